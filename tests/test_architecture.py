@@ -61,8 +61,6 @@ ALLOWED_IN_APP = {
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
 }
-# Folders of more files than a folder should have.
-CROWDED = {"autorig", "formats"}
 # Third-party modules with a single home.
 HOMES = {
     "moderngl": {"rendering", "app"},
@@ -134,7 +132,7 @@ def test_features_of_the_window_import_one_way() -> None:
 def test_folders_stay_small() -> None:
     folders = {path.parent for path in SOURCES}
     counts = {str(path.relative_to(PACKAGE)): len([*path.glob("*.py")]) for path in folders}
-    assert {name for name, count in counts.items() if count > 30} <= CROWDED
+    assert not {name for name, count in counts.items() if count > 30}
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -215,7 +213,7 @@ def test_nothing_touches_the_environment_of_the_process() -> None:
 # Circles that are still there, at run time or through types alone; new ones are not added.
 CIRCLES = {
     frozenset({"viewer.lint._finding", "viewer.lint._tracks"}),
-    frozenset({"viewer.formats._archive", "viewer.formats._source"}),
+    frozenset({"viewer.formats._archive.values", "viewer.formats._source"}),
     frozenset({"viewer.commands._sequence", "viewer.commands._shots"}),
 }
 

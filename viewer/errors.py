@@ -1,8 +1,8 @@
-"""The tree of errors, which callers catch at the height they need.
+"""The exception hierarchy; callers catch at the level they need.
 
 ::
 
-    ViewerError                 exit 2   anything a person can act on; one line, no traceback
+    ViewerError                 exit 2   an error the user can act on; one line, no traceback
     ├── FormatError             exit 2   a file breaks its format: path:line: expected, found
     ├── UnsupportedFormatError  exit 2   no reader or writer knows this kind of file
     ├── RigError                exit 2   parts that do not fit each other
@@ -35,7 +35,7 @@ _LONGEST = 1000  # characters of a message with names in it
 
 
 class ViewerError(Exception):
-    """Something a person can act on; ``str()`` is the one line to show.
+    """An error the user can act on; ``str()`` is the one line to show.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ class ViewerError(Exception):
     Attributes
     ----------
     diagnostic : Diagnostic or None
-        The fault as data, where it is about a file or a figure.
+        The fault as data, if it concerns a file or a figure.
     """
 
     exit_code = 2
 
     def __init__(self, problem: str | Diagnostic = "") -> None:
         self.diagnostic = problem if isinstance(problem, Diagnostic) else None
-        # Names of joints, figures and files come from files, and may hold anything.
+        # Names of joints, figures and files come from files and may contain any character.
         super().__init__(self._line(problem))
 
     def _line(self, problem: str | Diagnostic) -> str:
@@ -99,7 +99,7 @@ class RigError(ViewerError):
 
 
 class RenderError(ViewerError):
-    """OpenGL is missing, too old, or refused what was asked."""
+    """OpenGL is missing or too old, or refused a request."""
 
     exit_code = 4
 

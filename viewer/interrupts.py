@@ -28,7 +28,7 @@ import threading
 import time
 from contextlib import contextmanager
 
-# As in ``viewer/__init__.py``: what is imported here delays the moment of looking after signals.
+# As in ``viewer/__init__.py``: every import here delays the installation of signal handlers.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +45,7 @@ _PAUSE = 0.02  # seconds before raising is tried again
 
 
 class Interrupted(BaseException):
-    """A signal ends the run; no ``Exception``, so that nobody takes it for a fault of a file.
+    """A signal ends the run. Not an ``Exception``, so that no handler mistakes it for an error.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Interrupted(BaseException):
 
     @property
     def exit_code(self) -> int:
-        """As shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
+        """Exit code by shell convention: 130 after Ctrl-C, 143 after SIGTERM."""
         return 128 + self.number
 
 
@@ -67,7 +67,7 @@ class _Watch:
     """The signals of one run, from ``start`` to ``stop``, both in the main thread."""
 
     def __init__(self, is_held: bool, owns_process: bool = False) -> None:
-        self.number = 0  # of the signal that came; 0 for none
+        self.number = 0  # of the signal received; 0 if none
         self.is_held = is_held
         self._owns_process = owns_process
         self._since = 0.0
@@ -80,14 +80,14 @@ class _Watch:
     def start(self) -> None:
         for number in _SIGNALS:
             other = signal.getsignal(number)
-            # Ignored as nohup and shells want it for jobs in the background; None: not Python's.
+            # nohup and shells ignore signals for background jobs; None is a handler in C.
             if other not in (signal.SIG_IGN, None):
                 self._others[number] = other
                 signal.signal(number, self._on_signal)
         self._hook, sys.unraisablehook = sys.unraisablehook, self._on_unraisable
 
     def stop(self) -> None:
-        """Give the signals back to those who had them."""
+        """Restore the previous signal handlers."""
         with self._lock:
             self._is_over = True
         sys.unraisablehook = self._hook
@@ -95,7 +95,7 @@ class _Watch:
             signal.signal(number, other)
 
     def ignore(self) -> None:
-        """Ignore signals for good: the result stands, and the interpreter shuts down."""
+        """Ignore signals permanently: the result is final, and the interpreter is shutting down."""
         for number in self._others:
             signal.signal(number, signal.SIG_IGN)
 
@@ -119,7 +119,7 @@ class _Watch:
             raise Interrupted(self.number)
 
     def _force(self, number: int) -> None:
-        """End a program that does not respond; a library's caller decides for itself."""
+        """End a program that does not respond; used as a library, leave that to the caller."""
         if self._owns_process:
             os.write(2, f"viewer: {_SIGNALS[number]}\n".encode())
             os._exit(128 + number)
@@ -127,7 +127,7 @@ class _Watch:
         signal.raise_signal(number)
 
     def _on_unraisable(self, problem: UnraisableHookArgs, /) -> None:
-        """Raise again what was raised where Python drops exceptions, as in ``__del__``."""
+        """Raise again an interrupt raised where Python drops exceptions, as in ``__del__``."""
         if isinstance(problem.exc_value, Interrupted):
             self._ring_again()
         else:
@@ -145,7 +145,7 @@ class _Watch:
                 _thread.interrupt_main(signal.Signals(self.number))
 
 
-# There is one: signals belong to the process.
+# A single one, because signals belong to the process.
 _current: _Watch | None = None
 
 
@@ -195,7 +195,7 @@ def watch_program() -> None:
 
 @contextmanager
 def deferred() -> Iterator[None]:
-    """Put signals off until the end of the block, for calls into C libraries.
+    """Defer signals until the end of the block, for calls into C libraries.
 
     If no watch is active, because another program uses the package as a library, that program's
     own handlers are called at the end.
@@ -241,14 +241,14 @@ def _held(watch: _Watch | None, is_held: bool) -> Iterator[None]:
 
 
 def hold() -> None:
-    """Put signals off until the end of the enclosing block: from now on only ``poll`` raises."""
+    """Defer signals until the end of the enclosing block: from now on only ``poll`` raises."""
     watch = _mine()
     if watch is not None:
         watch.is_held = True
 
 
 def poll(in_any_thread: bool = False) -> None:
-    """Raise a signal that was put off, at a point where nothing is half done.
+    """Raise a deferred signal, at a point where no work is half done.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def poll(in_any_thread: bool = False) -> None:
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether a module is being imported; importers turn exceptions into others."""
+    """Return whether a module is being imported; import code may replace exceptions."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
@@ -276,7 +276,7 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 
 def _is_unwinding() -> bool:
-    """Return whether the signal was raised already, and clean-up is going on."""
+    """Return whether the signal has already been raised and clean-up is in progress."""
     problem = sys.exc_info()[1]
     while problem is not None:
         if isinstance(problem, Interrupted):

@@ -1,4 +1,4 @@
-"""Body models that a person has on disk: one folder, remembered, searched by published names."""
+"""Body models on disk: one remembered folder, searched for published file names."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ __all__ = [
 ]
 
 _DEEPEST = 4  # folders below the model folder that are searched
-_MOST_FILES = 20_000  # entries looked at: a home folder by mistake must not take minutes
+# Entries examined: a home folder given by mistake must not take minutes.
+_MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl")
 _SEX = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
-# Published file names, and the "kind:variant" by which they can be asked for.
+# Published file names, and the "kind:variant" that names each on the command line.
 _PUBLISHED = (
     (r"smpl_(?P<sex>neutral|male|female)", "smpl"),
     (r"basicmodel_(?P<sex>neutral|m|f)_lbs_10_207_0_v\d\.\d\.\d", "smpl"),
@@ -37,13 +38,13 @@ _PUBLISHED = (
 
 
 def _settings_file() -> Path:
-    import platformdirs  # only where models are looked for
+    import platformdirs  # imported only when models are searched for
 
     return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "models.json"
 
 
 def load_model_folder() -> Path | None:
-    """Return the folder that was remembered, None if none was or it cannot be read."""
+    """Return the remembered folder, None if there is none or the setting cannot be read."""
     try:
         folder = json.loads(_settings_file().read_text("utf-8"))["folder"]
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
@@ -57,11 +58,11 @@ def save_model_folder(folder: str | Path) -> Path:
     Raises
     ------
     ViewerError
-        If it is no folder.
+        If it is not a folder.
     OutputError
-        If it cannot be remembered.
+        If the setting cannot be saved.
     """
-    # Those of Path raise for names that are too long, and for people who do not exist.
+    # The methods of Path raise for names that are too long and for unknown users.
     path = Path(os.path.expanduser(folder))  # noqa: PTH111
     if not str(folder) or not os.path.isdir(path):  # noqa: PTH112
         found = printable(folder, 300) or "an empty name"
@@ -71,23 +72,23 @@ def save_model_folder(folder: str | Path) -> Path:
     except OSError as problem:
         raise OutputError(f"{printable(_settings_file(), 300)}: {problem.strerror}") from None
     text = json.dumps({"folder": str(path.resolve())}, indent=1)
-    with deferred():  # signals raise again afterwards: this is no result
+    with deferred():  # signals raise again afterwards, because this is not a result
         save_bytes(_settings_file(), text.encode("utf-8", "replace"))
     return path
 
 
 def known_models(folder: Path) -> dict[str, Path]:
-    """Return the models in a folder and those below, by the name they can be asked for.
+    """Return the models in a folder and its subfolders, by the name that selects each.
 
     Parameters
     ----------
     folder : Path
-        Searched a few levels deep.
+        Folder to search, a few levels deep.
 
     Returns
     -------
     dict
-        ``"smplx:neutral"`` to its file; an ``.npz`` goes before a ``.pkl`` of the same name.
+        ``"smplx:neutral"`` to its file; an ``.npz`` takes precedence over a ``.pkl``.
     """
     found: dict[str, Path] = {}
     for path in _files(folder):
@@ -100,7 +101,7 @@ def known_models(folder: Path) -> dict[str, Path]:
 
 def _files(folder: Path) -> list[Path]:
     paths, looked = [], 0
-    # The settings may name anything; Path.is_dir() would raise for some of it.
+    # The setting may be any text, and Path.is_dir() raises for some texts.
     if not os.path.isdir(folder):  # noqa: PTH112
         return []
     for root, folders, names in os.walk(folder):
@@ -121,7 +122,7 @@ def _name_of(path: Path) -> str | None:
     """Return ``kind:variant`` of a published file name, None for others."""
     stem, above = path.stem.lower(), path.parent.name.lower()
     if stem == "model" and above in _SEX and path.parent.parent.name.lower() == "smplh":
-        return f"smplh:{_SEX[above]}"  # as AMASS asks to unpack them
+        return f"smplh:{_SEX[above]}"  # the folders that AMASS tells users to unpack it to
     for pattern, kind in _PUBLISHED:
         match = re.fullmatch(pattern, stem)
         if match:
@@ -136,9 +137,9 @@ def find_model(name: str, folder: Path | None) -> Path | None:
     Parameters
     ----------
     name : str
-        In any case of letters; a kind alone means its neutral or only model.
+        Case-insensitive; a kind alone means its neutral or only model.
     folder : Path or None
-        Where models are.
+        Model folder.
     """
     if folder is None:
         return None

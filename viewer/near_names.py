@@ -1,4 +1,4 @@
-"""Suggestions for a name that does not exist: the names that were probably meant."""
+"""Suggestions for an unknown name: the most similar existing names."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from viewer.phrases import printable
 __all__ = ["did_you_mean", "name_hint", "near_names", "question"]
 
 _MOST_NEAR = 5
-_MOST_LISTED = 20  # a list that is not longer is shown whole
+_MOST_LISTED = 20  # lists up to this length are shown whole
 _BEGINNING = 6  # names of a longer list
-_MARGIN = 0.15  # of the ratio, below the best: the others are less likely by far
+_MARGIN = 0.15  # of the similarity ratio below the best; names with a lower ratio are unlikely
 _LONGEST = 80  # characters of a name
 
 
@@ -21,19 +21,19 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
     Parameters
     ----------
     text : str
-        What was typed. The case of letters does not count.
+        Text that was typed, compared case-insensitively.
     names : iterable of str
-        Those there are. Empty names are skipped, repeated ones count once.
+        Existing names. Empty names are skipped, repeated ones count once.
     alike : float
-        Smallest ratio of equal letters, as difflib measures it: 1 for equal names. Names that
-        contain the text, if it is no single letter, count as just alike enough.
+        Smallest similarity ratio, as difflib measures it: 1 for equal names. Names that contain
+        the text count as having exactly this ratio, unless the text is a single letter.
 
     >>> near_names("left_kne", ["right_knee", "left_knee", "head"])
     ['left_knee']
     >>> near_names("knee", ["head", "L_Knee"])
     ['L_Knee']
     """
-    # Only needed once something is wrong.
+    # Imported late, because it is needed only for errors.
     from difflib import SequenceMatcher
 
     wanted = text.lower()[:_LONGEST]

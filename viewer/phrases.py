@@ -1,4 +1,4 @@
-"""Counts, lists and names as messages write them."""
+"""Formatting of counts, lists and names in messages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def printable(text: object, limit: int = 200) -> str:
 
 
 def quoted(word: bytes | str, limit: int = 40) -> str:
-    r"""Return a word of a file in double quotes, on one line and not too long.
+    r"""Return a word of a file in double quotes, on one line, truncated if long.
 
     >>> quoted(b"up\x00"), quoted("left")
     ('"up\\x00"', '"left"')
@@ -40,11 +40,11 @@ def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None
     Parameters
     ----------
     count : int
-        How many.
+        Number of things.
     noun : str
-        Singular; its last word takes the plural: ``"negative weight"``.
+        Singular noun, whose last word is made plural: ``"negative weight"``.
     one, many : str
-        Verb for one and for several: ``"is"``, ``"are"``; none if left out.
+        Verb for one and for several: ``"is"``, ``"are"``; no verb if omitted.
     of : int, optional
         The total.
 

@@ -1,4 +1,4 @@
-"""Location of ``shaders/``, ``assets/`` and ``manual/``, in a checkout and in a wheel."""
+"""Locations of ``shaders/``, ``assets/`` and ``manual/``, in a checkout and in a wheel."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def resource(kind: str, *parts: str) -> Path:
     Raises
     ------
     ViewerError
-        If the installation lacks it.
+        If it is missing from the installation.
     """
     # A wheel puts the folders inside the package; a checkout has them beside it.
     for base in (_PACKAGE, _PACKAGE.parent):

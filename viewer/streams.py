@@ -19,10 +19,10 @@ _MOST_LINKS = 40  # as the kernel follows
 
 
 def is_stdout(path: str | Path) -> bool:
-    """Return whether a path is a name of the output stream, or a link to one.
+    """Return whether a path names standard output, or is a link to such a name.
 
-    What the stream leads to is another question: a redirected file must never be replaced, as the
-    caller may append to it.
+    The file that the stream is redirected to does not count. It must never be replaced, because
+    the caller may append to it.
     """
     text = str(path)
     for _ in range(_MOST_LINKS):
@@ -36,33 +36,33 @@ def is_stdout(path: str | Path) -> bool:
 
 
 def require_stdout(path: str | Path) -> None:
-    """Refuse a name of the output stream where that is closed.
+    """Refuse a path that names standard output if the stream is closed.
 
     Raises
     ------
     OutputError
-        With the name.
+        If it is closed; the message gives the name.
     """
     if is_stdout(path) and getattr(sys.stdout, "buffer", None) is None:
         raise OutputError(f"{printable(path, 300)}: standard output is closed")
 
 
 def write_stdout(path: str | Path, data: bytes) -> None:
-    """Write bytes to the output stream.
+    """Write bytes to standard output.
 
     Parameters
     ----------
     path : str or Path
-        What the stream is called in messages.
+        Name of the stream in messages.
     data : bytes
-        What to write.
+        Bytes to write.
 
     Raises
     ------
     OutputError
-        If the stream is closed, takes no bytes, or its disk is full.
+        If the stream is closed or not writable, or its disk is full.
     BrokenPipeError
-        If nobody reads it any more.
+        If its reader has closed it.
     """
     require_stdout(path)
     try:
@@ -77,13 +77,13 @@ def write_stdout(path: str | Path, data: bytes) -> None:
 
 
 def summary_stream(output: str | Path) -> TextIO:
-    """Return where to say what was written: a file on its way through a pipe ends with its data."""
+    """Return the stream for a summary: standard error if the output goes to standard output."""
     return sys.stderr if is_stdout(output) else sys.stdout
 
 
 @contextlib.contextmanager
 def standard_streams() -> Iterator[None]:
-    """Make messages harmless for a while, and keep files from getting a standard descriptor.
+    """Ignore errors of messages in the block, and reserve the standard descriptors.
 
     A message that cannot be written changes neither result nor exit code. Where the error stream
     is closed, messages are dropped; ``print`` would write them into the output.
@@ -101,20 +101,20 @@ def standard_streams() -> Iterator[None]:
 
 
 def _reserve(stack: contextlib.ExitStack) -> None:
-    """Open closed descriptors below 3: what a library prints must not get into a result."""
+    """Open closed descriptors below 3, so that output of a library cannot end up in a result."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
         stack.callback(os.close, descriptor)
     os.close(descriptor)
 
 
 class _Messages(io.TextIOBase):
-    """A text stream whose errors nobody has to handle."""
+    """A text stream that ignores its errors."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write, or drop, a text."""
+        """Write a text, or drop it if that fails."""
         try:
             self._stream.write(text)
         except (OSError, ValueError):
@@ -122,14 +122,14 @@ class _Messages(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Write what is held back, or drop it."""
+        """Write buffered text, or drop it if that fails."""
         try:
             self._stream.flush()
         except (OSError, ValueError):
             self._lose()
 
     def isatty(self) -> bool:
-        """Return whether a person reads along."""
+        """Return whether the stream is a terminal."""
         return not self._stream.closed and self._stream.isatty()
 
     def fileno(self) -> int:
@@ -137,7 +137,7 @@ class _Messages(io.TextIOBase):
         return self._stream.fileno()
 
     def _lose(self) -> None:
-        # Python would complain at its end about what is still held back.
+        # Python would report text that is still buffered when it exits.
         with contextlib.suppress(OSError, ValueError):  # no file, as in tests
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, self._stream.fileno())

@@ -13,7 +13,7 @@ from measure import interleaved, report, run_process
 
 import viewer
 from viewer.formats import Source
-from viewer.formats._archive_opening import open_archive
+from viewer.formats._archive.opening import open_archive
 
 GOAL = 1.5
 MEMORY_GOAL = 3.0

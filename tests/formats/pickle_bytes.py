@@ -14,8 +14,8 @@ from faults import Fault, fault_of
 from numpy.typing import NDArray
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive
-from viewer.formats._archive_opening import open_archive
+from viewer.formats._archive.opening import open_archive
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 

@@ -14,9 +14,9 @@ from numpy.testing import assert_array_equal
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Opaque, Sparse
-from viewer.formats._archive_opening import is_archive, open_archive
-from viewer.formats._container import are_indices
+from viewer.formats._archive.checking import are_indices
+from viewer.formats._archive.opening import is_archive, open_archive
+from viewer.formats._archive.values import Archive, Opaque, Sparse
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 

@@ -7,7 +7,7 @@ from faults import NAN
 from numpy.testing import assert_array_equal
 
 from viewer.diagnostics import Phrase
-from viewer.formats._easymocap.shapes import carry, last_given
+from viewer.formats._easymocap.shapes import hold, last_given
 
 ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
 GIVEN = np.array([False, True, False, True, False])
@@ -15,15 +15,15 @@ GIVEN = np.array([False, True, False, True, False])
 
 def test_rows_repeat_the_last_good_one():
     expected = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [np.nan, 3.0], [1.0, 2.0]]
-    assert_array_equal(carry(ROWS, GIVEN, None), expected)
+    assert_array_equal(hold(ROWS, GIVEN, None), expected)
 
 
 def test_rows_begin_with_what_was_known():
-    assert_array_equal(carry(ROWS, GIVEN, np.array([7.0, 8.0]))[0], [7.0, 8.0])
+    assert_array_equal(hold(ROWS, GIVEN, np.array([7.0, 8.0]))[0], [7.0, 8.0])
 
 
 def test_complete_rows_stay_as_they_are():
-    assert carry(ROWS, np.ones(5, dtype=bool), None) is ROWS
+    assert hold(ROWS, np.ones(5, dtype=bool), None) is ROWS
 
 
 def test_last_good_row_is_remembered():

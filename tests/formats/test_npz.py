@@ -19,8 +19,8 @@ from numpy.testing import assert_array_equal
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Opaque
-from viewer.formats._archive_opening import open_archive
+from viewer.formats._archive.opening import open_archive
+from viewer.formats._archive.values import Archive, Opaque
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 

@@ -35,8 +35,8 @@ from pickle_bytes import (
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Opaque, Sparse
-from viewer.formats._archive_opening import open_archive
+from viewer.formats._archive.opening import open_archive
+from viewer.formats._archive.values import Opaque, Sparse
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, frozen
 

@@ -35,7 +35,7 @@ from pickle_bytes import (
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Opaque
+from viewer.formats._archive.values import Opaque
 from viewer.rig.arrays import Deferred
 
 pytestmark = pytest.mark.slow

@@ -28,7 +28,7 @@ from pickle_bytes import (
 )
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Opaque
+from viewer.formats._archive.values import Opaque
 from viewer.phrases import printable
 
 DAMAGED = (

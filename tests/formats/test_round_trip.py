@@ -148,7 +148,7 @@ def test_mesh_without_skin_comes_back():
 def test_other_pictures_are_not_replaced(tmp_path):
     (tmp_path / "a.png").write_bytes(b"mine")
     textured = mesh(materials=(Material("", "a.png", np.zeros((1, 1, 4), np.uint8)),))
-    with pytest.raises(OutputError, match=r"a\.png: another picture is there already"):
+    with pytest.raises(OutputError, match=r"a\.png: a different picture exists already"):
         write(Figure("a", textured), tmp_path / "a.skin")
     assert (tmp_path / "a.png").read_bytes() == b"mine"
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]

@@ -114,7 +114,7 @@ def test_odd_sizes_repeat_the_last_column_and_row(tmp_path, suffix):
     pixels[:, 32, :3], pixels[30, :, :3] = (200, 0, 0), (0, 0, 200)
     sink = VideoSink(path, (33, 31), 25.0, quality=100)
     assert sink.notes == [
-        f"{path}: this format needs even sizes; the last column or row is repeated: "
+        f"{path}: this format needs even dimensions; the last column or row is repeated: "
         "33 x 31 becomes 34 x 32"
     ]
     write(sink, [pixels])
@@ -172,7 +172,7 @@ def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
     pixels[:24, :, 3], pixels[24:, :32, 3] = 0, 128
     wants = suffix == ".mp4"
     sink = VideoSink(path, (64, 48), 25.0, transparent=wants)
-    said = f"{path}: this format knows no transparency; drawn on black"
+    said = f"{path}: this format has no transparency; drawn on black"
     assert sink.notes == [said] * wants
     write(sink, [pixels])
     frame = decoded(path)[0].astype(int)
@@ -194,8 +194,8 @@ def delays(path: Path) -> list[int]:
     [
         (25.0, [4] * 6, ""),
         (50.0, [2] * 6, ""),
-        (30.0, [3, 4, 3, 3, 4, 3], "frames stay for 3 or 4 of them, 30 frames a second on average"),
-        (24.0, [4, 4, 4, 5, 4, 4], "frames stay for 4 or 5 of them, 24 frames a second on average"),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames a second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames a second on average"),
     ],
 )
 def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
@@ -311,7 +311,7 @@ def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words)
 def test_kinds_are_listed_for_other_suffixes():
     with pytest.raises(UnsupportedFormatError) as caught:
         video_kind(Path("x.avi"))
-    assert str(caught.value) == ('videos cannot be written as ".avi"; there are: .mp4, .webm, .gif')
+    assert str(caught.value) == ('videos cannot be written as ".avi"; supported: .mp4, .webm, .gif')
 
 
 @pytest.mark.parametrize(
@@ -319,7 +319,7 @@ def test_kinds_are_listed_for_other_suffixes():
     [
         ("missing/x.mp4", "does not exist"),
         ("folder.mp4", "is a folder"),
-        ("pipe.mp4", "is not a regular file, which a video must be written to"),
+        ("pipe.mp4", "is not a regular file, and a video must be written to one"),
     ],
 )
 def test_places_where_no_video_can_be_are_refused_at_once(tmp_path, name, words):

@@ -28,7 +28,7 @@ from viewer.media.saving import (
 from viewer.media.targets import check_folder_target, check_targets
 
 if TYPE_CHECKING:
-    from viewer.formats._archive import Archive
+    from viewer.formats._archive.values import Archive
     from viewer.formats.rig import NamedFiles
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
@@ -80,26 +80,26 @@ __all__ = [
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy")
-_ANY_TEXT = (".txt",)  # says nothing of what is inside
-_HEAD = 1 << 16  # bytes in which a file has to show what it is
+_ANY_TEXT = (".txt",)  # says nothing about the content
+_HEAD = 1 << 16  # bytes that must identify a file
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """What menus and dialogs must know before a format's module is imported.
+    """Properties of a format that menus and dialogs need before its module is imported.
 
     Attributes
     ----------
     title : str
-        For menus and the manual.
+        Name in menus and the manual.
     suffixes : tuple of str
-        With their dots; the first is what files are called that we write.
+        Suffixes with their dots; files are written with the first.
     signature : bytes
         Regular expression that the head of every such text file contains; empty for none.
     keys : tuple of str
-        What an archive (``.pkl``, ``.npz``) of this kind holds: any of them tells it.
+        Keys that identify an archive (``.pkl``, ``.npz``) of this kind: any of them is enough.
     files : tuple of str
-        What a folder of this kind holds: any of them tells it.
+        Files that identify a folder of this kind: any of them is enough.
     writes : bool
         Whether there is a writer.
     is_bare_mesh : bool
@@ -198,7 +198,7 @@ def detect(source: Source) -> str:
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
     if _is_archive(source):
-        # A text format's suffix on a broken archive: say what it is, not how it is broken.
+        # A broken archive with a text format's suffix: the fault is the suffix.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
             return _detect_archive(source)
     head = source.head(_HEAD)
@@ -206,13 +206,13 @@ def detect(source: Source) -> str:
         if re.search(FORMATS[key].signature, head):
             return key
     for key, kind in texts.items():
-        # Numbers alone are a pose only where no other suffix says otherwise.
+        # Bare numbers are a pose only if the suffix belongs to no other format.
         if re.search(kind.signature, head) and not (by_suffix and key == "pose"):
             if by_suffix:
                 source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
             return key
     if suffix in _ARCHIVES:
-        return _detect_archive(source)  # says what it is instead
+        return _detect_archive(source)  # its error names the kind of archive
     looks = source.looks_like()
     if by_suffix and looks is None:
         return by_suffix  # its reader knows best what is missing
@@ -233,7 +233,7 @@ MESHES = tuple(s for kind in FORMATS.values() if kind.is_bare_mesh for s in kind
 
 
 def claims(suffix: str) -> bool:
-    """Return whether a text format owns a suffix, so that other content under it is a mistake."""
+    """Return whether a suffix belongs to a text format, so that other content is a mistake."""
     kinds = (kind for kind in FORMATS.values() if kind.signature)
     return any(suffix.lower() in kind.suffixes for kind in kinds) and suffix not in _ARCHIVES
 
@@ -256,13 +256,13 @@ def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
     if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
         return False  # most text files, before the module for archives is loaded
-    from viewer.formats._archive_opening import is_archive
+    from viewer.formats._archive.opening import is_archive
 
     return is_archive(head)
 
 
 def _detect_archive(source: Source) -> str:
-    from viewer.formats._container import archive_of
+    from viewer.formats._archive.checking import archive_of
 
     archive = archive_of(source)
     keys = archive.keys
@@ -279,7 +279,7 @@ def _detect_archive(source: Source) -> str:
 
 
 def _pose_or_motion(archive: Archive) -> str:
-    """Tell one pose from many; the keys are the same."""
+    """Return whether an archive is one pose or a motion; both have the same keys."""
     from viewer.formats.amass import has_frames
 
     is_pose = set(archive.keys).intersection(FORMATS["pose"].keys)
@@ -300,7 +300,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     Parameters
     ----------
     content : Figure, Clip or PoseRecord
-        What to write.
+        Content of the file.
     path : str or Path
         Its suffix chooses the format.
 

@@ -1,4 +1,4 @@
-"""Bytes of files: what may be read, and why something cannot be."""
+"""Reading of files: size limits, kinds of files, and errors about unreadable ones."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MAX_SIZE = 2 << 30
 """Largest file that is read, in bytes, unless the caller says otherwise."""
 
 FOLDER = "a folder"
-"""What ``kind_of`` calls a folder."""
+"""Name of a folder in the result of ``kind_of``."""
 
-_MOST_FILES = 2000  # of a folder that are compared with the name of a missing one
-_ALIKE = 0.8  # names of files share their suffixes, and often more
+_MOST_FILES = 2000  # in a folder that are compared with the name of a missing file
+_ALIKE = 0.8  # high, because file names have suffixes in common, and often more
 _KINDS = {
     stat.S_IFDIR: FOLDER,
     stat.S_IFIFO: "a pipe",
@@ -31,7 +31,7 @@ _KINDS = {
 
 
 def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
-    """Read a regular file whole.
+    """Read a whole regular file.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
 
 
 def kind_of(path: Path, max_size: int) -> str | None:
-    """Look before opening, as a pipe would block: return what it is, None for a file."""
+    """Return the kind of a path, None for a file; opening a pipe to find out would block."""
     try:
         status = path.stat()
     except (OSError, ValueError) as problem:
@@ -80,7 +80,7 @@ def _unreadable(path: Path, problem: Exception) -> FormatError:
 
 
 def unreadable(path: Path, reason: object, near: str = "") -> FormatError:
-    """Return the error of a file that the system does not give out."""
+    """Return the error of a file that cannot be read."""
     return FormatError(
         Diagnostic("F001.unreadable", path, values={"reason": str(reason), "near": near})
     )
@@ -91,11 +91,11 @@ def no_file(path: Path, kind: str) -> FormatError:
 
 
 def _near_files(path: Path) -> str:
-    """Return a question that offers files with a similar name, "" if there are none."""
+    """Return a question that suggests files with similar names, "" if there are none."""
     try:
         with os.scandir(path.parent) as entries:
             names = [entry.name for entry in islice(entries, _MOST_FILES)]
-    except OSError:  # the folder is missing too, or may not be listed
+    except OSError:  # the folder is missing too, or cannot be listed
         return ""
-    # A link that leads nowhere has this name itself.
+    # A dangling link has this very name.
     return did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)

@@ -1,4 +1,4 @@
-"""Half floats of archives, which become doubles before anything is computed with them.
+"""Conversion of the half floats in archives to doubles, before anything is computed with them.
 
 A half overflows at 65504: comparing it with a larger Python number, or adding two, already warns.
 """
@@ -16,12 +16,12 @@ __all__ = ["in_double", "widened"]
 
 
 def widened(array: Deferred) -> Deferred:
-    """Return an array whose values are given as ``in_double`` gives them."""
+    """Return an array whose values are converted by ``in_double``."""
     if array.dtype != np.float16:
         return array
     return Deferred(array.shape, np.float64, lambda: in_double(array.values()))
 
 
 def in_double(values: NDArray[Any]) -> NDArray[Any]:
-    """Return halves as doubles, which hold each of them exactly, and others as they are."""
+    """Return half floats as doubles, which is exact, and other values unchanged."""
     return values.astype(np.float64) if values.dtype == np.float16 else values

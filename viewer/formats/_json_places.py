@@ -1,8 +1,8 @@
-"""Places in a JSON text: looked for only when an error needs one.
+"""Offsets of values in a JSON text, searched for only when an error needs one.
 
-Reading is left to Python's own parser, which is fast and keeps no places. The text is gone through
-a second time, token by token, once something in it is known to be wrong. All of it but nesting is
-then known to be valid JSON, except that NaN and infinities may stand for numbers.
+Python's parser is fast, but it keeps no offsets. The text is scanned a second time, token by token,
+once a fault in it is known. Apart from its nesting it is then known to be valid JSON, except that
+NaN and infinities may stand for numbers.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ __all__ = [
 ]
 
 MOST_DIGITS = 4300
-"""Of a whole number that Python converts."""
+"""Largest number of digits of a whole number that Python converts."""
 
 Keys = tuple[str | int, ...]
-"""Keys and indices that lead from the whole to a value."""
+"""Keys and indices that lead from the outermost value to a nested one."""
 
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+')
 _CONSTANTS = ("NaN", "Infinity", "-Infinity")
@@ -36,14 +36,14 @@ _LONG_NUMBER = re.compile(rf"[0-9]{{{MOST_DIGITS + 1}}}")
 
 
 def line_at(text: str, offset: int) -> int:
-    """Return the number of the line, from 1, that an offset is in."""
+    """Return the line of an offset, counted from 1."""
     return 1 + text.count("\n", 0, offset)
 
 
 def value_place(text: str, path: Sequence[str | int]) -> int | None:
     """Return the offset of a value, in characters; None if there is no such value.
 
-    Of several keys of one name the last one counts, as in Python.
+    If a key is repeated, its last value counts, as in Python.
 
     >>> value_place('{"a": [1, 22]}', ("a", 1))
     10
@@ -57,9 +57,9 @@ def value_place(text: str, path: Sequence[str | int]) -> int | None:
 
 
 def nearest_place(text: str, path: Sequence[str | int]) -> int | None:
-    r"""Return the offset of a key or list item, or of what holds it if it is not there.
+    r"""Return the offset of a key or list item; if it is missing, that of its container.
 
-    None if not even the outermost is there.
+    None if the outermost container is missing too.
 
     >>> nearest_place('[{"id": 0, "poses": []}]', (0, "poses"))
     11
@@ -76,7 +76,7 @@ def nearest_place(text: str, path: Sequence[str | int]) -> int | None:
 
 
 def repeated_key(text: str) -> tuple[str, int] | None:
-    """Return the first key that an object has twice, and the offset of the second one."""
+    """Return the first repeated key of an object, and the offset of its second occurrence."""
     seen: set[Keys] = set()
     for path, offset, is_key in _places(text):
         if is_key and path in seen:
@@ -93,7 +93,7 @@ def constant_place(text: str) -> tuple[str, int] | None:
 
 
 def nesting_place(text: str, depth: int) -> int:
-    """Return the offset of the first bracket below so many others; the text's end if there is none.
+    """Return the offset of the first bracket at a depth; the end of the text if there is none.
 
     The text need not be valid JSON.
     """
@@ -109,7 +109,7 @@ def nesting_place(text: str, depth: int) -> int:
 
 
 def deepest_place(text: str) -> int:
-    """Return the offset of the bracket that is nested deepest; the text need not be valid JSON."""
+    """Return the offset of the most deeply nested bracket; the text need not be valid JSON."""
     depth = deepest = place = 0
     for token in _TOKEN.finditer(text):
         depth += {"{": 1, "[": 1, "}": -1, "]": -1}.get(token.group(), 0)

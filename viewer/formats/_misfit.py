@@ -1,4 +1,4 @@
-"""Faults on their way to whoever knows their file, or decides that they are only remarks."""
+"""Faults found where the file is not known, and remarks derived from faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["MisfitError", "remark_on"]
 
 
 class MisfitError(Exception):
-    """A value that cannot be used; whoever knows the file and the place says so.
+    """An invalid value; the caller adds the file and the line.
 
     Attributes
     ----------

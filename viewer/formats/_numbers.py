@@ -1,4 +1,4 @@
-"""Parse long blocks of decimal numbers with numpy, exactly as ``float()`` would above 5e-324.
+"""Parser for long blocks of decimal numbers, in numpy, exact as ``float()`` above 5e-324.
 
 Eight characters are treated as one 64-bit word ("SIMD within a register"). A number with at
 most 15 digits is an integer below 2^53 divided by a power of ten not above 10^22, both exact
@@ -35,7 +35,7 @@ LARGEST = float(np.finfo(np.float32).max)
 """Numbers beyond this become infinite on the GPU, so no file may hold them."""
 
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[fF]?")
-# As Python, C and the C of Microsoft write what is no finite number.
+# NaN and infinity as written by Python, C and Microsoft's C library.
 _NOT_FINITE = re.compile(
     rb"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|1\.?#(?:q?nan|snan|ind|inf)\w*)", re.IGNORECASE
 )
@@ -71,7 +71,7 @@ def is_number(word: bytes) -> bool:
 def to_number(word: bytes) -> float | None:
     """Return a word's value, or None if it is not a finite number that a float32 can hold.
 
-    A number other than 0 stays one, however small.
+    A number other than 0 stays different from 0, however small.
 
     >>> to_number(b"2.5f"), to_number(b"1e-400")
     (2.5, 5e-324)
@@ -80,13 +80,13 @@ def to_number(word: bytes) -> float | None:
         return None
     value = float(word.rstrip(b"fF"))
     if value == 0.0 and _NOT_ZERO.match(word):
-        # No index and no count may take what is only too small for 0, a whole number.
+        # A tiny number must not round to 0, which would be valid as an index or a count.
         value = math.copysign(_SMALLEST, value)
     return value if abs(value) <= LARGEST else None
 
 
 def is_infinite(word: bytes) -> bool:
-    """Return whether a word was a number once: NaN, infinity, or more than a float32 can hold.
+    """Return whether a word is NaN, infinity, or a number that a float32 cannot hold.
 
     >>> is_infinite(b"-nan"), is_infinite(b"1e999"), is_infinite(b"-1.#IND"), is_infinite(b"up")
     (True, True, True, False)
@@ -116,7 +116,7 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     Returns
     -------
     values : (N,)
-        The numbers before the first word that is none.
+        The numbers before the first word that is not a number.
     bad : int
         Index of that word, -1 if all are numbers.
 
@@ -133,7 +133,7 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
 
 
 def parse_words(data: bytes, start: int, end: int) -> Floats:
-    """Parse white-space-separated words, whatever they are.
+    """Parse white-space-separated words, which need not be numbers.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def parse_words(data: bytes, start: int, end: int) -> Floats:
     Returns
     -------
     (N,)
-        NaN for every word that is no number.
+        NaN for every word that is not a number.
 
     >>> parse_words(b"1 up 1e3", 0, 8).tolist()
     [1.0, nan, 1000.0]
@@ -157,7 +157,7 @@ def parse_words(data: bytes, start: int, end: int) -> Floats:
 
 
 def word_begins(letters: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return where words begin that white space parts.
+    """Return the offsets of white-space-separated words.
 
     >>> word_begins(np.frombuffer(b" 1 23", np.uint8)).tolist()
     [1, 3]
@@ -178,11 +178,11 @@ def _chunk_bounds(data: bytes, start: int, end: int) -> Iterator[tuple[int, int]
 
 
 def _parse_chunk(chunk: bytes, whole: bool = False) -> tuple[Floats, int]:
-    """Return the numbers up to the first word that is none, or else all, with NaN for such."""
+    """Return the numbers before the first invalid word, or all with NaN for invalid words."""
     padded = b" " * _PAD + chunk + b" "
     letters = np.frombuffer(padded, dtype=np.uint8)
-    # Control characters, 0-8 and 14-31, would count as white space below, but they belong to a
-    # word. The subtraction wraps around, so one comparison finds the second range.
+    # Control characters, 0-8 and 14-31, would count as white space below, but they are part of
+    # a word. The subtraction wraps around, so one comparison finds the second range.
     if letters.min() < 9 or (letters - np.uint8(14) < 18).any():
         return _parse_slowly(chunk, whole)
     space = letters <= ord(" ")
@@ -212,7 +212,7 @@ def _parse_slowly(chunk: bytes, whole: bool) -> tuple[Floats, int]:
 def _parse_words(
     padded: bytes, letters: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the words' values and which of them need ``float()`` instead."""
+    """Return the values of words, and a mask of the words that need ``float()`` instead."""
     lengths = ends - starts
     minus = None
     if b"-" in padded or b"+" in padded:
@@ -236,7 +236,7 @@ def _parse_words(
 def _parse_short(
     windows: NDArray[np.void], ends: NDArray[np.intp], lengths: NDArray[np.intp], has_dots: bool
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Parse unsigned words of at most 8 characters; longer ones give something to replace."""
+    """Parse unsigned words of at most 8 characters; results of longer ones must be replaced."""
     words = _digits_only(windows.take(ends - 8).view("<u8"), np.minimum(lengths, 8))
     if not has_dots:
         return _eight_digits(words).astype(np.float64), (lengths < 1) | _not_digits(words)
@@ -253,7 +253,7 @@ def _parse_long(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Parse unsigned words of 9 to 16 characters.
 
-    Of several points one stays, and is then found not to be a digit.
+    If a word has several points, one is left over and is then found not to be a digit.
     """
     low = windows.take(ends - 8).view("<u8")
     high = _digits_only(windows.take(ends - 16).view("<u8"), np.minimum(lengths - 8, 8))

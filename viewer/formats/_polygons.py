@@ -1,4 +1,4 @@
-"""Polygons cut into triangles: fans where they are convex, ears where they are not."""
+"""Triangulation of polygons: fans where they are convex, ear clipping where they are not."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ __all__ = ["first_known", "triangles_of", "triangulate"]
 
 Picks = NDArray[np.int64]
 
-_MOST_CORNERS = 400  # beyond, ears would take seconds: such a polygon becomes a fan
-_CHUNK = 4_000_000  # (corner, corner) pairs that are looked at together
+_MOST_CORNERS = 400  # ear clipping of larger polygons would take seconds, so they become fans
+_CHUNK = 4_000_000  # (corner, corner) pairs that are tested at once
 
 
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
-    """Cut polygons into triangles that cover them, in their order and winding.
+    """Triangulate polygons, keeping their order and winding.
 
-    A quad is split along the diagonal that leaves both halves facing as the whole does; a larger
-    polygon becomes a fan if its first corner sees all others, else ears are cut off one by one
-    (Meisters 1975), in the plane of its area vector (Newell).
+    A quad is split along the diagonal that leaves both halves facing like the whole; a larger
+    polygon becomes a fan if its first corner sees all others, otherwise its ears are clipped one
+    by one (Meisters 1975), in the plane of its area vector (Newell).
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
     Returns
     -------
     picks : (T, 3)
-        Indices into ``corners``: whatever else a corner has follows them.
+        Indices into ``corners``, which also select other attributes of the corners.
     faces : (T,)
-        The polygon that each triangle is a part of, never falling.
+        Polygon of each triangle, in ascending order.
     """
     starts = np.cumsum(counts) - counts
     if (counts == 3).all():
@@ -58,7 +58,7 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
 
 
 def _cut(points: Floats) -> Picks:
-    """Return the triangles of polygons with equally many corners: (F, n, 3) to (F, n - 2, 3)."""
+    """Triangulate polygons with the same number of corners: (F, n, 3) to (F, n - 2, 3)."""
     count, size = points.shape[:2]
     normals = _area_vectors(points)
     fan = _fan(size)
@@ -89,16 +89,16 @@ def _area_vectors(points: Floats) -> Floats:
 
 
 def _is_covered(points: Floats, triangles: Picks, normals: Floats) -> Bools:
-    """Return which polygons' triangles all face as the polygon does."""
+    """Return a mask of polygons whose triangles all face like the polygon: (F,)."""
     a, b, c = (points[:, triangles[:, corner]] for corner in range(3))
     facing = np.einsum("fta,fa->ft", np.cross(b - a, c - a), normals)
     return (facing > 0.0).all(axis=1)
 
 
 def _flattened(points: Floats, normals: Floats) -> Floats:
-    """Return polygons in their own planes, counter-clockwise: (F, n, 2)."""
+    """Project polygons into their own planes, counter-clockwise: (F, n, 2)."""
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    # The axis that the normal is farthest from makes a safe first direction.
+    # The axis with the smallest component of the normal gives a well-conditioned cross product.
     axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(axes, normals)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -108,7 +108,7 @@ def _flattened(points: Floats, normals: Floats) -> Floats:
 
 
 def _ears(points: Floats) -> Picks:
-    """Cut ears off all polygons at once, one each a round: (F, n, 2) to (F, n - 2, 3)."""
+    """Clip one ear of every polygon in each round: (F, n, 2) to (F, n - 2, 3)."""
     count, size = points.shape[:2]
     left = np.tile(np.arange(size), (count, 1))
     rows = np.arange(count)
@@ -118,7 +118,7 @@ def _ears(points: Floats) -> Picks:
         corners = [points[rows[:, None], index] for index in (before, left, after)]
         areas = _cross(corners[1] - corners[0], corners[2] - corners[0])
         is_ear = (areas > 0.0) & ~_has_inside(corners, corners[1])
-        # Where no ear is left (a polygon that crosses itself) the widest corner goes.
+        # A self-intersecting polygon may have no ear left; then the largest corner is clipped.
         chosen = np.where(is_ear.any(axis=1), is_ear.argmax(axis=1), areas.argmax(axis=1))
         found.append(np.stack([part[rows, chosen] for part in (before, left, after)], axis=1))
         keeps = np.ones(left.shape, dtype=np.bool_)
@@ -129,7 +129,7 @@ def _ears(points: Floats) -> Picks:
 
 
 def _has_inside(corners: list[Floats], points: Floats) -> Bools:
-    """Return which triangles hold a point that is none of their corners: (F, k) for k points."""
+    """Return a mask of triangles that contain a point other than their corners: (F, k)."""
     inside = np.ones((*points.shape[:2], points.shape[1]), dtype=np.bool_)
     spots = points[:, None]
     for start, end in ((0, 1), (1, 2), (2, 0)):
@@ -145,19 +145,19 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def triangles_of(counts: Picks, faces: Picks) -> Picks:
-    """Return the triangles that some polygons become, two fewer than corners each.
+    """Return the triangles that ``triangulate`` makes of some polygons.
 
     Parameters
     ----------
     counts : (F,)
-        Corners of each polygon, as for ``triangulate``; of fewer than 3 nothing becomes.
+        Corners of each polygon, as for ``triangulate``; fewer than 3 give no triangle.
     faces : (N,)
-        Some of them, in any order.
+        Indices of polygons, in any order.
 
     Returns
     -------
     (T,)
-        Rising.
+        Indices of triangles, ascending.
     """
     sizes = np.maximum(counts - 2, 0)
     faces = np.unique(faces)
@@ -167,7 +167,7 @@ def triangles_of(counts: Picks, faces: Picks) -> Picks:
 
 
 def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
-    """Return corners, those below 0 replaced by the first known one of their polygon, or by 0.
+    """Return corners with each negative one replaced by the first valid one of its polygon, or 0.
 
     Parameters
     ----------
@@ -176,10 +176,10 @@ def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
     counts : (F,)
         Corners of each polygon.
     owners : (C,)
-        The polygon of each corner.
+        Polygon of each corner.
     """
     known = np.flatnonzero(corners >= 0)
     first = np.zeros(len(counts), dtype=np.int64)
-    # Written backwards, so that the first one stays.
+    # Assigned in reverse order, so that the first valid corner remains.
     first[owners[known[::-1]]] = corners[known[::-1]]
     return np.where(corners < 0, first[owners], corners)

@@ -1,11 +1,11 @@
-"""Files that a file names: the one rule for where they may be.
+"""Location rule for files that are referenced by other files.
 
-A file may name only what lies below its own folder, links resolved: opening or converting a
-stranger's model must not show or pass on pictures from elsewhere on the disk. What is refused is
-said: a figure is drawn without the texture, and a ``.rig`` that names such a file is refused.
+A file may reference only files below its own folder, with links resolved: opening or converting a
+downloaded model must not show or copy pictures from elsewhere on the disk. A refusal is reported:
+the figure is drawn without the texture, and a ``.rig`` that references such a file is refused.
 
-The folder is that of the path as it was opened. If the path is a link, names are looked up beside
-the link, as other programs do, not beside the file it leads to. What the user names on the command
+The folder is that of the path as it was opened. If the path is a link, names are looked up next to
+the link, as other programs do, not next to its target. Files that the user names on the command
 line or in a dialog may lie anywhere, and so may the files of a folder that the user opens.
 """
 
@@ -23,29 +23,29 @@ _DRIVE = re.compile(r"[A-Za-z]:")
 
 
 def referenced_path(folder: Path, name: str) -> Path | None:
-    """Return the path of a file that another file names, None if it leads out of the folder.
+    """Return the path of a referenced file, None if it leads out of the folder.
 
     Parameters
     ----------
     folder : Path
-        Of the file that names it.
+        Folder of the referencing file.
     name : str
-        As written; back slashes count as slashes. The file need not exist.
+        Name as written; backslashes count as slashes. The file need not exist.
     """
     written = name.replace("\\", "/")
     if _is_absolute(written):
         return None
     path = folder / written
     try:
-        # Unlike Path.resolve(), this raises nothing for links in a circle: reading says it.
+        # Unlike Path.resolve(), this does not raise for circular links; reading reports them.
         inside, base = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
-    except ValueError:  # a name with a NUL, which no file has
+    except ValueError:  # a name with a NUL, which no file can have
         return path
     return path if inside != base and inside.is_relative_to(base) else None
 
 
 def refused_text(name: str) -> Phrase:
-    """Return why ``referenced_path`` gives no path, to follow the file's name in a message.
+    """Return the reason why ``referenced_path`` gives no path, to follow the file's name.
 
     >>> str(refused_text("../a.png")), str(refused_text("/home/a.png"))
     ('lies outside the folder: not read', 'is an absolute path: not followed, not read')

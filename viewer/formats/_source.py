@@ -1,4 +1,4 @@
-"""A file that is being read: its bytes, its warnings, and line numbers when an error needs one."""
+"""A file being read: its bytes, its diagnostics, and line numbers computed on demand."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from viewer.phrases import quoted
 from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
-    from viewer.formats._archive import Archive
+    from viewer.formats._archive.values import Archive
 
 __all__ = ["MAX_SIZE", "Source", "no_number", "read_bytes"]
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
-_ANY_END = (b"ply\n", b"ply\r")  # numbers follow, whose last byte may be any
+_ANY_END = (b"ply\n", b"ply\r")  # binary numbers follow, which may end with any byte
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
@@ -42,7 +42,7 @@ _MAGIC = (
     (b"\xfe\xff", "UTF-16 text"),
     (b"\x93NUMPY", "a numpy array"),
 )
-_LOOK = 4096  # bytes that show what a file is
+_LOOK = 4096  # bytes that identify a file
 
 
 class Source:
@@ -51,15 +51,15 @@ class Source:
     Attributes
     ----------
     path : Path
-        Where the bytes come from; texture names are relative to its folder.
+        Path of the file; texture names are relative to its folder.
     is_folder : bool
-        Whether it is a folder: then there are no bytes.
+        Whether it is a folder, which has no bytes.
     max_size : int
-        Largest size of a file, in bytes, also of those inside a folder or archive.
+        Largest size of a file in bytes, including those inside a folder or archive.
     diagnostics : Collector
-        What its reader records; shared with the files it was led to.
+        Diagnostics that its reader records, shared with the files that it references.
     also_read : list of Path
-        Other files that its reader was led to: pictures, material libraries.
+        Other files that its reader opened: pictures, material libraries.
     """
 
     def __init__(
@@ -74,16 +74,16 @@ class Source:
         self.max_size = max_size
         self.diagnostics = Collector() if diagnostics is None else diagnostics
         self.also_read: list[Path] = []
-        self.archive: Archive | None = None  # opened once, by whoever asks first
+        self.archive: Archive | None = None  # opened once, on first use
         self._data = None if data is None else _without_marks(data)
-        self._counted = (0, 1)  # an offset whose line is known, and that line
+        self._counted = (0, 1)  # an offset with a known line, and that line
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
 
     @classmethod
     def open(
         cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
     ) -> Source:
-        """Look at a file or folder; see ``read_bytes`` for what it raises."""
+        """Open a file or folder; raises as ``read_bytes`` does."""
         source = cls(path, max_size=max_size, diagnostics=diagnostics)
         kind = kind_of(source.path, max_size)
         source.is_folder = kind == FOLDER
@@ -93,21 +93,21 @@ class Source:
 
     @property
     def data(self) -> bytes:
-        """The whole file, without a UTF-8 byte order mark and a closing Ctrl-Z; read once."""
+        """The whole file, without a UTF-8 byte order mark and a final Ctrl-Z; read once."""
         if self._data is None:
             self._data = _without_marks(read_bytes(self.path, self.max_size))
         return self._data
 
     def peek(self, size: int) -> bytes:
-        """Return the first bytes, without reading the others if nobody has."""
+        """Return the first bytes, without reading the rest unless that has been done already."""
         return read_head(self.path, size) if self._data is None else self._data[:size]
 
     def inside(self, name: str) -> Source:
-        """Return a file of this folder; its diagnostics are this source's own."""
+        """Return a file of this folder, which shares the diagnostics of this source."""
         return self._related(self.path / name)
 
     def beside(self, name: str) -> Source:
-        """Return a file next to this one; its diagnostics are this source's own."""
+        """Return a file next to this one, which shares the diagnostics of this source."""
         return self._related(self.path.parent / name)
 
     def _related(self, path: Path) -> Source:
@@ -118,7 +118,7 @@ class Source:
         return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
-        """Yield words and braces, braces always on their own, with their offsets."""
+        """Yield words and braces as matches; a brace is always a word of its own."""
         return _WORD.finditer(self.data, start, len(self.data) if end is None else end)
 
     def next_word(self, start: int) -> re.Match[bytes] | None:
@@ -126,7 +126,7 @@ class Source:
         return _WORD.search(self.data, start)
 
     def number_offset(self, start: int, end: int, index: int) -> int:
-        """Return the offset of the index-th word of a part without braces; for errors only."""
+        """Return the offset of the index-th word in a part without braces; for errors only."""
         letters = np.frombuffer(self.data, dtype=np.uint8, count=end - start, offset=start)
         return start + int(word_begins(letters)[index])
 
@@ -138,9 +138,9 @@ class Source:
         return len(self.data)
 
     def line(self, offset: int) -> int:
-        """Return the line of an offset, counted from 1; looked for only when it is needed.
+        """Return the line of an offset, counted from 1; slow, for errors only.
 
-        CR CR LF, seen in real files, is one line end; so is a CR alone.
+        CR CR LF, seen in real files, is one line ending; so is a CR alone.
         """
         start, line = self._counted
         if offset < start:
@@ -155,20 +155,20 @@ class Source:
 
     @property
     def end(self) -> int:
-        """Offset behind the last word: where a file lacks something."""
+        """Offset after the last word: the place of anything that is missing."""
         return len(self.data.rstrip())
 
     def fault(self, key: str, offset: int | None = None, **values: Any) -> FormatError:
-        """Return the error of a fault that a reader cannot go on from.
+        """Return the error of a fault after which the reader cannot continue.
 
         Parameters
         ----------
         key : str
-            Of its message.
+            Key of the message.
         offset : int, optional
-            Where it is in the file, if that is known.
+            Position in the file, if known.
         **values : object
-            What the message shows. They are keywords so that calls read like the templates.
+            Values in the message. They are keywords so that calls read like the templates.
         """
         return FormatError(self._diagnostic(key, offset, values))
 
@@ -181,25 +181,25 @@ class Source:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record a fault that the reader goes on from, but the file is refused for.
+        """Record a fault that makes the file invalid, but lets the reader continue.
 
         Parameters
         ----------
         key : str
-            Of its message.
+            Key of the message.
         offset : int, optional
-            Where it is in the file, if that is known; of several the first.
+            Position in the file, if known; of several faults, that of the first.
         count : int
-            How many faults there are.
+            Number of faults.
         part, places : str, (N,)
             The data that the reader replaces with neutral values, see ``Diagnostic``.
         **values : object
-            What the message shows.
+            Values in the message.
 
         Raises
         ------
         FormatError
-            At once if the diagnostics keep no errors.
+            Immediately, if the collector does not keep errors.
         """
         self._keep(self._diagnostic(key, offset, values), count, part, places)
 
@@ -219,18 +219,18 @@ class Source:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record a fault or remark that the file is not refused for.
+        """Record a fault or remark that leaves the file valid.
 
         Parameters
         ----------
         key : str
-            Of its message.
+            Key of the message.
         offset : int, optional
-            Where it is in the file, if that is known.
+            Position in the file, if known.
         count, part, places : int, str, (N,)
-            How many there are, and where; see ``Diagnostic``.
+            Number of faults, and their places; see ``Diagnostic``.
         **values : object
-            What the message shows.
+            Values in the message.
         """
         found = self._diagnostic(key, offset, values)
         indices = None if places is None else _indices(places)
@@ -242,11 +242,11 @@ class Source:
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings as lines for a person."""
+        """Warnings as lines of text."""
         return [str(found) for found in self.diagnostics.warnings]
 
     def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
-        """Keep how to find the offset of the index-th thing of a kind, for whoever asks.
+        """Register a function that finds the offset of the index-th element of a kind.
 
         Parameters
         ----------
@@ -254,16 +254,16 @@ class Source:
             ``"positions"``, ``"normals"``, ``"weights"``, ``"triangles"``, ``"bindings"``,
             ``"joints"``, ``"channels"`` or ``"frames"``.
         offset_of : callable
-            Called only when somebody asks; may be slow.
+            Called on demand; may be slow.
         """
         self._offsets[kind] = self, offset_of
 
     def offset_of(self, kind: str, index: int) -> int:
-        """Return the offset of a thing that the reader remembers; slow, for errors only."""
+        """Return the offset of an element of a registered kind; slow, for errors only."""
         return self._offsets[kind][1](index)
 
     def place(self, kind: str, index: int) -> tuple[Path, int] | None:
-        """Return the file and line of a thing; None if the reader does not remember such."""
+        """Return the file and line of an element; None if its kind is not registered."""
         if kind not in self._offsets:
             return None
         source, offset_of = self._offsets[kind]
@@ -275,7 +275,7 @@ class Source:
         return b"" if first is None else self.data[first.start() : first.start() + size]
 
     def looks_like(self) -> str | None:
-        """Return what the bytes look like if they are no text of ours, e.g. ``"gzip data"``."""
+        """Return the apparent kind of a file in no supported text format, e.g. ``"gzip data"``."""
         head = self.head(_LOOK)
         if not head:
             return "only white space" if self.data else "an empty file"
@@ -292,7 +292,7 @@ class Source:
 
 
 def _indices(places: ArrayLike) -> Ints:
-    """Return indices once each, rising: (N,) int32."""
+    """Return unique indices in ascending order: (N,) int32."""
     return np.unique(np.asarray(places, dtype=np.int32))
 
 
@@ -303,13 +303,13 @@ def _without_marks(data: bytes) -> bytes:
 
 
 def no_number(word: bytes | None) -> str:
-    """Return what was expected and found where a number should be, None for the end of the file.
+    """Return "expected a number, found …"; the word is None at the end of the file.
 
     >>> no_number(b"up"), no_number(b"1e300")
     ('expected a number, found "up"', 'expected a number below 3.4e+38, found "1e300"')
     """
     if word is None:
         return "expected a number, found the end of the file"
-    # What is too large is written as a number is: it says what is wrong with it.
+    # A number that is too large is well-formed, so the message gives the limit.
     below = f" below {LARGEST:.1e}" if is_too_large(word) else ""
     return f"expected a number{below}, found {quoted(word)}"

@@ -1,4 +1,4 @@
-"""What readers of plain meshes share: normals for every vertex, the up axis, the unit."""
+"""Helpers for readers of plain meshes: normals of all vertices, the up axis, the unit."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
-_SHORTEST = 1e-15  # of a normal: the square of a shorter one is 0 in float32
+_SHORTEST = 1e-15  # normal; the square of a shorter one is 0 in float32
 _SIZES = {3: "triangle", 4: "quad"}
 
 
 def filled_normals(
     source: Source, normals: Floats | None, positions: Floats, triangles: Ints
 ) -> Floats:
-    """Return a normal for every vertex: those of the file, computed where it has none.
+    """Return a normal for every vertex: the file's, or one computed where it has none.
 
     Parameters
     ----------
     source : Source
-        Is warned of normals of length 0.
+        Source for warnings about normals of length 0.
     normals : (V, 3) or None
-        NaN where the file gives none.
+        Normals of the file; NaN where it has none.
     positions, triangles : (V, 3), (T, 3)
         The mesh.
     """
@@ -49,7 +49,7 @@ def filled_normals(
 
 
 def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
-    """Return how many polygons of which size were cut: ``"2 quads, 1 with 5 or more corners"``."""
+    """Return the numbers of polygons by size: ``"2 quads, 1 with 5 or more corners"``."""
     sizes = [counted(int((counts == size).sum()), name) for size, name in _SIZES.items()]
     large = int((counts > 4).sum())
     parts = [text for text in sizes if not text.startswith("0 ")]
@@ -58,10 +58,10 @@ def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:
-    """Return the axis that a comment calls up, as our own files do; y if it says nothing."""
+    """Return the up axis stated by a comment, as in files of this program; y by default."""
     return "z" if re.search(r"\bz up\b", comment) else "y"
 
 
 def stated_unit(comment: str) -> str:
-    """Return ``"m"`` if a comment of our own files says metres."""
+    """Return ``"m"`` if a comment of this program states metres."""
     return "m" if re.search(r"\b[yz] up, metres\b", comment) else ""

@@ -1,4 +1,4 @@
-"""Text tables without header: numbers in columns, one row a line."""
+"""Text tables without a header: numbers in columns, one row per line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, number_key, read_words, refuse_words
+from viewer.formats._words import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_numbers", "read_table"]
@@ -30,19 +30,19 @@ def read_table(
     columns : int
         Numbers in every row.
     part : str
-        What of a figure the rows are, see ``Diagnostic``.
+        Part of the figure that the rows describe, see ``Diagnostic``.
 
     Returns
     -------
     rows : (N, columns)
-        As written; NaN in rows that cannot be used, if the file is not refused for them.
+        Values as written; NaN in invalid rows, unless the file is refused because of them.
     offset_of : callable
-        Returns where a row is in the file; slow, for errors only.
+        Returns the offset of a row in the file; slow, for errors only.
 
     Raises
     ------
     FormatError
-        With the line of a row that has more or fewer numbers, or a word that is none.
+        For a row with more or fewer numbers, or a word that is not a number; gives its line.
     """
     values, bad = parse_numbers(source.data, 0, len(source.data))
     if bad < 0 and len(values) and _is_regular(source, columns, len(values)):
@@ -57,7 +57,7 @@ def read_numbers(source: Source) -> Floats:
     Raises
     ------
     FormatError
-        With the line of a word that is no number.
+        For a word that is not a number; gives its line.
     """
     data = source.data
     values, bad = parse_numbers(data, 0, len(data))
@@ -70,7 +70,7 @@ def read_numbers(source: Source) -> Floats:
 
 
 def _is_regular(source: Source, columns: int, count: int) -> bool:
-    """Return whether every line has so many words, or none; lines end with LF, CR or both."""
+    """Return whether every line has this many words, or none; lines end with LF, CR or both."""
     if count % columns:
         return False
     letters = np.frombuffer(source.data, dtype=np.uint8)
@@ -83,7 +83,7 @@ def _is_regular(source: Source, columns: int, count: int) -> bool:
 
 
 def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places]:
-    """Read what is broken word by word, and refuse what cannot be used."""
+    """Read a table with faults word by word, and record the faults."""
     words = read_words(source.data, 0, len(source.data))
     if len(words.offsets) == 0:
         raise source.fault("F002.table-empty", columns=columns, found=source.looks_like())

@@ -1,4 +1,4 @@
-"""Pictures that files name as textures, and picture files themselves."""
+"""Loading of pictures: textures referenced by other files, and picture files themselves."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ __all__ = ["load_image", "read_picture"]
 
 
 def load_image(source: Source, name: str, offset: int) -> Bytes | None:
-    """Return a texture's pixels, or None with a warning that gives its path as resolved.
+    """Return a texture's pixels, or None with a warning that gives its resolved path.
 
     Parameters
     ----------
     source : Source
-        The file that names the picture.
+        File that references the picture.
     name : str
-        The picture, which must lie below that file's folder, see ``referenced_path``.
+        Name of the picture, which must lie below that file's folder, see ``referenced_path``.
     offset : int
-        Where the name is in the file.
+        Offset of the name in the file.
 
     Returns
     -------
@@ -46,6 +46,6 @@ def read_picture(source: Source) -> Bytes:
     Raises
     ------
     FormatError
-        If it is no picture that can be read.
+        If it is not a readable picture.
     """
     return decode_picture(source.path, source.data)

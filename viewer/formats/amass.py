@@ -1,4 +1,4 @@
-"""Read motions of the SMPL family: AMASS and what is written like it.
+"""Reader of motions of the SMPL family: AMASS and datasets in similar layouts.
 
 ::
 
@@ -9,8 +9,8 @@
     AIST++, .pkl    smpl_poses (N, 72)  smpl_trans (N, 3)  smpl_scaling (1,)
     smplx's names   global_orient (N, 3)  body_pose (N, 63 or 69)  transl (N, 3)  left_hand_pose …
 
-Poses may also be (N, J, 3). Beside these, files that we wrote hold ``up`` and ``present`` (N,).
-The root turns about the rest pelvis, V = R (X - J0) + J0 + trans. AMASS stands z up, AIST++ y up.
+Poses may also be (N, J, 3). Files written by this program also have ``up`` and ``present`` (N,).
+The root rotates about the rest pelvis, V = R (X - J0) + J0 + trans. AMASS is z up, AIST++ y up.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ import math
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, finite
+from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.values import Archive
+from viewer.formats._neutral import held_rows
 from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
-from viewer.formats._tolerant import held_rows
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
@@ -41,7 +41,7 @@ _EXPRESSIONS = ("expressions", "expression")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 _BODY = members_by_numbers()[66]
 _SMPL, _SMPLX = FAMILY[24].names, FAMILY[55].names
-# Keys of parts and, by their number of columns, the joints that they turn.
+# Keys of parts and, by number of columns, the joints that they rotate.
 _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
     (_ROOTS, {3: _BODY[:1]}),
     (("pose_body", "body_pose"), {63: _BODY[1:], 69: _SMPL[1:]}),
@@ -54,7 +54,7 @@ _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
     (("right_hand_pose",), {45: _SMPLX[40:]}),
 )
 _HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
-# Columns of the principal components that a hand has at most, less than its angles.
+# Most columns of principal components of a hand, fewer than its angles.
 _MOST_COMPONENTS = 44
 _FLAGS = ("flat_hand_mean", "use_pca")
 _OWN = ("present", "up")
@@ -70,14 +70,14 @@ _KNOWN = {
 _OF_MOTIONS = (*_RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
-_MOST_SCALED = 1e6  # of a body; AIST++ scales by about 100
-_SAME = 1e-5  # radians or metres: what float32 leaves of numbers below 100
+_MOST_SCALED = 1e6  # scale of a body; AIST++ scales by about 100
+_SAME = 1e-5  # radians or metres: precision of float32 for numbers below 100
 
 
 def has_frames(archive: Archive) -> bool:
     """Return whether an archive is a motion rather than one pose, which may be J x 3 numbers.
 
-    A motion has several frames, or none, or one in an array of frames beside a frame rate.
+    A motion has several frames, or none, or one frame in an array with a frame rate.
     """
     is_timed = any(archive.has(key) for key in _OF_MOTIONS)
     for key in (*_POSES, "body_pose", "pose_body", *_ROOTS):
@@ -95,18 +95,18 @@ def read(source: Source) -> BodyMotion:
     Parameters
     ----------
     source : Source
-        The file; what is not used is added to its warnings.
+        The file; unused values are added to its warnings.
 
     Returns
     -------
     BodyMotion
-        To be given to a figure.
+        Motion that can be applied to a figure.
 
     Raises
     ------
     FormatError
-        If there are no poses, arrays differ in their number of frames, or the body is moved out
-        of reach.
+        If there are no poses, arrays differ in their number of frames, or a translation is
+        beyond the limit.
     """
     archive = archive_of(source)
     found = _first_key(source, archive, _POSES)
@@ -149,7 +149,7 @@ def _refusal(source: Source, archive: Archive) -> FormatError:
 
 
 def _rows(archive: Archive, key: str, count: int | None = None, first: str = "") -> Floats:
-    """Return an array as one row a frame, (N, C), finite."""
+    """Return an array as one finite row per frame: (N, C)."""
     array = archive.array(key)
     shape = array.shape if len(array.shape) > 1 else (1, *array.shape)
     if count is not None and shape[0] != count:
@@ -172,7 +172,7 @@ def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
 
 
 def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str | None:
-    """Return the first spelling that is there; say so if another one says something else."""
+    """Return the first existing spelling of a key; warn if another has different values."""
     there = [key for key in keys if archive.has(key)]
     for key in there[1:]:
         if not _are_same(_numbers(archive, there[0]), _numbers(archive, key)):
@@ -181,7 +181,7 @@ def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str |
 
 
 def _numbers(archive: Archive, key: str) -> Floats:
-    """Return what is only compared with something else; nothing where it is no array of numbers."""
+    """Return numbers for a comparison; an empty array if the value is not an array of numbers."""
     try:
         return np.asarray(archive.array(key).values(), dtype=np.float64).ravel()
     except FormatError:
@@ -195,7 +195,7 @@ def _are_same(first: Floats, second: Floats) -> bool:
 def _compare_parts(
     source: Source, archive: Archive, key: str, names: tuple[str, ...], vectors: Floats
 ) -> None:
-    """Say which parts are there beside whole poses and turn the same joints in another way."""
+    """Warn of parts that contradict the whole poses."""
     has_angles = not _flag(archive, "use_pca")
     has_angles &= not archive.has("flat_hand_mean") or _flag(archive, "flat_hand_mean")
     odd = []
@@ -207,7 +207,7 @@ def _compare_parts(
         usual = () if part in _HANDS else next(iter(joints.values()))
         turned = joints.get(len(numbers) // len(vectors), usual)
         if not turned or not set(turned) <= set(names):
-            continue  # components of hands, or joints that the poses do not have
+            continue  # hand components, or joints that are not in the poses
         columns = [names.index(name) for name in turned]
         if not _are_same(vectors[:, columns].ravel(), numbers):
             odd.append(part)
@@ -218,7 +218,7 @@ def _compare_parts(
 def _split_poses(
     source: Source, archive: Archive, root: str
 ) -> tuple[tuple[str, ...], Floats, dict[str, Floats]]:
-    """Return joints, their rotation vectors, and components of hands."""
+    """Return joints, their rotation vectors, and hand components."""
     count = len(_rows(archive, root))
     names: list[str] = []
     parts: list[Floats] = []
@@ -236,7 +236,7 @@ def _split_poses(
             raise archive.fault("F002.motion-width", item=key, expected=list(joints), found=columns)
         if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
             source.warn("F007.motion-angles", item=key)
-        if set(joints[columns]) <= set(names):  # pose_eye holds both, leye_pose one of them
+        if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one
             _compare_again(source, key, joints[columns], rows, names, parts)
             continue
         names += joints[columns]
@@ -253,7 +253,7 @@ def _compare_again(
     names: list[str],
     parts: list[Floats],
 ) -> None:
-    """Say so if a part turns joints in another way than an earlier part has done."""
+    """Warn if a part rotates joints differently from an earlier part."""
     vectors = np.concatenate(parts, axis=1).reshape(len(rows), -1, 3)
     columns = [names.index(name) for name in joints]
     if not _are_same(vectors[:, columns].ravel(), rows.ravel()):
@@ -333,7 +333,7 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
 
 
 def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
-    """Return the row of every frame, -1 where the file says that it fills a gap."""
+    """Return the row of every frame, -1 where the file marks the person as absent."""
     rows: Ints = np.arange(count, dtype=np.int32)
     if archive.has("present"):
         present = _rows(archive, "present").ravel()
@@ -355,17 +355,17 @@ def _up(archive: Archive, is_aist: bool) -> str:
         return said
     if is_aist:
         return "y"
-    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE: y up, but it does not say
+    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE is y up, unstated
     return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
 
 
 def _text(archive: Archive, key: str) -> str:
-    """Return a text, also one that was made of bytes by ``str``; empty if there is none."""
+    """Return a text, including bytes converted by ``str``; empty if there is none."""
     if not archive.has(key):
         return ""
     try:
         text = archive.text(key)
-    except FormatError:  # an object array, in which nothing matters
+    except FormatError:  # an object array, whose content is not needed
         return ""
     return text[2:-1] if text.startswith("b'") and text.endswith("'") else text
 

@@ -1,4 +1,4 @@
-r"""Read and write ``.anim`` clips (UCSD course CSE169).
+r"""Reader and writer of ``.anim`` clips (UCSD course CSE169).
 
 ::
 
@@ -26,7 +26,7 @@ from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._reach import FARTHEST
 from viewer.formats._source import Source
-from viewer.formats._tolerant import number_key
+from viewer.formats._words import number_key
 from viewer.media.saving import save_text
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (
@@ -46,7 +46,7 @@ _RULES: dict[bytes, Tangent] = {rule.encode(): rule for rule in TANGENT_RULES}
 _WORDS_PER_KEY = 4
 
 Word = re.Match[bytes]
-_Key = tuple[float, float, Tangent, Tangent, int]  # the last is where it begins
+_Key = tuple[float, float, Tangent, Tangent, int]  # the last is its offset
 
 
 def read(source: Source) -> Clip:
@@ -55,7 +55,7 @@ def read(source: Source) -> Clip:
     Parameters
     ----------
     source : Source
-        The file; what is odd but readable is added to its warnings.
+        The file; recoverable faults are added to its warnings.
 
     Returns
     -------
@@ -71,13 +71,13 @@ def read(source: Source) -> Clip:
 
 
 class _Parser:
-    """Walks the words of a file."""
+    """Recursive-descent parser over the words of a file."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.words = source.words()
         self.word: Word | None = None
-        # Where the current word is: in a channel, and there in a key.
+        # The channel and the key that contain the current word.
         self.channel: int | None = None
         self.key: int | None = None
         self.starts: list[int] = []  # of all channels
@@ -138,7 +138,7 @@ class _Parser:
         self.channel = index
         self.starts.append(self.word.start() if self.word else 0)
         self._advance()
-        # Some files number their channels; the order counts, not the number.
+        # Some files number their channels; only the order matters.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
             self._advance()
         self._expect(b"{")
@@ -199,7 +199,7 @@ class _Parser:
             time, value = self._number("time", of_key=True), self._number("value", of_key=True)
             row = time, value, self._tangent(), self._tangent(), start
             if math.isnan(time + value):
-                lost += 1  # it was refused; the curve is drawn through the other keys
+                lost += 1  # already recorded; the curve passes through the other keys
             else:
                 rows.append(row)
         self.key = None
@@ -213,7 +213,7 @@ class _Parser:
         self.word = next(self.words, None)
 
     def _where(self) -> Phrase:
-        """Return what the current word belongs to."""
+        """Return the phrase for the item that contains the current word."""
         if self.channel is None:
             return Phrase("animation")
         if self.key is None:
@@ -221,7 +221,7 @@ class _Parser:
         return Phrase("anim-key", channel=self.channel, index=self.key)
 
     def _begins(self) -> Phrase | None:
-        """Return where the channel begins in which the file ends; None before its end."""
+        """Return the place of the last channel if the file ends inside it, else None."""
         if self.word is not None:
             return None
         if self.channel is None:
@@ -231,17 +231,17 @@ class _Parser:
         return Phrase("anim-begins", where=channel, line=line)
 
     def _values(self, own: dict[str, Any]) -> dict[str, Any]:
-        """Return what messages about the current word show, besides their own values."""
+        """Return the values that all messages about the current word have in common."""
         found = None if self.word is None else self.word.group()
         return {"where": self._where(), "found": found, "begins": self._begins(), **own}
 
     def _fault(self, key: str, **values: Any) -> FormatError:
-        """Return the error of a fault at the current word that nothing can follow."""
+        """Return the error of a fault at the current word that ends the parse."""
         where = self.source.end if self.word is None else self.word.start()
         return self.source.fault(key, where, **self._values(values))
 
     def _refuse(self, key: str, word: Word | None = None, **values: Any) -> None:
-        """Refuse a word, or else the current one, and go on."""
+        """Record a fault of a word, by default the current one, and continue."""
         word = self.word if word is None else word
         where = self.source.end if word is None else word.start()
         part: Part = "" if self.channel is None else "channels"
@@ -255,7 +255,7 @@ class _Parser:
         self._advance()
 
     def _number(self, item: str, of_key: bool = False) -> float:
-        """Read a number; NaN in place of a number of a key that is refused."""
+        """Read a number; NaN if a number of a key is invalid."""
         if self.word is None:
             raise self._fault("F002.anim-end", item=self._item(item))
         word = self.word.group()

@@ -1,4 +1,4 @@
-r"""Read ``.bvh``: a skeleton and its motion (BioVision; the format has no standard).
+r"""Reader of ``.bvh``: a skeleton and its motion (BioVision; the format has no standard).
 
 ::
 
@@ -9,11 +9,11 @@ r"""Read ``.bvh``: a skeleton and its motion (BioVision; the format has no stand
     channel   = Xposition | Yposition | Zposition | Xrotation | Yrotation | Zrotation
     name      = word*
 
-Words are separated by any white space, line ends among them, and keywords come in any case. A frame
-has one number per channel, joints in the order of the file. Angles are degrees; a joint's rotation
-channels multiply from left to right, ``Zrotation Yrotation Xrotation`` is R = Rz Ry Rx. Position
-channels replace the joint's OFFSET. Unit and up axis are not in the file: both are guessed, and
-the motion says how, for whoever was not told better.
+Words are separated by any white space, including line ends, and keywords are case-insensitive. A
+frame has one number per channel, joints in the order of the file. Angles are degrees; a joint's
+rotation channels multiply from left to right, ``Zrotation Yrotation Xrotation`` is R = Rz Ry Rx.
+Position channels replace the joint's OFFSET. Unit and up axis are not in the file: both are
+estimated, unless the user states them, and the motion records how.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from viewer.diagnostics import Phrase
 from viewer.formats._bvh.guess import frame_rate, guess_unit, guess_up
 from viewer.formats._bvh.hierarchy import BvhJoint, called, read_hierarchy
 from viewer.formats._bvh.motion import Motion, read_motion
+from viewer.formats._neutral import held_rows
 from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
-from viewer.formats._tolerant import held_rows
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import DEFAULT_RATE
@@ -39,11 +39,11 @@ from viewer.rig.skeleton import Skeleton, ball_skeleton
 
 __all__ = ["read"]
 
-_LARGEST_SHARE = 8  # rotations kept for each number of the file, before a file is refused
-_SMALL_CLIP = 1 << 24  # rotations that are never too many
-_CHUNK = 256  # frames at a time, whose numbers stay inside the processor's cache
-_THICKNESS = 0.1  # of a joint's box, in lengths of the bone
-_THINNEST, _THICKEST = 0.05, 0.3  # ... but within these, in lengths of a usual bone
+_LARGEST_RATIO = 8  # rotations per number of the file; files with more are refused
+_SMALL_CLIP = 1 << 24  # rotations that are always accepted
+_CHUNK = 256  # frames at a time, so that their numbers fit into the processor's cache
+_THICKNESS = 0.1  # of a joint's box, relative to the length of the bone
+_THINNEST, _THICKEST = 0.05, 0.3  # its limits, relative to the length of a typical bone
 
 
 def read(source: Source) -> SkeletonMotion:
@@ -57,8 +57,8 @@ def read(source: Source) -> SkeletonMotion:
     Returns
     -------
     SkeletonMotion
-        Lengths as in the file. Every joint is a ball joint; the clip's translations are position
-        channels without the OFFSET. End Sites are the far ends of the joints' boxes.
+        Lengths as in the file. Every joint is a ball joint; the clip's translations are the
+        position channels minus the OFFSET. End Sites are the far ends of the joints' boxes.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def read(source: Source) -> SkeletonMotion:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """Joints without End Sites, and which column of a frame does what to which."""
+    """Joints without End Sites, and the columns of a frame that move them."""
 
     names: tuple[str, ...]
     parents: list[int]
@@ -143,9 +143,9 @@ def _table(source: Source, joints: list[BvhJoint]) -> _Table:
 
 
 def _refuse_empty_joints(source: Source, table: _Table, motion: Motion) -> None:
-    """Refuse what would fill the memory: many frames of many joints that have no channels."""
+    """Refuse files that would exhaust memory: many frames of many joints without channels."""
     rotations = len(motion.values) * len(table.names)
-    if rotations > max(_SMALL_CLIP, _LARGEST_SHARE * motion.values.size):
+    if rotations > max(_SMALL_CLIP, _LARGEST_RATIO * motion.values.size):
         raise source.fault(
             "F002.bvh-few-channels",
             channels=table.n_channels,
@@ -156,13 +156,13 @@ def _refuse_empty_joints(source: Source, table: _Table, motion: Motion) -> None:
 
 def _skeleton(table: _Table) -> Skeleton:
     parents = np.array(table.parents, dtype=np.int32)
-    # Offsets are kept as they are, not as differences of positions: those would be rounded.
+    # Offsets are used as written, because differences of positions would be rounded.
     skeleton = ball_skeleton(table.names, parents, np.zeros((len(parents), 3)))
     return replace(skeleton, rest_translations=table.offsets, boxes=_boxes(table, parents))
 
 
 def _rest_points(table: _Table, skeleton: Skeleton) -> Floats:
-    """Return joints and End Sites in the rest pose: (P, 3)."""
+    """Return the positions of joints and End Sites in the rest pose: (P, 3)."""
     joints = np.zeros((skeleton.n_joints, 3))
     for joint, parent in enumerate(table.parents):
         joints[joint] = table.offsets[joint] + (joints[parent] if parent >= 0 else 0.0)
@@ -173,7 +173,7 @@ def _rest_points(table: _Table, skeleton: Skeleton) -> Floats:
 def _boxes(table: _Table, parents: Ints) -> Floats:
     """Return a box for each joint from itself to its children or End Sites: (J, 2, 3).
 
-    Twice its middle is the End Site of a joint with one; the exporter counts on it.
+    Invariant for the exporter: twice the centre of the box is the End Site of a joint with one.
     """
     inner = np.flatnonzero(parents >= 0)
     owners = np.concatenate([parents[inner], [joint for joint, _ in table.ends]]).astype(np.int32)
@@ -183,7 +183,7 @@ def _boxes(table: _Table, parents: Ints) -> Floats:
     lengths = np.linalg.norm(tips, axis=1)
     size = float(np.median(lengths[lengths > 0.0])) if lengths.any() else 1.0
     half = np.clip(_THICKNESS * lengths, _THINNEST * size, _THICKEST * size)[:, None]
-    # A bone is as long as it is, and neither thinner nor, where it lies aslant, much thicker.
+    # Along its main axis a box is as long as the bone; the other sides get a limited thickness.
     along = np.abs(tips) >= np.abs(tips).max(axis=1, keepdims=True)
     reach = np.where(along, np.abs(0.5 * tips), np.minimum(np.abs(0.5 * tips), 2.0 * half))
     reach = np.where(reach < half, reach + half, reach)
@@ -196,7 +196,7 @@ def _boxes(table: _Table, parents: Ints) -> Floats:
 
 
 def _rotations(table: _Table, values: Floats) -> Floats:
-    """Multiply every joint's rotation channels, those with the same axes at once: (N, J, 4)."""
+    """Multiply every joint's rotation channels, joints with the same axes at once: (N, J, 4)."""
     rotations = np.empty((len(values), len(table.names), 4))
     groups: dict[tuple[int, ...], list[int]] = {}
     turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]
@@ -210,15 +210,15 @@ def _rotations(table: _Table, values: Floats) -> Floats:
             parts.append(np.ones_like(parts[0]))
             for axis, chosen in zip(axes, columns, strict=True):
                 half = values[rows, chosen] * (np.pi / 360.0)
-                _turn(parts, axis, np.sin(half), np.cos(half))
+                _rotate(parts, axis, np.sin(half), np.cos(half))
             for number, part in enumerate(parts):
                 rotations[rows, joints, number] = part
     _keep_signs(rotations)
     return rotations
 
 
-def _turn(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
-    """Multiply quaternions (x, y, z, w) by one about a coordinate axis from the right."""
+def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
+    """Multiply quaternions (x, y, z, w) on the right by one about a coordinate axis; in place."""
     other, third = (axis + 1) % 3, (axis + 2) % 3
     a, b, c, w = parts[axis], parts[other], parts[third], parts[3]
     parts[axis], parts[3] = a * cosine + w * sine, w * cosine - a * sine
@@ -226,7 +226,7 @@ def _turn(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
 
 
 def _keep_signs(rotations: Floats) -> None:
-    """Of q and -q, which are one rotation, take the one nearer to the frame before; in place."""
+    """Choose between q and -q, the same rotation, the one nearer to the frame before; in place."""
     products = np.einsum("nja,nja->nj", rotations[1:], rotations[:-1])
     turned = np.logical_xor.accumulate(products < 0.0, axis=0)
     if turned.any():
@@ -234,7 +234,7 @@ def _keep_signs(rotations: Floats) -> None:
 
 
 def _translations(source: Source, table: _Table, values: Floats) -> Floats | None:
-    """Return position channels without the OFFSET that they replace: (N, J, 3)."""
+    """Return the position channels minus the OFFSET that they replace: (N, J, 3)."""
     moves = [
         (joint, code, column)
         for joint, row in enumerate(table.columns)
@@ -257,7 +257,7 @@ def _translations(source: Source, table: _Table, values: Floats) -> Floats | Non
 
 
 def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
-    """Refuse frames that carry a joint too far, and hold the one before them.
+    """Refuse frames that translate a joint beyond the limit, and repeat the one before them.
 
     ``names`` are the axis and joint of each column.
     """

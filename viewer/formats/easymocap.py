@@ -1,8 +1,8 @@
-"""Read what EasyMocap writes: a folder of JSON files, one a frame, of people by number.
+"""Reader of EasyMocap's output: a folder of JSON files, one per frame, with numbered people.
 
 ::
 
-    out/smpl/000000.json          body parameters; smpl_full/ or smplfull/ go before smpl/
+    out/smpl/000000.json          body parameters; smpl_full/ or smplfull/ take precedence
     out/keypoints3d/000000.json   3D keypoints of the same frames
     out/smpl/01/000000.json       fits of single views: the first view is read
     intri.yml, extri.yml          cameras, in that folder or one of the two above it
@@ -12,8 +12,8 @@
               "expression": [[10]], "handl": [[n]], "handr": [[n]],
               "keypoints3d": [[x, y, z, c], …], "handl3d", "handr3d", "face3d"}
 
-File names that are all numbers are frame numbers, holes included; others are sorted. Bodies are
-V = R(Rh) X(poses, shapes) + Th, turned about the model's origin. There is no frame rate in it.
+If all file names are numbers, they are frame numbers, with gaps; other names are sorted. Bodies are
+V = R(Rh) X(poses, shapes) + Th, rotated about the model's origin. The files have no frame rate.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_capture", "read"]
 
-_LEVELS = 3  # folders, from that of the frames upwards, that may hold the cameras
+_LEVELS = 3  # folders that may contain the cameras, from that of the frames upwards
 
 
 def read(source: Source) -> Capture:
-    """Look at a recording, with all that its files leave open as it usually is.
+    """Open a recording, with defaults for everything that its files do not state.
 
     Parameters
     ----------
     source : Source
-        The folder that EasyMocap wrote, one of the folders in it, or a single frame file.
+        Output folder of EasyMocap, one of its subfolders, or a single frame file.
 
     Returns
     -------
     Capture
-        Not read yet, except for the first people in it.
+        Recording of which only the first people have been read.
 
     Raises
     ------
     FormatError
-        If there are no frames, or nobody is in any of them.
+        If there are no frames, or no person in any of them.
     """
     return open_capture(source)
 
@@ -61,36 +61,35 @@ def open_capture(
     legacy_expression: bool = False,
     layout: str = "",
 ) -> Capture:
-    """Look at a recording.
+    """Open a recording.
 
     Parameters
     ----------
     source : Source
-        The folder that EasyMocap wrote, one of the folders in it, or a single frame file.
+        Output folder of EasyMocap, one of its subfolders, or a single frame file.
     frame_rate : float
         Frames a second.
     flat_hands : bool, optional
-        Whether hand components leave the mean hand out; by default they do for SMPL-X and MANO,
-        and do not for SMPL+H.
+        Whether hand components exclude the mean hand; by default they do for SMPL-X and MANO, and
+        do not for SMPL+H.
     up : "y", "z", "-y", "-z" or ""
-        The axis that points up in the world; empty to guess it from the people.
+        Up axis of the world; empty to estimate it from the people.
     legacy_expression : bool
-        Let the expression drive shape components 10 to 19, as EasyMocap does with files of 300
-        shapes.
+        Use the expression as shape components 10 to 19, as EasyMocap does with files of 300 shapes.
     layout : str
-        Of keypoints, see ``keypoint_layout``, where several have the same number: ``"h36m"``,
-        ``"panoptic"``.
+        Layout of keypoints, see ``keypoint_layout``, to choose between layouts with the same
+        number of points: ``"h36m"``, ``"panoptic"``.
 
     Returns
     -------
     Capture
-        Not read yet, except for the first people in it. What was noticed about the files as a
-        whole is in the source's warnings.
+        Recording of which only the first people have been read. Faults of the files
+        as a whole are in the source's warnings.
 
     Raises
     ------
     FormatError
-        If there are no frames, or nobody is in any of them.
+        If there are no frames, or no person in any of them.
     """
     files = find_frames(source)
     options = Options(
@@ -114,7 +113,7 @@ def open_capture(
 
 
 def _name(source: Source) -> str:
-    """Return what a recording is called: not ``smpl``, as all are."""
+    """Return a recording's name: not that of its folder ``smpl``, which all have."""
     return folder_name(source.path) if source.is_folder else source.path.stem
 
 

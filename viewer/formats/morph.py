@@ -1,12 +1,12 @@
-r"""Read ``.morph`` targets (UCSD course CSE169).
+r"""Reader of ``.morph`` targets (UCSD course CSE169).
 
 ::
 
     morph = "positions" n "{" (index x y z)*n "}"  "normals" n "{" (index x y z)*n "}"
 
-Positions and normals are absolute, not offsets, for the listed vertices of one ``.skin``; all
-others stay. The two sections may come in either order and list their vertices in any; normals may
-be left out.
+Positions and normals are absolute, not offsets, for the listed vertices of one ``.skin``; all other
+vertices are unchanged. The two sections may come in either order and list vertices in any order;
+normals are optional.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _SECTIONS = (b"positions", b"normals")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Section:
-    """The vertices that a section lists, ascending, and their numbers."""
+    """The vertices that a section lists, in ascending order, and their values."""
 
     vertices: Ints
     values: Floats
@@ -44,17 +44,17 @@ def read(source: Source) -> MorphTarget:
     Parameters
     ----------
     source : Source
-        The file; what is odd but readable is added to its warnings.
+        The file; recoverable faults are added to its warnings.
 
     Returns
     -------
     MorphTarget
-        Named after the file; its vertices ascend.
+        Target named after the file, with vertices in ascending order.
 
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar, or the sections list other vertices.
+        With file and line, if the text breaks the grammar, or the sections list different vertices.
     """
     sections: dict[bytes, _Section] = {}
     position = 0
@@ -66,14 +66,15 @@ def read(source: Source) -> MorphTarget:
     if b"positions" not in sections:
         looks = source.looks_like()
         raise source.fault("F002.morph-positions", None if looks else source.end, looks=looks)
-    moved = sections[b"positions"]
-    if len(moved.vertices) == 0:
+    positions = sections[b"positions"]
+    if len(positions.vertices) == 0:
         source.warn("F007.morph-empty")
     if b"normals" not in sections:
         source.warn("F007.morph-normals")
-        return MorphTarget(source.path.stem, moved.vertices, moved.values)
-    _check_same(source, moved, sections[b"normals"])
-    return MorphTarget(source.path.stem, moved.vertices, moved.values, sections[b"normals"].values)
+        return MorphTarget(source.path.stem, positions.vertices, positions.values)
+    normals = sections[b"normals"]
+    _check_same(source, positions, normals)
+    return MorphTarget(source.path.stem, positions.vertices, positions.values, normals.values)
 
 
 def _unexpected(source: Source, word: re.Match[bytes], is_repeated: bool) -> FormatError:
@@ -83,7 +84,7 @@ def _unexpected(source: Source, word: re.Match[bytes], is_repeated: bool) -> For
 
 
 def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[_Section, int]:
-    """Read a section, and return where it ends; rows with faults are left out."""
+    """Read a section without its invalid rows, and return the offset of its end."""
     count, position = read_count(source, name, header)
     block = find_block(source, name, header, position)
     rows, offset_of = read_rows(source, block, count, _WIDTH, item="entry")
@@ -123,23 +124,23 @@ def _section(source: Source, name: str, header: re.Match[bytes]) -> tuple[_Secti
     return section, block.end + block.closed
 
 
-def _check_same(source: Source, moved: _Section, turned: _Section) -> None:
+def _check_same(source: Source, positions: _Section, normals: _Section) -> None:
     """Refuse positions and normals of different vertices."""
-    if len(moved.vertices) != len(turned.vertices):
+    if len(positions.vertices) != len(normals.vertices):
         raise source.fault(
             "F002.morph-counts",
-            turned.header,
-            line=source.line(moved.header),
-            first=len(moved.vertices),
-            other=source.line(turned.header),
-            second=len(turned.vertices),
+            normals.header,
+            line=source.line(positions.header),
+            first=len(positions.vertices),
+            other=source.line(normals.header),
+            second=len(normals.vertices),
         )
-    differs = np.flatnonzero(moved.vertices != turned.vertices)
+    differs = np.flatnonzero(positions.vertices != normals.vertices)
     if len(differs):
         row = int(differs[0])
         raise source.fault(
             "F002.morph-vertices",
-            turned.header,
-            found=int(turned.vertices[row]),
-            expected=int(moved.vertices[row]),
+            normals.header,
+            found=int(normals.vertices[row]),
+            expected=int(positions.vertices[row]),
         )

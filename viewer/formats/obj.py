@@ -1,4 +1,4 @@
-r"""Read Wavefront ``.obj`` meshes, without a rig.
+r"""Reader of Wavefront ``.obj`` meshes, which have no rig.
 
 ::
 
@@ -8,8 +8,8 @@ r"""Read Wavefront ``.obj`` meshes, without a rig.
            | "#" comment | other
     corner = v | v/vt | v//vn | v/vt/vn              from 1, or from -1 for the last one so far
 
-Vertices keep the file's numbers, also those of no face. Polygons are cut into triangles. A vertex
-with several normals gets their mean: our meshes have one for each vertex.
+Vertices keep their indices, including those without a face. Polygons are triangulated. A vertex
+with several normals gets their mean, because a mesh here has one normal per vertex.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ import re
 
 import numpy as np
 
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._obj.lines import Places
 from viewer.formats._obj.mtl import read_libraries
 from viewer.formats._obj.parts import ObjParts, read_parts
 from viewer.formats._polygons import triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
-from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
 
 __all__ = ["read"]
 
-_HEAD = 4096  # bytes in which our own files say what is up
-_SHORTEST = 1e-9  # of a mean of unit normals that point everywhere
+_HEAD = 4096  # bytes in which files of this program state the up axis
+_SHORTEST = 1e-9  # length of a mean of unit normals that cancel each other
 
 
 def read(source: Source) -> Figure:
@@ -41,12 +41,13 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; what is odd or left out is added to its warnings.
+        The file; recoverable faults and ignored data are added to its warnings.
 
     Returns
     -------
     Figure
-        Without skeleton and skin; y up and without a unit, unless a comment of our own says.
+        Mesh without skeleton and skin; y up and without a unit, unless a comment written by this
+        program states them.
 
     Raises
     ------
@@ -57,10 +58,10 @@ def read(source: Source) -> Figure:
     if len(parts.positions) == 0:
         looks = source.looks_like()
         raise source.fault("F002.obj-mesh", None if looks else source.end, looks=looks)
-    rough = mended_positions(parts.positions, np.zeros((0, 3), np.int32))
+    rough = neutral_positions(parts.positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
     triangles = parts.corners[picks, 0].astype(np.int32)
-    positions = mended_positions(parts.positions, triangles)
+    positions = neutral_positions(parts.positions, triangles)
     source.remember("triangles", lambda triangle: int(parts.offsets[owners[triangle]]))
     normals = _normals(source, parts)
     uvs, uv_triangles = _uvs(source, parts, picks)
@@ -102,8 +103,8 @@ def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, s
 
 
 def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None, Ints | None]:
-    """Return the table of texture coordinates, and which ones the triangles' corners have."""
-    # NaN stands for faults; the sum says at once whether there is one.
+    """Return the table of texture coordinates, and their index for each triangle corner."""
+    # Faults are NaN, and a single sum shows whether there is one.
     uvs = np.nan_to_num(parts.uvs) if np.isnan(parts.uvs.sum()) else parts.uvs
     if len(uvs) == 0:
         return None, None
@@ -120,7 +121,7 @@ def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None,
 
 
 def _normals(source: Source, parts: ObjParts) -> Floats | None:
-    """Return one normal for every vertex, NaN where no corner has one."""
+    """Return a normal for every vertex, NaN where no corner has one."""
     listed, n_vertices = parts.normals, len(parts.positions)
     if len(listed) == 0:
         return None
@@ -129,7 +130,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
         source.warn("F007.obj-normals", n=len(listed))
         return None
     if np.isnan(listed.sum()):
-        # A normal with a fault is computed from the triangles.
+        # Invalid normals are computed from the triangles instead.
         used &= ~np.isnan(listed.sum(axis=1)[parts.corners[:, 2]])
     vertices, indices = parts.corners[used, 0], parts.corners[used, 2]
     result = np.full((n_vertices, 3), np.nan)
@@ -152,7 +153,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
 
 
 def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -> Floats:
-    """Return the mean of each vertex's normals, of which each counts once: (V, 3)."""
+    """Return the mean of each vertex's distinct normals: (V, 3)."""
     pairs = np.unique(vertices * len(listed) + indices)
     owners, normals = pairs // len(listed), listed[pairs % len(listed)]
     sums = np.stack(
@@ -163,9 +164,9 @@ def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -
 
 
 def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], Ints]:
-    """Return the materials, and that of each face.
+    """Return the materials, and the material index of each face.
 
-    Without any ``usemtl``, several groups or objects become materials, so that their names stay.
+    Without any ``usemtl``, several groups or objects become materials, to preserve their names.
     """
     used = parts.runs[b"usemtl"]
     by_name = bool(used)

@@ -1,11 +1,11 @@
-"""Read the PIG animal model (github.com/anl13/PIG_model): a folder of tables, or an archive.
+"""Reader of the PIG animal model (github.com/anl13/PIG_model): a folder of tables or an archive.
 
 ::
 
     vertices.txt          V x 3   x y z             metres, x forward, y left, z up
     t_pose_joints.txt     J x 3   x y z             in figure space
     parents.txt           J x 1   parent, -1 for the root
-    skinning_weights.txt  N x 3   joint vertex weight     used as they are, not normalised
+    skinning_weights.txt  N x 3   joint vertex weight     used as stored, not normalised
     faces_vert.txt        T x 3   vertex indices
     textures.txt U x 2, faces_tex.txt T x 3, J_regressor.txt N x 3         optional
     body_parts.txt V x 1, body_part_defs.txt, sym.txt V x 1                 optional
@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._neutral import neutral_corners, neutral_positions
 from viewer.formats._pig.names import JOINTS, KEYPOINTS
 from viewer.formats._pig.parts import Part, PigFiles, open_parts
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_corners, mended_positions
 from viewer.media.file_names import folder_name
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -43,7 +43,7 @@ __all__ = ["read"]
 Indices = NDArray[np.int64]
 
 _JOINT, _VERTEX = "noun-joint", "noun-vertex"  # phrases
-_ODD_SUM = 0.01  # the authors' rounding stays well below
+_ODD_SUM = 0.01  # well above the authors' rounding error
 
 
 def read(source: Source) -> Figure:
@@ -52,21 +52,21 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The folder, pickle or ``.npz``; what is odd but readable is added to its warnings.
+        The folder, pickle or ``.npz``; recoverable faults are added to its warnings.
 
     Returns
     -------
     Figure
-        With z up, in metres.
+        Figure with z up, in metres.
 
     Raises
     ------
     FormatError
-        With file and line where there are lines.
+        If the model is invalid; gives the file, and the line in a text.
     """
     files = open_parts(source)
     parts = files.parts
-    positions = _mended_mesh(parts)
+    positions = _neutral_mesh(parts)
     n_vertices, n_joints = len(positions), len(parts["t_pose_joints"].values)
     if len(parts["parents"].values) != n_joints:
         raise _count_fault(parts["parents"], n_joints, parts["t_pose_joints"])
@@ -100,7 +100,7 @@ def read(source: Source) -> Figure:
 
 
 def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
-    """Return the error of a part that has not as many rows as another."""
+    """Return the error of a part whose number of rows differs from another part's."""
     return part.source.fault(
         "F002.pig-rows-as",
         part.odd_offset(wanted),
@@ -118,19 +118,19 @@ def _layout(n_joints: int) -> PoseLayout:
     return PoseLayout(4 + 3 * n_joints, starts, is_euler, translation=0, scale=3 + 3 * n_joints)
 
 
-def _mended_mesh(parts: dict[str, Part]) -> Floats:
-    """Return the vertices; those whose row cannot be used lie between their neighbours."""
+def _neutral_mesh(parts: dict[str, Part]) -> Floats:
+    """Return the vertices, with those of invalid rows moved between their neighbours."""
     positions, faces = parts["vertices"].values, parts["faces_vert"].values
     if not np.isnan(positions).any():
         return positions
     fits = ((faces >= 0) & (faces < len(positions))).all(axis=1)
-    return mended_positions(positions, faces[fits].astype(np.int32))
+    return neutral_positions(positions, faces[fits].astype(np.int32))
 
 
 def _indices(part: Part, column: int, end: int, noun: str, rows_of: Part | None = None) -> Ints:
     """Return a column of whole numbers from 0 to ``end - 1``, the rows of another part.
 
-    ``noun`` is the phrase that says what they count, ``"noun-vertex"``.
+    ``noun`` is the key of the phrase for the indexed elements, ``"noun-vertex"``.
     """
     return _columns(part, slice(column, column + 1), end, noun, rows_of)[:, 0]
 
@@ -162,7 +162,7 @@ def _columns(part: Part, columns: slice, end: int, noun: str, rows_of: Part | No
     if fits.all():
         return values.astype(np.int32)
     if values.shape[1] == 3:
-        return mended_corners(np.where(fits, values, 0).astype(np.int64), fits)
+        return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
     return np.where(fits, values, -1).astype(np.int32)
 
 
@@ -172,7 +172,7 @@ def _parents(part: Part) -> Ints:
     for joint, parent in enumerate(parents.tolist()):
         if 0 <= parent < joint and parent == int(parent) if joint else parent == -1.0:
             continue
-        if not np.isnan(parent):  # that was refused with its row
+        if not np.isnan(parent):  # NaN was recorded with its row
             _refuse_parent(part, parents, joint)
         result[joint] = 0.0 if joint else -1.0
     return result.astype(np.int32)
@@ -201,7 +201,7 @@ def _mesh(source: Source, parts: dict[str, Part], positions: Floats) -> Mesh:
             raise _count_fault(parts["faces_tex"], len(triangles), parts["faces_vert"])
     else:
         source.warn("F007.pig-texture")
-    # Normals of the unsplit vertices, or seams would show.
+    # Normals are computed before vertices are split, to avoid visible seams.
     normals = vertex_normals(positions, triangles)
     return Mesh(positions, normals, triangles, uvs, uv_triangles=uv_triangles)
 
@@ -214,7 +214,7 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
     usable = (columns >= 0) & (vertices >= 0) & ~np.isnan(weights)
     lost = vertices[~usable & (vertices >= 0)]
     if not usable.all():
-        # What is wrong with these rows was said already; here is whose weights are not all there.
+        # The faults of these rows are recorded; this marks the vertices with incomplete weights.
         part.source.refuse("F002.pig-lost", None, 0, "weights", lost, item=part.item())
         columns, vertices, weights = columns[usable], vertices[usable], weights[usable]
     rows = np.flatnonzero(usable)
@@ -240,13 +240,13 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
 
 
 def _row_of(rows: Indices, vertices: Ints, vertex: int) -> int:
-    """Return the first row with a weight of a vertex; of one that has none, the first of all."""
+    """Return the first row with a weight of a vertex; the first row of all if it has none."""
     found = np.flatnonzero(vertices == vertex)
     return int(rows[found[0]]) if len(found) else 0
 
 
 def _check_weights(source: Source, name: str, skin: Skin, known: Bools) -> None:
-    """Remark on the weights of the vertices whose rows are all known."""
+    """Report odd weight sums of the vertices whose rows are all valid."""
     moved = has_influence(skin)
     bare = np.flatnonzero(~moved & known)
     if len(bare):
@@ -297,7 +297,7 @@ def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointR
 
 
 def _column(parts: dict[str, Part], name: str, rows: int, end: int, noun: str) -> Ints | None:
-    """Return an optional column with one number a vertex."""
+    """Return an optional column with one number per vertex."""
     if name not in parts:
         return None
     part = parts[name]
@@ -349,7 +349,7 @@ def _reduced(parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
 
 
 def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
-    """Return the authors' keypoints; they are known for the published mesh only."""
+    """Return the authors' keypoints, which are defined for the published mesh only."""
     if n_joints != len(JOINTS) or n_vertices <= max(i for _, kind, i in KEYPOINTS if kind == "v"):
         return None
     count = len(KEYPOINTS)
@@ -366,10 +366,11 @@ def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
 def _facts(
     files: PigFiles, mesh: Mesh, skin: Skin, joints: Floats, regressor: JointRegressor | None
 ) -> tuple[tuple[str, str], ...]:
-    """Put what matters into words: raw weights, regressed joints, parts, what was ignored."""
-    sums = np.where(has_influence(skin), weight_sums(skin), 1.0)  # others stay at rest
+    """Return facts about raw weights, regressed joints, parts and ignored data."""
+    # Vertices without influence stay at rest.
+    sums = np.where(has_influence(skin), weight_sums(skin), 1.0)
     facts = [("weights", f"raw; their sums are {sums.min():.3f} to {sums.max():.3f}")]
-    # At rest normalised weights return the mesh itself; raw ones scale each vertex by its sum.
+    # At rest, normalised weights reproduce the mesh; raw ones scale each vertex by its sum.
     moved = np.linalg.norm(mesh.positions * (sums - 1.0)[:, None], axis=1)
     facts.append(
         ("normalising", f"would move rest vertices by up to {1000.0 * moved.max():.2f} mm")

@@ -1,4 +1,4 @@
-"""Read ``.ply`` meshes (Stanford polygons), without a rig: text and binary of both byte orders.
+"""Reader of ``.ply`` meshes (Stanford polygons) as text and binary of either byte order; no rig.
 
 ::
 
@@ -6,9 +6,10 @@
     line     = "comment" text | "element" name count | "property" type name
              | "property" "list" type type name
 
-Of ``vertex`` are used x y z, nx ny nz, and s t (or u v, texture_u texture_v); of ``face`` the
-corners (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers a corner. A comment
-``TextureFile`` names a picture. Polygons are cut into triangles; all else is named and left out.
+Used are x y z, nx ny nz, and s t (or u v, texture_u texture_v) of ``vertex``; the corners
+(``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers per corner, of ``face``. A
+comment ``TextureFile`` names a picture. Polygons are triangulated; other data is ignored with a
+warning that names it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import printable
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply.header import CORNERS, Header, read_header
 from viewer.formats._ply.rows import Table, read_tables
@@ -27,7 +29,6 @@ from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._texture import load_image
-from viewer.formats._tolerant import mended_positions
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Material, Mesh
@@ -46,26 +47,27 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; what is odd or left out is added to its warnings.
+        The file; recoverable faults and ignored data are added to its warnings.
 
     Returns
     -------
     Figure
-        Without skeleton and skin; y up and without a unit, unless a comment of our own says.
+        Mesh without skeleton and skin; y up and without a unit, unless a comment written by this
+        program states them.
 
     Raises
     ------
     FormatError
-        With file and line, or the number of the vertex or face, if the file is broken.
+        With file and line, or the number of the vertex or face, if the file is invalid.
     """
     header = read_header(source)
     tables = read_tables(source, header)
     vertices, positions = _vertices(source, header, tables)
     counts, corners, uv_corners = _faces(source, tables, len(positions))
-    rough = mended_positions(positions, np.zeros((0, 3), np.int32))
+    rough = neutral_positions(positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, corners, counts)
     triangles = corners[picks].astype(np.int32)
-    positions = mended_positions(positions, triangles)
+    positions = neutral_positions(positions, triangles)
     _remember(source, tables, owners)
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
     uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)
@@ -98,7 +100,7 @@ def read(source: Source) -> Figure:
 
 
 def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None:
-    """Remember where vertices and triangles are, in a text."""
+    """Register the places of vertices and triangles in a text."""
     vertices, faces = tables["vertex"].offsets, tables["face"].offsets if "face" in tables else None
     if vertices is not None:
         source.remember("positions", lambda vertex: int(vertices[vertex]))
@@ -107,7 +109,7 @@ def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None
 
 
 def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple[Table, Floats]:
-    """Return the element of the vertices, and where they are."""
+    """Return the element of the vertices, and their positions."""
     if "vertex" not in tables:
         if not tables:
             raise source.fault("F002.ply-nothing", header.end - 1)
@@ -125,7 +127,7 @@ def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple
 def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
     """Return properties side by side, (N, len(names)); None if one is missing.
 
-    NaN in rows that cannot be used, which are refused: those of a text have been.
+    Invalid rows are recorded as faults and become NaN; in a text they are NaN already.
     """
     if any(name not in table.columns for name in names):
         return None
@@ -153,7 +155,7 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
 def _faces(
     source: Source, tables: dict[str, Table], n_vertices: int
 ) -> tuple[Indices, Indices, Floats | None]:
-    """Return corners of each face, all corners, and their texture coordinates if they have some."""
+    """Return corner counts of the faces, all corners, and their texture coordinates if any."""
     faces = tables.get("face")
     nothing = np.zeros(0, np.int64)
     if faces is None:
@@ -178,13 +180,13 @@ def _faces(
 def _corners(
     source: Source, faces: Table, counts: Indices, values: NDArray[Any], n_vertices: int
 ) -> Indices:
-    """Return the vertices of all faces; in place of what is none, another of the same face."""
+    """Return the vertices of all faces, invalid ones replaced by another of the same face."""
     corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
     is_wrong = (corners != values) | (corners < 0) | (corners >= n_vertices)
     if not is_wrong.any():
         return corners
     owners = np.repeat(np.arange(len(counts)), counts)
-    # Words of a text that are no numbers have been refused.
+    # Words of a text that are not numbers are recorded already.
     wrong = np.flatnonzero(is_wrong & ~np.isnan(values) if faces.offsets is not None else is_wrong)
     if len(wrong):
         face = int(owners[wrong[0]])
@@ -203,7 +205,7 @@ def _corners(
 
 
 def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
-    """Return texture coordinates of corners, (C, 2), if every face has two numbers a corner."""
+    """Return texture coordinates of corners, (C, 2), if every face has two numbers per corner."""
     if "texcoord" not in faces.lists:
         return None
     found, values = faces.lists["texcoord"]
@@ -230,9 +232,9 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
 def _uvs(
     source: Source, vertices: Table, wedges: Floats | None, picks: Indices
 ) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates: those of corners, each different one once, or of vertices."""
+    """Return texture coordinates: the distinct ones of corners, or those of vertices."""
     if wedges is not None and len(wedges):
-        # Two numbers of a corner as one, so that sorting finds equal pairs.
+        # Each pair is viewed as one complex number, so that sorting finds equal pairs.
         pairs = np.ascontiguousarray(wedges + 0.0).view(np.complex128).ravel()
         unique, inverse = np.unique(pairs, return_inverse=True)
         uvs = np.stack([unique.real, unique.imag], axis=1)
@@ -245,7 +247,7 @@ def _uvs(
 
 
 def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material, ...]:
-    """Return the picture that a comment names; one covers all faces."""
+    """Return a material with the picture that a comment names, for all faces."""
     named = [
         (text.split(None, 1)[1].strip(), offset)
         for text, offset in header.comments
@@ -260,7 +262,7 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
 
 
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:
-    """Warn, once, of everything that the file holds and the mesh does not."""
+    """Warn, once, of all data in the file that the mesh does not use."""
     used = {
         "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
         "face": {*CORNERS, *(("texcoord",) if uses_wedges else ())},

@@ -1,4 +1,4 @@
-"""Read and write single poses: ``.json``, ``.npz``, or plain numbers in a text file.
+"""Reader and writer of single poses: ``.json``, ``.npz``, or plain numbers in a text file.
 
 ::
 
@@ -10,11 +10,11 @@
     .npz   the same arrays, dof_names and dofs apart
     .txt   the model's own numbers, separated by blanks: 190 for PIG, 72 for SMPL …
 
-The turns of the joints, quaternions in the figure's axes, are for figures with other DOFs, which
-``dof_layout`` tells. Those with the same take ``dofs``, edited or not, and what lies beneath them:
-rotations and shifts of joints within their parents, written only where they are not at rest.
+``joint_turns`` are rotations as quaternions in the figure's axes, for figures with other DOFs than
+``dof_layout`` names. Figures with the same DOFs use ``dofs``, edited or not, and the transforms
+below them: rotations and shifts of joints relative to their parents, written only if not at rest.
 
-Both kinds of named values may instead hold one frame of what smplx takes: ``global_orient``,
+Both kinds of named values may instead contain one frame of smplx's parameters: ``global_orient``,
 ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,
 ``poses``, ``betas``, ``expression``, ``transl`` or ``trans``; beside them ``use_pca`` and
 ``flat_hand_mean``.
@@ -33,10 +33,10 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
-from viewer.formats._archive import describe
-from viewer.formats._container import archive_of
+from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.values import describe
 from viewer.formats._pose.named_values import NamedValues, described, parse_json
-from viewer.formats._pose.turns import KEYS, named_turns, read_turns
+from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
 from viewer.formats._source import Source
 from viewer.formats._table import read_numbers
 from viewer.media.saving import save_arrays, save_text
@@ -65,8 +65,8 @@ _BESIDES = (
     "mocap_frame_rate mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
 )
-_NOT_NEEDED = _BESIDES.split()  # what files of poses and motions have, and posing does not need
-_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)  # J x 3 numbers are one pose, not J frames
+_NOT_NEEDED = _BESIDES.split()  # keys of pose and motion files that posing does not need
+_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)  # here J x 3 numbers are one pose, not J frames
 _VERSION = 1
 
 
@@ -76,17 +76,17 @@ def read(source: Source) -> PoseRecord:
     Parameters
     ----------
     source : Source
-        The file; keys that mean nothing here are added to its warnings.
+        The file; unknown keys are added to its warnings.
 
     Returns
     -------
     PoseRecord
-        To be applied to a figure.
+        Pose that can be applied to a figure.
 
     Raises
     ------
     FormatError
-        If a value is no number, or there are several poses in it.
+        If a value is not a number, or the file has several poses.
     """
     if source.peek(2).startswith((b"PK", b"\x80")) or source.archive is not None:
         return _from_values(_archive_values(source))
@@ -100,7 +100,7 @@ def read(source: Source) -> PoseRecord:
 
 
 def _archive_values(source: Source) -> NamedValues:
-    """Return what a pose needs; the other keys, which may be large, stay unread."""
+    """Return the values that a pose needs; other keys, which may be large, are not read."""
     archive = archive_of(source)
     values: dict[str, Any] = dict.fromkeys(archive.keys)
     wanted = (*_KNOWN, *KEYS) if KEYS[0] in archive.keys else _KNOWN
@@ -131,7 +131,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
             expected=_VERSION,
             found=describe(version),
         )
-    # Which key each part of the pose is read from.
+    # The key that each part of the pose is read from.
     keys = {part: _first(named, names) for part, names in _NAMES.items()}
     vector = _first(named, _VECTORS)
     translation = _numbers(named, keys["translation"])
@@ -146,7 +146,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         scale=_single(named, "scale"),
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
-        turns=read_turns(named),
+        turns=read_rotations(named),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
@@ -158,7 +158,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
 
 
 def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:
-    """Return what finds the line of a record's part; the names in it are those of DOFs."""
+    """Return a function that finds the line of a part of a record, or of a DOF by its name."""
 
     def line(part: str, name: str) -> int | None:
         offset = named.offset(keys.get(part, part), *([name] if name else []))
@@ -168,7 +168,7 @@ def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str]
 
 
 def _check_keys(named: NamedValues, record: PoseRecord) -> None:
-    """Refuse a file that poses nothing; warn of keys that nobody reads."""
+    """Refuse a file without a pose; warn of unknown keys."""
     arrays = (record.vector, record.shape, record.expression, record.translation)
     is_empty = not record.dofs and not record.parts and record.scale is None
     if is_empty and all(array is None for array in arrays):
@@ -186,7 +186,7 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
 
 
 def _with_hint(key: str) -> Phrase | str:
-    """Return a key that nobody reads, with the one that was probably meant."""
+    """Return an unknown key, with the most similar known one."""
     near = [] if key in KEYS else near_names(key, (*_KNOWN, *KEYS))[:1]
     shown = printable(key, 40)
     return Phrase("pose-key-near", name=shown, near=question(near)) if near else shown
@@ -206,12 +206,12 @@ def _single(named: NamedValues, key: str) -> float | None:
 
 
 def _first(named: NamedValues, keys: tuple[str, ...]) -> str:
-    """Return the key that has a value, the first of all if none has."""
+    """Return the first key with a value; if there is none, the first key."""
     return next((key for key in keys if named.values.get(key) is not None), keys[0])
 
 
 def _numbers(named: NamedValues, key: str) -> Floats | None:
-    """Return the numbers of a key in one row; several frames are refused."""
+    """Return the numbers of a key as one row; several frames are refused."""
     if named.values.get(key) is None:
         return None
     array = named.numbers(key)
@@ -239,7 +239,7 @@ def _dofs(named: NamedValues) -> dict[str, float]:
 
 
 def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError:
-    """Return an error on what a figure does not take of a file's pose, with its line if known."""
+    """Return the error about a pose that does not fit the figure, with its line if known."""
     line = None
     if isinstance(problem, PosePartError) and record.line_of is not None:
         line = record.line_of(problem.part, problem.name)
@@ -250,7 +250,7 @@ def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError
 
 
 def pose_text(record: PoseRecord) -> str:
-    """Return a pose as JSON, one DOF a line."""
+    """Return a pose as JSON, one DOF per line."""
     values = {"viewer_pose": _VERSION, **_named(record)}
     return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
@@ -273,23 +273,23 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     ):
         if single is not None:
             named[name] = single
-    return named if record.turns is None else named | named_turns(record.turns)
+    return named if record.turns is None else named | named_rotations(record.turns)
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
-    """Write one pose, as the suffix asks.
+    """Write one pose in the format of the suffix.
 
     Parameters
     ----------
     content : PoseRecord
-        What to write; anything else is refused.
+        Pose to write; other content is refused.
     path : str or Path
         ``.json``, ``.npz``, or ``.txt`` for the model's own numbers alone.
 
     Raises
     ------
     UnsupportedFormatError
-        If it is no pose.
+        If the content is not a pose.
     OutputError
         If the file cannot be written.
     """

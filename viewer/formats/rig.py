@@ -1,12 +1,12 @@
-r"""Read ``.rig`` files (UCSD course CSE169): the names of files that belong together.
+r"""Reader of ``.rig`` files (UCSD course CSE169): the names of files that belong together.
 
 ::
 
     rig   = "rig" name? "{" item* "}"
     item  = "skeleton" file | "skin" file | "morphs" n "{" file*n "}"
 
-Files are relative to the folder of the ``.rig``, and must lie below it. A name may have blanks if
-it stands in double quotes.
+Files are relative to the folder of the ``.rig``, and must lie below it. A name in double
+quotes may contain blanks.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ Words = list[re.Match[bytes]]
 
 @dataclass(frozen=True, slots=True)
 class NamedFiles:
-    """Files that are to be opened together.
+    """Files to open together.
 
     Attributes
     ----------
     name : str
-        Of the whole.
+        Name of the rig.
     paths : tuple of Path
-        Skeleton, skin and morphs in the order of the file; they need not exist.
+        Skeleton, skin and morphs in the order of the file; not checked for existence.
     """
 
     name: str
@@ -43,12 +43,12 @@ class NamedFiles:
 
 
 def read(source: Source) -> NamedFiles:
-    """Read which files belong together; none of them is looked at.
+    """Read the names of files that belong together, without opening them.
 
     Parameters
     ----------
     source : Source
-        The file; what is odd but readable is added to its warnings.
+        The file; recoverable faults are added to its warnings.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Rigged meshes: every part of a figure with its rig, in one ``.npz`` that any program can read.
+"""Reader and writer of rigged meshes: all parts of a figure in one ``.npz``, without pickles.
 
 ::
 
@@ -15,8 +15,8 @@
     field_0_names (N,) …
 
 Rotations are (x, y, z, w); matrices are for column vectors. ``dof_kinds`` are 0 to 2 for
-translations, 3 to 5 for rotations about x, y, z. What ``viewer rig`` adds is for other programs,
-and not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``target_scales``,
+translations, 3 to 5 for rotations about x, y, z. Keys that ``viewer rig`` adds for other programs
+are not read: ``target_dofs``, ``target_translations``, ``target_rotations``, ``target_scales``,
 ``target_place``, ``placement``, ``alignment``.
 """
 
@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part
 from viewer.errors import FormatError, RigError
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.values import Archive
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_positions
 from viewer.media.saving import save_arrays
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Deferred, Floats
@@ -65,12 +65,12 @@ def read(source: Source) -> Figure:
     Returns
     -------
     Figure
-        With mesh, skeleton and skin; correctives are read when first used.
+        Figure with mesh, skeleton and skin; correctives are read when first used.
 
     Raises
     ------
     FormatError
-        If an array is missing, has a wrong shape, or the parts do not fit each other.
+        If an array is missing or has a wrong shape, or the parts do not fit each other.
     """
     archive = archive_of(source)
     version = int(_finite(archive, "viewer_rig", ()))
@@ -116,7 +116,7 @@ def _mesh(archive: Archive) -> Mesh:
     positions = _finite(archive, "positions", (None, 3), "positions")
     listed = _numbers(archive, "triangles", (None, 3))
     triangles = corners_of(archive, "triangles", listed, len(positions))
-    positions = mended_positions(positions, triangles)
+    positions = neutral_positions(positions, triangles)
     has_uvs, split = archive.has("uvs"), archive.has("uv_triangles")
     materials = _materials(archive)
     return Mesh(
@@ -166,7 +166,7 @@ def _skeleton(archive: Archive) -> Skeleton:
 
 
 def _parents(archive: Archive, count: int) -> NDArray[Any]:
-    """Return the parents; refuse those that come too late, and make these joints roots."""
+    """Return the parents; refuse those that do not precede their joints, which become roots."""
     parents = _numbers(archive, "parents", (count,))
     late = np.flatnonzero((parents >= np.arange(count)) | (parents < -1))
     if len(late) == 0:
@@ -192,7 +192,7 @@ def _parents(archive: Archive, count: int) -> NDArray[Any]:
 
 
 def _limits(archive: Archive, n_dofs: int) -> Floats:
-    """Return the limits; refuse those that contradict, and put none in their place."""
+    """Return the limits; refuse contradictory ones, which are removed."""
     limits = _numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64)
     wrong = ~(limits[:, 0] <= limits[:, 1])
     if not wrong.any():
@@ -214,7 +214,7 @@ def _skin(archive: Archive, n_joints: int) -> Skin:
     starts = _numbers(archive, "skin_starts", (None,))
     joints = _numbers(archive, "skin_joints", (None,))
     listed = _numbers(archive, "skin_weights", (None,))
-    # Whether the starts rise is for the skin to say.
+    # Whether the starts ascend is checked by the skin.
     owners = np.searchsorted(np.sort(starts), np.arange(len(listed)), side="right") - 1
     weights = finite(archive, "skin_weights", listed, "weights", np.maximum(owners, 0))
     inverse_bind = _finite(archive, "inverse_bind", (None, 4, 4), "bindings")
@@ -317,12 +317,12 @@ def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | No
 
 
 def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
-    """Return what the file holds of a figure, by key; correctives as float32.
+    """Return the arrays of a figure by key, as stored in the file; correctives as float32.
 
     Raises
     ------
     RigError
-        If it lacks mesh, skeleton or skin.
+        If the figure has no mesh, skeleton or skin.
     """
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     if mesh is None or skeleton is None or skin is None:
@@ -359,7 +359,7 @@ _SKELETON = (
     *("parents", "rest_translations", "rest_rotations", "rest_scales"),
     *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes"),
 )
-"""Keys that are called as in ``Skeleton``."""
+"""Keys with the same names as in ``Skeleton``."""
 
 
 def _field_arrays(figure: Figure) -> dict[str, NDArray[Any]]:

@@ -1,4 +1,4 @@
-r"""Read and write ``.skel`` skeletons (UCSD course CSE169).
+r"""Reader and writer of ``.skel`` skeletons (UCSD course CSE169).
 
 ::
 
@@ -8,7 +8,7 @@ r"""Read and write ``.skel`` skeletons (UCSD course CSE169).
           | "rotxlimit" min max | "rotylimit" min max | "rotzlimit" min max | joint | unknown
     name  = word*
 
-Words are separated by any white space; braces are words even when glued. Lengths have no
+Words are separated by any white space; braces are words even without it. Lengths have no
 unit, angles are radians, y is up. Joints are numbered in the order of the file. Each has three
 rotation DOFs; the first also has three translations, which ``.anim`` calls the root's.
 """
@@ -25,7 +25,7 @@ from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source
-from viewer.formats._tolerant import number_key
+from viewer.formats._words import number_key
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.posing.dof_text import beyond_text
@@ -42,7 +42,7 @@ Word = re.Match[bytes]
 
 @dataclass(slots=True)
 class _Joint:
-    """A joint while it is read; items come in any order, the last of a kind wins."""
+    """A joint being read; items come in any order, and the last of a kind wins."""
 
     name: str
     parent: int
@@ -51,7 +51,7 @@ class _Joint:
     boxmin: Sequence[float] = (-0.1, -0.1, -0.1)
     boxmax: Sequence[float] = (0.1, 0.1, 0.1)
     pose: Sequence[float] = (0.0, 0.0, 0.0)
-    # By axis: the limits, and where they are.
+    # By axis: the limits and their offset.
     limits: dict[int, tuple[list[float], int]] = field(default_factory=dict)
 
 
@@ -61,12 +61,12 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; what is odd but readable is added to its warnings.
+        The file; recoverable faults are added to its warnings.
 
     Returns
     -------
     Figure
-        Without mesh; DOFs clamped to their limits.
+        Figure without mesh; DOFs are clamped to their limits.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def read(source: Source) -> Figure:
 
 
 def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
-    """Say which DOFs of the file's own pose had to be brought within their limits."""
+    """Return a message about DOFs of the file's pose that were clamped to their limits."""
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
@@ -97,7 +97,7 @@ def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ..
 
 
 class _Parser:
-    """Walks the words of a file without recursion: real rigs nest, and broken ones nest deeply."""
+    """Parser without recursion, because invalid files may be nested arbitrarily deeply."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -131,7 +131,7 @@ class _Parser:
         self.word = next(self.words, None)
 
     def _open_joint(self) -> None:
-        assert self.word is not None  # the caller looked at it
+        assert self.word is not None  # the caller checked it
         start = self.word.start()
         name: list[str] = []
         self._advance()
@@ -156,7 +156,7 @@ class _Parser:
         self._advance()
 
     def _limit(self, axis: int) -> None:
-        assert self.word is not None  # the caller looked at it
+        assert self.word is not None  # the caller checked it
         start = self.word.start()
         values = self._numbers(2)
         if values:
@@ -165,9 +165,9 @@ class _Parser:
     def _numbers(self, count: int) -> list[float]:
         """Read the numbers of an item; the current word is its keyword.
 
-        None at all where a fault was recorded: the item is as if it were not there.
+        Empty if a fault was recorded; the item is then ignored.
         """
-        assert self.word is not None  # the caller looked at it
+        assert self.word is not None  # the caller checked it
         keyword = self.word
         values: list[float] = []
         self._advance()
@@ -184,7 +184,7 @@ class _Parser:
         return values
 
     def _refuse(self, keyword: Word, expected: int, found: int) -> None:
-        """Refuse an item for the word after its numbers, and go on behind it."""
+        """Record a fault of an item with a wrong number of values, and skip the item."""
         refuse, word, places = self.source.refuse, _text(self.word), [self.open[-1]]
         part: Part = "joints" if keyword.group() == b"offset" else "items"
         owner = _called(self.found[self.open[-1]])
@@ -203,7 +203,7 @@ class _Parser:
         self._skip_item()
 
     def _skip_item(self, on_line: bool = True) -> None:
-        """Move behind what belongs to an item: the rest of its line, and numbers below that."""
+        """Skip the rest of an item: that of its line, and numbers on the lines below."""
         while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
             last = self.word
             if not (on_line or is_number(last.group()) or is_infinite(last.group())):
@@ -212,20 +212,20 @@ class _Parser:
             on_line = on_line and self._is_beside(last)
 
     def _is_beside(self, last: Word) -> bool:
-        """Return whether the current word is in one line with the one before."""
+        """Return whether the current word is on the same line as the previous one."""
         if self.word is None:
             return False
         between = self.source.data[last.end() : self.word.start()]
         return b"\n" not in between and b"\r" not in between
 
     def _skip_unknown(self) -> None:
-        """Skip a word we do not know with its line and numbers, or its whole balanced block."""
-        assert self.word is not None  # the caller looked at it
+        """Skip an unknown word with its line and numbers, or with its whole balanced block."""
+        assert self.word is not None  # the caller checked it
         keyword = self.word
         self.source.warn("F006.unknown", keyword.start(), found=keyword.group())
         if keyword.group() != b"{":
             self._advance()
-            # One warning for its whole line: "colour red" is one thing that we do not know.
+            # One warning for the whole line: "colour red" is a single unknown item.
             self._skip_item(self._is_beside(keyword))
         if not self._finds_block():
             return
@@ -238,7 +238,7 @@ class _Parser:
         raise self.source.fault("F002.open", keyword.start(), word=keyword.group())
 
     def _finds_block(self) -> bool:
-        """Move to the "{" of ``word name? {`` if the rest of one follows."""
+        """Move to the "{" of ``word name? {`` if such a block follows."""
         if self.word is None or self.word.group() in (b"}", *KEYWORDS):
             return False
         if self.word.group() == b"{":
@@ -274,7 +274,7 @@ def _called(joint: _Joint) -> Phrase:
 
 
 def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
-    """Return the skeleton, and its pose as the file has it."""
+    """Return the skeleton, and its pose as written in the file."""
     n_joints = len(joints)
     # The root's translations come first, as in the channels of .anim.
     kinds = np.concatenate([np.arange(6), np.tile([3, 4, 5], n_joints - 1)])
@@ -297,14 +297,14 @@ def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
         dof_kinds=kinds,
         rest_dofs=np.clip(dofs, limits[:, 0], limits[:, 1]),
         dof_limits=limits,
-        # Corners may be exchanged on an axis, which would turn faces inside out.
+        # Corners may be swapped on an axis, which would turn the faces inside out.
         boxes=np.sort(corners, axis=1),
     )
     return skeleton, dofs
 
 
 def _check_limits(source: Source, joints: list[_Joint], limits: Floats) -> None:
-    """Turn +-100000 into no limit, and limits that contradict each other as well; in place."""
+    """Remove limits of +-100000, which mean "none", and contradictory limits; in place."""
     limits[limits[:, 0] <= -UNLIMITED, 0] = -np.inf
     limits[limits[:, 1] >= UNLIMITED, 1] = np.inf
     wrong = np.flatnonzero(limits[:, 0] > limits[:, 1])

@@ -1,4 +1,4 @@
-r"""Read and write ``.skin`` meshes with weights (UCSD course CSE169, with texture extension).
+r"""Reader and writer of ``.skin`` meshes with weights (UCSD course CSE169, texture extension).
 
 ::
 
@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
@@ -38,7 +39,6 @@ from viewer.formats._skin.checks import (
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
-from viewer.formats._tolerant import mended_positions
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -48,7 +48,7 @@ from viewer.rig.skin import Skin
 
 __all__ = ["read", "write"]
 
-_SHORTEST = 1e-15  # of a normal: the square of a shorter one is 0 in float32
+_SHORTEST = 1e-15  # normal; the square of a shorter one is 0 in float32
 
 
 def read(source: Source) -> Figure:
@@ -57,12 +57,12 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; what is odd but readable is added to its warnings.
+        The file; recoverable faults are added to its warnings.
 
     Returns
     -------
     Figure
-        Without skeleton; without skin if the file has neither weights nor bindings.
+        Figure without skeleton, and without skin if the file has neither weights nor bindings.
 
     Raises
     ------
@@ -88,13 +88,13 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
         [run.material for run in sections.triangles],
         [len(run.triangles) for run in sections.triangles],
     )
-    positions = mended_positions(sections.tables["positions"], triangles)
+    positions = neutral_positions(sections.tables["positions"], triangles)
     uvs = sections.tables.get("texcoords")
     return Mesh(
         positions=positions,
         normals=_normals(source, sections, positions, triangles),
         triangles=triangles,
-        # NaN stands for faults; the sum says at once whether there is one.
+        # Faults are NaN, and a single sum shows whether there is one.
         uvs=uvs if uvs is None or not np.isnan(uvs.sum()) else np.nan_to_num(uvs),
         materials=tuple(sections.materials),
         triangle_materials=materials.astype(np.int32),
@@ -116,7 +116,7 @@ def _normals(source: Source, sections: Sections, positions: Floats, triangles: I
         if "normals" not in sections.offsets:
             source.warn("F007.skin-normals")
         return vertex_normals(positions, triangles)
-    # Column by column: numpy reduces rows of three slowly.
+    # Column by column, because numpy reduces rows of three slowly.
     x, y, z = np.abs(normals.T)
     longest = np.maximum(np.maximum(x, y), z)
     zero: Bools = longest < _SHORTEST
@@ -158,18 +158,18 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     inverse_bind = invert_bindings(source, sections)
     joints, weights = checked_influences(source, sections, len(inverse_bind))
     skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
-    if not source.diagnostics.errors:  # what a file is refused for says enough of its weights
+    if not source.diagnostics.errors:  # errors make warnings about weights redundant
         check_weights(source, skin)
     return skin
 
 
 def write(figure: Figure, path: str | Path) -> None:
-    """Write a figure's mesh, weights and bindings; its texture pictures too if they are missing.
+    """Write a figure's mesh, weights and bindings, and its texture pictures if they are missing.
 
     Parameters
     ----------
     figure : Figure
-        With a mesh; without a skin, weights and bindings are left out.
+        Figure with a mesh. Without a skin, weights and bindings are omitted.
     path : str or Path
         Replaced only when the whole text has been written.
 
@@ -220,7 +220,7 @@ def _weights_text(skin: Skin) -> str:
 
 
 def _triangle_runs(mesh: Mesh) -> list[str]:
-    """Write a material before the triangles that follow it, as the reader assigns them."""
+    """Return the triangles sections, each after its material, as the reader assigns them."""
     indices = mesh.material_indices
     edges = np.flatnonzero(np.diff(indices)) + 1
     parts: list[str] = []
@@ -249,10 +249,10 @@ def _material_text(material: Material) -> str:
 
 
 def _as_rest_of_line(texture: str | None) -> str | None:
-    """Return what is read back where a texture's name is written."""
+    """Return a texture's name as it is read back."""
     try:
         text = (texture or "").encode("utf-8", "surrogateescape").strip()
-    except UnicodeEncodeError:  # a lone surrogate, which no bytes are decoded to
+    except UnicodeEncodeError:  # a lone surrogate, which decoding never yields
         return None
     return re.split(rb"[\r\n{}]", text)[0].decode("utf-8", "surrogateescape") or None
 
@@ -270,15 +270,15 @@ def _matrix_text(rows: Floats) -> str:
 
 
 def _save_texture(material: Material, folder: Path) -> None:
-    """Put a picture where the file names it, unless the same one is there already."""
+    """Save a picture under the name in the file, unless the same picture is there already."""
     if material.texture is None or material.image is None:
         return
-    name = Path(material.texture.replace("\\", "/"))  # as the reader takes it
+    name = Path(material.texture.replace("\\", "/"))  # as the reader interprets it
     path = folder / name
     if path.exists():
         there = load_image(Source(folder / "x.skin", b""), material.texture, 0)
         if there is None or not np.array_equal(there, material.image):
-            raise OutputError(f"{printable(path, 300)}: another picture is there already")
+            raise OutputError(f"{printable(path, 300)}: a different picture exists already")
         return
     if name.is_absolute() or ".." in name.parts:
         why = "is an absolute path" if name.is_absolute() else "lies outside the folder"

@@ -1,4 +1,4 @@
-"""Read body models of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME, and kin.
+"""Reader of body models of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME and related models.
 
 An archive (``.pkl`` as published, or ``.npz``) of named arrays; V, J, S come from their shapes::
 
@@ -9,7 +9,7 @@ An archive (``.pkl`` as published, or ``.npz``) of named arrays; V, J, S come fr
     vt (U, 2)   ft (F, 3)    vert_sym_idxs (V,)   lmk_faces_idx (L,)   lmk_bary_coords (L, 3)
 
 Loper et al. 2015 (SMPL), Romero et al. 2017 (MANO, SMPL+H), Li et al. 2017 (FLAME), Pavlakos et
-al. 2019 (SMPL-X). Nothing in a file is executed: see ``_archive.py``.
+al. 2019 (SMPL-X). Nothing in a file is executed: see ``_archive/``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Archive, Opaque, Sparse, describe
-from viewer.formats._container import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
+from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._smpl.parts import (
     IGNORED,
@@ -29,7 +30,6 @@ from viewer.formats._smpl.parts import (
     model_uvs,
 )
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_positions
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
@@ -45,10 +45,10 @@ from viewer.rig.smpl_family import Member, member_of
 __all__ = ["KEYS", "read"]
 
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
-"""Without these a file is no such model."""
+"""Required keys, which identify such a model."""
 
-_ODD_SUM = 0.05  # of a joint's regressor from 1: it would not be where it should
-_ROUNDED = 1e-3  # how far weights may be from a sum of 1 and are scaled to it
+_ODD_SUM = 0.05  # deviation of a joint regressor's sum from 1, which would displace the joint
+_ROUNDED = 1e-3  # largest deviation from 1 of weight sums that are normalised
 _ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and that through float32
 
 
@@ -58,17 +58,17 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The archive; what is odd but readable is added to its warnings.
+        The archive; recoverable faults are added to its warnings.
 
     Returns
     -------
     Figure
-        With mesh, skeleton and skin; blend shapes and correctives are read when first used.
+        Figure with mesh, skeleton and skin; blend shapes and correctives are read when first used.
 
     Raises
     ------
     FormatError
-        If an array is missing, has a wrong shape, or numbers that make no sense.
+        If an array is missing, or has a wrong shape or invalid values.
     """
     archive = archive_of(source)
     missing = [key for key in KEYS if not archive.has(key)]
@@ -111,7 +111,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
     if len(positions) == 0:
         raise archive.fault("F002.smpl-no-vertex", item="v_template")
     triangles = corners_of(archive, "f", archive.array("f", (None, 3)).values(), len(positions))
-    positions = mended_positions(positions, triangles)
+    positions = neutral_positions(positions, triangles)
     used += ["v_template", "f"]
     uvs, uv_triangles = model_uvs(source, archive, len(triangles), used)
     return Mesh(
@@ -124,7 +124,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
 
 
 def _parents(archive: Archive, used: list[str]) -> Ints:
-    """Return each joint's parent; the root's is written in four ways."""
+    """Return each joint's parent; the root's has four spellings."""
     table = archive.array("kintree_table").values()
     if table.ndim not in (1, 2) or (table.ndim == 2 and len(table) != 2) or table.size == 0:
         raise archive.fault(
@@ -166,7 +166,7 @@ def _refuse_parent(archive: Archive, parents: Floats, joint: int) -> None:
 def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
     value = archive.get(key)
     if isinstance(value, Opaque):
-        # numpy pickles a sparse matrix in an .npz, and pickles are programs.
+        # numpy pickles a sparse matrix in an .npz, and unpickling could run code.
         problem = Phrase("matrix-objects", shape=shape, what=value.what)
         raise archive.fault("F002.archive-value", item=key, problem=problem)
     return archive.sparse(key, shape)
@@ -222,7 +222,7 @@ def _skin(
         )
     used.append("weights")
     kept = weights != 0.0
-    # What was rounded is put right, and nothing else.
+    # Only rounding errors are corrected.
     factors = np.where(np.abs(sums - 1.0) <= _ROUNDED, sums, 1.0)
     return skin_from_entries(
         n_vertices,

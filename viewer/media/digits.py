@@ -1,4 +1,4 @@
-"""Whole numbers written into pictures, without a font: digits of 5 x 7 dots."""
+"""Whole numbers drawn into pictures without a font: digits of 5 x 7 dots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ROWS = (
 )
 _WIDTH, _HEIGHT, _STEP = 5, 7, 6
 _INK, _PAPER = (255, 255, 255, 255), (0, 0, 0, 255)
-_PAPER_SHARE = 0.55  # how much of what is under the paper it covers
+_PAPER_OPACITY = 0.55  # opacity of the dark background behind a number
 
 
 def digits(number: int) -> Bools:
@@ -37,27 +37,27 @@ def digits(number: int) -> Bools:
 
 
 def write_number(pixels: Bytes, number: int) -> None:
-    """Write a number into the lower left corner of a picture, on dark paper that shines through.
+    """Draw a number into the lower left corner of a picture, on a translucent dark background.
 
     Parameters
     ----------
     pixels : (H, W, 4) uint8
-        Changed in place; left as it is if the number does not fit.
+        Changed in place; unchanged if the number does not fit.
     number : int
         0 or more.
     """
     height, width = pixels.shape[:2]
-    dots = np.pad(digits(number), 2)  # the paper's margin, in dots
+    dots = np.pad(digits(number), 2)  # margin of the background, in dots
     scale = max(round(height / 100), 1)
     ink = np.kron(dots, np.ones((scale, scale), dtype=np.bool_)).astype(np.bool_)
     if ink.shape[0] > height or ink.shape[1] > width:
         return
     corner = pixels[height - ink.shape[0] :, : ink.shape[1]]
-    # Paper over a transparent background: its share is its alpha.
+    # Over a transparent picture the opacity of the background becomes its alpha.
     under = corner.astype(np.float64)
-    share = _PAPER_SHARE
+    opacity = _PAPER_OPACITY
     under[..., :3] *= under[..., 3:] / 255.0
-    alpha = 255.0 * share + (1.0 - share) * under[..., 3]
-    color = (1.0 - share) * under[..., :3] * 255.0 / alpha[..., None]
+    alpha = 255.0 * opacity + (1.0 - opacity) * under[..., 3]
+    color = (1.0 - opacity) * under[..., :3] * 255.0 / alpha[..., None]
     corner[..., :3], corner[..., 3] = np.rint(color), np.rint(alpha)
     corner[ink] = _INK

@@ -9,11 +9,11 @@ __all__ = ["file_stem", "folder_name", "opened_text"]
 
 _LONGEST = 100  # letters of a stem
 _INSIDE = ("smpl_full", "smplfull", "smpl", "keypoints3d", "core_txt_files")
-"""Folders that every EasyMocap recording, or every copy of the PIG model, calls the same."""
+"""Folders with the same name in every EasyMocap recording or copy of the PIG model."""
 
 
 def folder_name(path: Path) -> str:
-    """Return what a folder's content is called: after the folder that a person has named.
+    """Return a name for a folder's content: that of the nearest folder which the user named.
 
     >>> folder_name(Path("/takes/dance.v2/smpl")), folder_name(Path("/models/hog"))
     ('dance.v2', 'hog')
@@ -24,7 +24,7 @@ def folder_name(path: Path) -> str:
 
 
 def opened_text(path: Path) -> str:
-    """Return what titles and menus call a file or folder that was opened.
+    """Return the name of an opened file or folder in titles and menus.
 
     >>> opened_text(Path("takes/walk.bvh")), opened_text(Path("/takes/dance/smpl"))
     ('walk.bvh', 'dance/smpl')
@@ -35,12 +35,12 @@ def opened_text(path: Path) -> str:
 
 
 def _whole(path: Path) -> Path:
-    """Return a path from the root: "." has no name of its own, and a link keeps the one it has."""
+    """Return an absolute path, because "." has no name; links keep their own name."""
     return Path(os.path.abspath(path))  # noqa: PTH100  resolve() would follow links
 
 
 def file_stem(name: str, otherwise: str = "picture") -> str:
-    """Return a name as the stem of a file: what could confuse a shell becomes an underscore.
+    """Return a name as the stem of a file; characters special to shells become underscores.
 
     >>> file_stem("dance 0"), file_stem("a/b"), file_stem("")
     ('dance_0', 'a_b', 'picture')

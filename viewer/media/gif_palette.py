@@ -1,8 +1,8 @@
-"""The 256 colours of a GIF: chosen from a few frames, then used for all with a still dither.
+"""The 256-colour palette of a GIF: chosen from a few frames, used for all with ordered dither.
 
-One palette for the whole video leaves what does not move unchanged from frame to frame, so that it
-need not be stored again: a fifth of the size that a palette for each frame takes. The dither is
-ordered (a pattern that stands still), for the same reason.
+With one palette for the whole video, static regions stay identical from frame to frame and are not
+stored again: the file has a fifth of the size that it has with a palette for each frame. The dither
+is ordered (a fixed pattern) for the same reason.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PaletteChooser", "PaletteUser"]
 
-_HUNDREDTH = Fraction(1, 100)  # of a second, in which a GIF counts
-_PALETTE_SIDE = 16  # FFmpeg holds a palette as a picture of 16 x 16
+_HUNDREDTH = Fraction(1, 100)  # of a second, the time unit of GIF
+_PALETTE_SIDE = 16  # FFmpeg stores a palette as a picture of 16 x 16
 
 
 class PaletteChooser:
@@ -37,7 +37,7 @@ class PaletteChooser:
         source = self._graph.add_buffer(
             width=size[0], height=size[1], format="rgba", time_base=_HUNDREDTH
         )
-        # One colour stands for transparent, and for "as in the frame before".
+        # One colour means "transparent", and "unchanged since the previous frame".
         chooser = self._graph.add("palettegen", "stats_mode=full:reserve_transparent=1")
         sink = self._graph.add("buffersink")
         source.link_to(chooser)
@@ -46,13 +46,13 @@ class PaletteChooser:
         self.n_seen = 0
 
     def look(self, picture: VideoFrame) -> None:
-        """Take a frame's colours into account."""
+        """Add a frame's colours to the statistics."""
         picture.pts, picture.time_base = self.n_seen, _HUNDREDTH
         self._graph.push(picture)
         self.n_seen += 1
 
     def palette(self) -> VideoFrame:
-        """Return the colours; called once, after at least one frame."""
+        """Return the palette; called once, after at least one frame."""
         self._graph.push(None)
         palette: VideoFrame = self._graph.pull()  # type: ignore[assignment]  # no sound in here
         return palette
@@ -68,7 +68,7 @@ class PaletteUser:
     size : (int, int)
         Width and height.
     time_base : Fraction
-        Seconds that a frame stays.
+        Duration of a frame in seconds.
     palette : VideoFrame
         Of a ``PaletteChooser``.
     """
@@ -101,7 +101,7 @@ class PaletteUser:
         colors.push(None)
 
     def taken(self, picture: VideoFrame | None) -> list[VideoFrame]:
-        """Return the frames that are ready once this one is in; None ends the video."""
+        """Return the frames that are complete after this one; None ends the video."""
         if picture is not None:
             picture.time_base = self._time_base
         self._frames.push(picture)
@@ -111,6 +111,6 @@ class PaletteUser:
                 done = self._graph.pull()
             except (self._av.BlockingIOError, self._av.EOFError):
                 return ready
-            # Delays in 1/100 s, rounded so that no error adds up.
+            # In 1/100 s; times are rounded, not durations, so errors do not accumulate.
             done.pts, done.time_base = round(100 * done.pts * done.time_base), _HUNDREDTH
             ready.append(done)

@@ -1,4 +1,4 @@
-"""Decode and write pictures; Pillow is imported only when there is one."""
+"""Decoding and writing of pictures; Pillow is imported only when it is needed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins like this is a picture that textures may be."""
+    """Return whether a file that begins like this is a picture in a supported format."""
     return head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*")) or (
         head[:4] == b"RIFF" and head[8:12] == b"WEBP"
     )
@@ -39,14 +39,14 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
     Parameters
     ----------
     path : Path
-        Named in errors.
+        File name for errors.
     data : bytes
         The file.
 
     Raises
     ------
     FormatError
-        If it is no picture that can be read.
+        If it is not a readable picture.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -77,7 +77,7 @@ def _open(data: bytes) -> Image.Image:
 
 
 def save_image(path: Path, pixels: Bytes) -> int:
-    """Write a picture in the format of its suffix, PNG if that is none.
+    """Write a picture in the format of its suffix, PNG if there is no suffix.
 
     Parameters
     ----------

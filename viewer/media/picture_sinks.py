@@ -1,4 +1,4 @@
-"""Where frames go as pictures: one file each, or all of them side by side in one."""
+"""Sinks that write frames as pictures: one file for each, or one contact sheet of all."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _CELL_ASPECT = 4.0 / 3.0
 
 
 class PictureSink:
-    """Writes a picture for every frame, each in one step.
+    """Writes a picture for every frame, each atomically.
 
-    Pictures that are finished stay if the rest is given up.
+    Finished pictures are kept if the run is aborted.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class PictureSink:
     Attributes
     ----------
     workers : int
-        Pictures that may be written at the same time.
+        Number of pictures that may be written at the same time.
     n_bytes : int
-        Size of what is written so far.
+        Total size of the files written so far.
     """
 
     n_samples = 0
@@ -47,11 +47,11 @@ class PictureSink:
 
     @property
     def n_bytes(self) -> int:
-        """Size of the files that are there."""
+        """Total size of the files written so far."""
         return sum(path.stat().st_size for path in self.paths if path.is_file())
 
     def look(self, pixels: Bytes) -> None:
-        """Do nothing: no picture depends on others."""
+        """Do nothing: pictures are independent of each other."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Write one picture; see ``viewer.rendering.recorder.Sink``.
@@ -64,10 +64,10 @@ class PictureSink:
         save_image(self.paths[frame], pixels)
 
     def close(self) -> None:
-        """Do nothing: every picture is there."""
+        """Do nothing: every picture is complete."""
 
     def abort(self) -> None:
-        """Do nothing: no picture is ever half there."""
+        """Do nothing: no picture is ever incomplete."""
 
 
 class SheetSink:
@@ -78,25 +78,25 @@ class SheetSink:
     path : Path
         Its suffix chooses the format.
     size : (int, int)
-        The most that the picture may be wide and high, in pixels.
+        Largest width and height of the picture, in pixels.
     numbers : sequence of int
-        One for each frame, written into its cell.
+        Number of each frame, drawn into its cell.
 
     Attributes
     ----------
     columns, rows : int
-        How many cells there are across and down.
+        Number of cells across and down.
     cell : (int, int)
-        Width and height of one: the size of the frames.
+        Width and height of a cell: the size of the frames.
     size : (int, int)
-        Width and height of the whole.
+        Width and height of the whole picture.
     n_bytes : int
         Size of the written file.
 
     Raises
     ------
     ViewerError
-        If so many cells would be too small.
+        If there are so many frames that the cells would be too small.
     """
 
     n_samples = 0
@@ -114,12 +114,12 @@ class SheetSink:
         self._sheet: Bytes | None = None
 
     def look(self, pixels: Bytes) -> None:
-        """Do nothing: no cell depends on others."""
+        """Do nothing: cells are independent of each other."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Put a frame into its cell; see ``viewer.rendering.recorder.Sink``."""
         if self._sheet is None:
-            # Cells that stay empty look like the background.
+            # Unused cells have the colour of the background.
             self._sheet = np.empty((self.size[1], self.size[0], 4), dtype=np.uint8)
             self._sheet[:] = pixels[0, 0]
         row, column = divmod(frame, self.columns)
@@ -140,14 +140,14 @@ class SheetSink:
         self.n_bytes = save_image(self.path, self._sheet)
 
     def abort(self) -> None:
-        """Forget the frames; nothing is written before ``close``."""
+        """Discard the frames; nothing is written before ``close``."""
         self._sheet = None
 
 
 def sheet_layout(size: tuple[int, int], count: int) -> tuple[int, int]:
-    """Return how many columns and rows hold some frames best.
+    """Return the best number of columns and rows for a number of frames.
 
-    Cells near 4 : 3 are good, empty ones bad.
+    Cells with an aspect ratio near 4 : 3 are preferred, and few empty ones.
 
     >>> sheet_layout((1280, 720), 12), sheet_layout((1280, 720), 1)
     ((4, 3), (1, 1))

@@ -1,4 +1,4 @@
-"""Write PNG files (W3C PNG, third edition) about three times faster than Pillow.
+"""PNG encoder (W3C PNG, third edition), about three times faster than Pillow.
 
 Pillow tries five filters on every row of a picture. Here each row is filtered by "Sub", which
 suits rendered surfaces and gradients, in numpy, and compressed at zlib's level 1.
@@ -35,7 +35,7 @@ def encode_png(pixels: Bytes) -> bytes:
     rows[:, 0] = _SUB
     filtered = rows[:, 1:].reshape(height, width, channels)
     filtered[:, 0] = pixels[:, 0, :channels]
-    # Bytes wrap around, as the filter wants.
+    # The filter is defined modulo 256, so bytes may wrap around.
     np.subtract(
         pixels[:, 1:, :channels], pixels[:, :-1, :channels], out=filtered[:, 1:], casting="unsafe"
     )

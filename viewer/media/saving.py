@@ -1,4 +1,4 @@
-"""Write files so that nobody ever sees half of one: a temporary file first, then a rename."""
+"""Atomic writing of files: a temporary file first, then a rename."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ __all__ = [
 
 
 def as_words(name: str) -> list[bytes] | None:
-    """Return the words that are read back as ``name``, or None if no words are.
+    """Return the words that are read back as ``name``, or None if there are none.
 
     >>> as_words("left leg"), as_words(" leg")
     ([b'left', b'leg'], None)
     """
     try:
         text = name.encode("utf-8", "surrogateescape")
-    except UnicodeEncodeError:  # a lone surrogate, which no bytes are decoded to
+    except UnicodeEncodeError:  # a lone surrogate, which decoding never yields
         return None
     words = text.split()
     comes_back = b" ".join(words).decode("utf-8", "surrogateescape") == name
@@ -51,20 +51,20 @@ def as_words(name: str) -> list[bytes] | None:
 
 
 def free_path(folder: Path, stem: str, suffix: str, data: bytes | None = None) -> Path:
-    """Return a path that no file has: ``fox.png``, then ``fox-2.png``, and so on.
+    """Return an unused path: ``fox.png``, then ``fox-2.png``, and so on.
 
     Parameters
     ----------
     folder : Path
-        Where to look.
+        Folder of the file.
     stem, suffix : str
-        Of the name; what could confuse a shell becomes an underscore.
+        Stem and suffix of the name; characters special to shells become underscores.
     data : bytes, optional
-        A file that holds just these is as good as none.
+        Content to write; a file that already has exactly this content counts as unused.
     """
     safe = file_stem(stem)
     path, number = folder / f"{safe}{suffix}", 1
-    # A link to nothing counts: writing to it would make a file elsewhere.
+    # A dangling link counts as used: writing to it would create a file elsewhere.
     while os.path.lexists(path) and not _holds(path, data):
         number += 1
         path = folder / f"{safe}-{number}{suffix}"
@@ -78,12 +78,12 @@ def _holds(path: Path, data: bytes | None) -> bool:
     return False
 
 
-_written: ContextVar[dict[Path, bytes] | None] = ContextVar("what is written", default=None)
+_written: ContextVar[dict[Path, bytes] | None] = ContextVar("written files", default=None)
 
 
 @contextlib.contextmanager
 def keeping_written() -> Iterator[dict[Path, bytes]]:
-    """Keep the bytes of each file that the block writes, to be read back: a pipe keeps nothing."""
+    """Keep the bytes of each file written in the block, since a pipe cannot be read back."""
     written: dict[Path, bytes] = {}
     token = _written.set(written)
     try:
@@ -93,42 +93,42 @@ def keeping_written() -> Iterator[dict[Path, bytes]]:
 
 
 def save_text(path: str | Path, text: str) -> None:
-    """Write text as UTF-8 with LF line ends; see ``save_bytes``."""
+    """Write text as UTF-8 with LF line endings; see ``save_bytes``."""
     save_bytes(path, text.encode("utf-8", "surrogateescape"))
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write named arrays as an ``.npz`` that needs no pickle to be read; see ``save_bytes``."""
+    """Write named arrays as an ``.npz`` without pickled objects; see ``save_bytes``."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
             member = io.BytesIO()
             np.lib.format.write_array(member, array, allow_pickle=False)
-            # Without a date of today: the same arrays give the same bytes.
+            # A fixed date, so that the same arrays give the same bytes.
             entry = zipfile.ZipInfo(f"{name}.npy")
             archive.writestr(entry, member.getvalue(), zipfile.ZIP_DEFLATED)
     save_bytes(path, buffer.getvalue())
 
 
 def save_bytes(path: str | Path, data: bytes) -> None:
-    """Replace a file's content in one step, or leave everything as it was.
+    """Replace a file's content atomically, or leave it unchanged.
 
-    A link is followed. A device or pipe is written to directly, never replaced, and so is the
-    output stream, whatever it leads to. The new file keeps the old one's permissions.
+    A link is followed. A device or pipe is written to directly, never replaced, and so is
+    standard output, even if redirected to a file. The new file keeps the old permissions.
 
     Parameters
     ----------
     path : str or Path
         The file to create or replace.
     data : bytes
-        Its new content.
+        New content.
 
     Raises
     ------
     OutputError
-        With the path and the system's reason.
+        If it cannot be written; the message gives the path and the system's reason.
     """
-    hold()  # a signal that comes after the rename must not make a failure of it
+    hold()  # a signal that arrives after the rename must not turn success into failure
     poll()
     path = Path(path)
     kept = _written.get()
@@ -151,7 +151,7 @@ def save_bytes(path: str | Path, data: bytes) -> None:
 
 
 class Replacement:
-    """A file that a library writes by its name: next to the target first, then in its place.
+    """A file that a library writes by name: a temporary file next to the target, then renamed.
 
     Parameters
     ----------
@@ -172,19 +172,19 @@ class Replacement:
             if stat.S_ISDIR(mode):
                 raise IsADirectoryError(None, "is a folder")
             if not stat.S_ISREG(mode) or is_stdout(self.path):
-                raise ValueError("is not a regular file, which a video must be written to")
+                raise ValueError("is not a regular file, and a video must be written to one")
             self._target, self._permissions = self.path.resolve(), stat.S_IMODE(mode)
             _require_folder(self._target)
         except (OSError, ValueError, RuntimeError) as problem:
             raise self.error(problem) from None
 
     def error(self, problem: Exception) -> OutputError:
-        """Return what went wrong as the one line to show, with the path."""
+        """Return an error of one line, with the path."""
         reason = getattr(problem, "strerror", None) or problem
         return OutputError(f"{printable(self.path, 300)}: {printable(reason)}")
 
     def begin(self) -> Path:
-        """Create the temporary file, of the target's suffix, and return its name."""
+        """Create the temporary file, with the target's suffix, and return its path."""
         target = self._target
         try:
             handle, name = tempfile.mkstemp(
@@ -198,9 +198,9 @@ class Replacement:
         return self.temporary
 
     def commit(self) -> int:
-        """Put the temporary file in the target's place; return its number of bytes."""
+        """Replace the target with the temporary file; return its size in bytes."""
         assert self.temporary is not None  # begin() made it
-        poll(in_any_thread=True)  # as in _replace; this is the encoder's thread
+        poll(in_any_thread=True)  # as in _replace, but this is the encoder's thread
         try:
             with self.temporary.open("rb+") as stream:
                 os.fsync(stream.fileno())
@@ -221,29 +221,27 @@ class Replacement:
             self.temporary = None
 
 
-_Copies = dict[Path, Path | None]  # of resolved files; None where there was none
-_outer: ContextVar[_Copies | None] = ContextVar(
-    "what the innermost all_or_none keeps", default=None
-)
+_Copies = dict[Path, Path | None]  # by resolved path; None where no file existed
+_outer: ContextVar[_Copies | None] = ContextVar("copies of the innermost all_or_none", default=None)
 
 
 @contextlib.contextmanager
 def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
-    """Put several files that belong together back as they were if writing one of them fails.
+    """Restore all of several files that belong together if writing one of them fails.
 
-    A block within another that succeeds hands what it kept to the outer one, which may still fail.
+    An inner block that succeeds passes its copies to the outer one, which may still fail.
 
     Parameters
     ----------
     paths : iterable of Path
-        Those that the block creates or replaces.
+        Files that the block creates or replaces.
 
     Raises
     ------
     OutputError
-        If there is no room to keep what they hold.
+        If their old content cannot be copied.
     """
-    hold()  # also for the copies, none of which may stay behind
+    hold()  # also protects the copies, none of which may be left behind
     poll()
     copies: _Copies = {}
     outer = _outer.get()
@@ -271,7 +269,7 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
 
 
 def _keep_copy(path: Path, copies: _Copies) -> None:
-    """Copy what a path leads to; None stands for no file. Devices and the like are left alone."""
+    """Copy the file at a path; None stands for a missing file. Devices are left alone."""
     if is_stdout(path):
         return
     try:
@@ -298,7 +296,7 @@ def _copy(target: Path) -> Path:
 
 
 def _mode(target: Path) -> int:
-    """Return type and permissions of the target, or those that a new file would get."""
+    """Return the target's type and permissions, or those that a new file would get."""
     try:
         return target.stat().st_mode
     except FileNotFoundError:
@@ -308,8 +306,8 @@ def _mode(target: Path) -> int:
 
 
 def _write_through(target: Path, data: bytes) -> None:
-    # Closing may fail too: /dev/full reports its error only there.
-    # A pipe whose other end nobody opens or reads waits for ever.
+    # Closing may fail too: /dev/full reports its error only then. A pipe without a reader
+    # blocks forever, so signals must raise.
     with raising(), target.open("wb") as stream:
         stream.write(data)
 
@@ -324,9 +322,9 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
-        poll()  # the last moment at which a signal is not too late
+        poll()  # last moment at which a signal can still stop the write
         Path(name).replace(target)
-    except BaseException:  # also Ctrl-C: the temporary file must not stay behind
+    except BaseException:  # including Ctrl-C: the temporary file must not be left behind
         with contextlib.suppress(OSError):
             Path(name).unlink()
         raise

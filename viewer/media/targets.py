@@ -13,31 +13,30 @@ from viewer.streams import is_stdout, require_stdout
 __all__ = ["check_folder_target", "check_targets"]
 
 _FORCE = "--force replaces it"
-_Identity = tuple[int, int] | Path  # device and inode of what exists, else where it would be
+_Identity = tuple[int, int] | Path  # device and inode of an existing file, else its path
 
 
 def check_targets(
     files: Sequence[Path], inputs: Iterable[Path], force: bool, hint: str = _FORCE
 ) -> None:
-    """Refuse a run if one of its files may not be written; nothing has been written then.
+    """Refuse a run if one of its output files may not be written, before anything is written.
 
     Parameters
     ----------
     files : sequence of Path
-        All that the run writes under names that were asked for, companions too.
+        All files that the run writes under requested names, including companion files.
     inputs : iterable of Path
-        All that the run reads; a folder stands for the files in it.
+        All files that the run reads; a folder stands for the files in it.
     force : bool
-        Whether files that exist may be replaced; inputs never are.
+        Whether existing files may be replaced; inputs never are.
     hint : str
-        What to do about a file that exists.
+        Advice for a file that exists.
 
     Raises
     ------
     OutputError
-        With the first file that is a folder, an input, there already or written twice, whose
-        folder is missing or locked, or that is a closed output stream. Links count as what they
-        lead to.
+        For the first file that is a folder or an input, exists already, is written twice, lies in
+        a folder that is missing or read-only, or is a closed standard output. Links are resolved.
     """
     opened = _Inputs(inputs)
     written: dict[_Identity, Path] = {}
@@ -54,19 +53,19 @@ def check_targets(
 
 
 def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> None:
-    """Refuse to write a folder that is there already, or that something was read from.
+    """Refuse to write a folder that exists already or that input was read from.
 
     Parameters
     ----------
     folder : Path
-        Replaced as a whole; folders above it that do not exist are made.
+        Folder that is replaced as a whole; missing parent folders are created.
     inputs, force
         As for ``check_targets``.
 
     Raises
     ------
     OutputError
-        With the folder, or what is in its way.
+        For the folder, or for a file in its place.
     """
     try:
         place = folder.resolve()
@@ -89,7 +88,7 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
 def _checked(
     file: Path, inputs: _Inputs, force: bool, hint: str, folders: set[Path]
 ) -> _Identity | None:
-    """Check one file; return what it is, None for a device or stream, which is never replaced."""
+    """Check one file and return its identity; None for a device or stream, never replaced."""
     if is_stdout(file):
         require_stdout(file)
         return None
@@ -122,7 +121,7 @@ def _check_folder(file: Path, folder: Path, known: set[Path]) -> None:
 
 
 class _Inputs:
-    """Files that were read, by what they are rather than by their names."""
+    """Input files by device and inode instead of by name."""
 
     def __init__(self, paths: Iterable[Path]) -> None:
         self._files: set[tuple[int, int]] = set()
@@ -135,10 +134,10 @@ class _Inputs:
                 else:
                     self._files.add((status.st_dev, status.st_ino))
             except (OSError, ValueError, RuntimeError):
-                continue  # what cannot be looked at has not been read
+                continue  # a file without a status cannot have been read
 
     def hold(self, target: Path, status: os.stat_result) -> bool:
-        """Return whether a resolved file was read, or lies in a folder that was."""
+        """Return whether a resolved file is an input, or lies in an input folder."""
         return (status.st_dev, status.st_ino) in self._files or target.parent in self._folders
 
 

@@ -1,4 +1,4 @@
-"""Temporary files that would stay behind if the process had to end at once."""
+"""Temporary files that would be left behind if the process had to end at once."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from pathlib import Path
 
 __all__ = ["note_unfinished", "remove_unfinished"]
 
-_MOST = 64  # at a time, of all threads: far fewer are written at once
+_MOST = 64  # at a time, in all threads; far fewer are written at once
 
 _unfinished: deque[Path] = deque(maxlen=_MOST)
 
 
 def note_unfinished(path: Path) -> None:
-    """Remember a temporary file; renamed or removed later, it need not be forgotten.
+    """Register a temporary file; it need not be unregistered when it is renamed or removed.
 
     Parameters
     ----------
     path : Path
-        With a part that nothing else is called.
+        Path that contains a unique part.
     """
     _unfinished.append(path)
 
 
 def remove_unfinished() -> None:
-    """Remove those that are still there. Call it only where the process ends."""
+    """Remove registered files that still exist. Call it only when the process ends."""
     for path in [*_unfinished]:
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)

@@ -1,8 +1,8 @@
-"""Write videos through PyAV (FFmpeg's libraries), which is imported when there is one to write.
+"""Writing of videos with PyAV (FFmpeg's libraries), which is imported only when needed.
 
 ``.mp4`` holds H.264, ``.webm`` VP9, ``.gif`` pictures of 256 colours. Colours of the first two are
 those of BT.709 in limited range, converted and tagged as such (ITU-T H.273, table 2 to 4, code
-point 1), so that players show the colours that were drawn.
+point 1), so that players show the rendered colours.
 """
 
 from __future__ import annotations
@@ -32,48 +32,48 @@ __all__ = ["VideoSink"]
 
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
 _QUALITY = 75.0
-_GIF_SAMPLES = 12  # frames whose colours are looked at
+_GIF_SAMPLES = 12  # frames whose colours the palette is chosen from
 
 
 class VideoSink:
     """Writes frames as a video; a sink of ``viewer.rendering.recorder``.
 
-    The file is written next to its place and put there when it is whole.
+    The video is written to a temporary file next to the target, which it replaces when complete.
 
     Parameters
     ----------
     path : Path
-        Its suffix chooses the kind.
+        Target; its suffix chooses the kind.
     size : (int, int)
-        Width and height of the frames. Where they must be even and are not, the last column or
-        row is repeated.
+        Width and height of the frames. If they must be even and are not, the last column or row is
+        repeated.
     rate : float
         Frames a second. A GIF counts time in 1/100 s, so its delays are rounded in turn and their
         mean is right.
     quality : float
         0 to 100; GIFs have one quality.
     transparent : bool
-        Whether frames have transparent pixels. Where the format knows none, they are put on black.
+        Whether frames have transparent pixels. If the format has no alpha, they are drawn on black.
 
     Attributes
     ----------
     workers : int
         1: frames are needed in order.
     n_samples : int
-        How many frames ``look`` should see first.
+        Number of frames that should be given to ``look`` first.
     notes : list of str
-        What is not as asked for, one line each.
+        Deviations from the request, one line each.
     n_bytes : int
-        Size of the file, once it is there.
+        Size of the file, once it is complete.
     encoder : str
-        FFmpeg's name for it.
+        FFmpeg's name of the encoder.
 
     Raises
     ------
     ViewerError
-        If PyAV is not installed or lacks the encoder, or the numbers make no sense.
+        If PyAV is not installed or lacks the encoder, or a number is out of range.
     OutputError
-        If no file can be written there.
+        If the target cannot be written.
     """
 
     def __init__(
@@ -107,51 +107,50 @@ class VideoSink:
     def _note(self, transparent: bool) -> None:
         name, rate = printable(self.path), float(self.rate)
         if transparent and not self._has_alpha:
-            self.notes.append(f"{name}: this format knows no transparency; drawn on black")
+            self.notes.append(f"{name}: this format has no transparency; drawn on black")
         if self._coded != self.size:
             (width, height), (wide, high) = self.size, self._coded
             self.notes.append(
-                f"{name}: this format needs even sizes; the last column or row is repeated: "
+                f"{name}: this format needs even dimensions; the last column or row is repeated: "
                 f"{width} x {height} becomes {wide} x {high}"
             )
         if self.encoder == "gif" and 100 % rate:
             low = int(100 / rate)
             self.notes.append(
-                f"{name}: GIFs count time in 1/100 s; frames stay for {low} or {low + 1} of them, "
+                f"{name}: GIFs count time in 1/100 s; frames last {low} or {low + 1} of them, "
                 f"{rate:g} frames a second on average"
             )
 
     def look(self, pixels: Bytes) -> None:
-        """Take the colours of some frame into account; before any is written, and only for GIFs."""
+        """Add a frame's colours to the palette; only for GIFs, before any frame is written."""
         if self._chooser is None:
             self._chooser = PaletteChooser(self._av, self._coded)
         self._chooser.look(self._picture(pixels))
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Encode one frame; they come in order.
+        """Encode one frame; frames must be given in order.
 
         Raises
         ------
         OutputError
-            If the encoder refuses it or the file cannot be written, and for every frame after
-            that.
+            If the encoder refuses it or the file cannot be written, and for every later frame.
         """
         with self._errors():
             if self._container is None:
                 if self.encoder == "gif" and self._chooser is None:
-                    self.look(pixels)  # better than none
+                    self.look(pixels)  # a palette of one frame is better than none
                 self._open()
             picture = self._picture(pixels)
             picture.pts, picture.time_base = frame, 1 / self.rate
             self._encode(self._converted(picture))
 
     def close(self) -> None:
-        """Finish the video and put it in its place.
+        """Finish the video and replace the target.
 
         Raises
         ------
         OutputError
-            If it cannot be finished; then what was there before stays.
+            If it cannot be finished; an existing file is then unchanged.
         """
         assert self._container is not None and self._output is not None  # there is a frame
         with self._errors():
@@ -168,7 +167,7 @@ class VideoSink:
         if self._output is not None:
             self._output.drop()
         if self._container is not None:
-            # It is thrown away anyway, most often because the disk is full.
+            # The file is discarded anyway, usually because the disk is full.
             with contextlib.suppress(OSError, ValueError, self._av.FFmpegError):
                 self._container.close()
             self._container = None
@@ -176,7 +175,7 @@ class VideoSink:
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:
-        """Turn the first error into one line, and repeat it: the encoder is not asked again."""
+        """Turn the first error into one line, and repeat it: the encoder is not called again."""
         if self._problem is not None:
             raise self._problem
         try:
@@ -184,7 +183,7 @@ class VideoSink:
             if self._output is not None and self._output.problem is not None:
                 raise self._output.problem
         except (OSError, ValueError, self._av.FFmpegError) as problem:
-            # What the library says is often but a consequence of what the file said before.
+            # The library's error is often only a consequence of an earlier error of the file.
             first = self._output.problem if self._output is not None else None
             self._problem = self._file.error(first or problem)
             raise self._problem from None
@@ -208,7 +207,7 @@ class VideoSink:
         stream.width, stream.height = self._coded
         stream.pix_fmt = "pal8" if self.encoder == "gif" else self._pixel_format
         context = stream.codec_context
-        context.thread_count = 0  # as many as there are processors
+        context.thread_count = 0  # one per processor
         if self._chooser is not None:
             context.time_base = Fraction(1, 100)
             palette = self._chooser.palette()
@@ -298,7 +297,7 @@ def _even(size: tuple[int, int]) -> tuple[int, int]:
 
 
 def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
-    """Return an encoder's own words for a quality from 0 to 100."""
+    """Return an encoder's options for a quality from 0 to 100."""
     if encoder == "libx264":
         return {"preset": "veryfast", "crf": f"{51.0 - 0.43 * quality:.1f}"}  # 75: 18.8
     if encoder == "libvpx-vp9":
@@ -308,5 +307,5 @@ def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
 
 
 def _bit_rate(size: tuple[int, int], rate: float, quality: float) -> int:
-    """Return bits a second for encoders that know no quality: 0.02 to 0.6 bits a pixel."""
+    """Return bits a second for encoders without a quality setting: 0.02 to 0.6 bits a pixel."""
     return int(size[0] * size[1] * rate * 0.02 * 30.0 ** (quality / 100.0))

@@ -1,8 +1,8 @@
-"""The file that a video is encoded into: keeps its first error, so that FFmpeg never meets one.
+"""Output file of a video encoder, which stores write errors and hides them from FFmpeg.
 
-libavformat does not survive a failed write everywhere: where the header could not be written, the
-next packet makes PyAV write it again, and ``avformat_init_output`` reads what is freed already.
-So writes always succeed for the library. Whoever owns the file asks for the error after each step.
+libavformat does not survive every failed write: if the header could not be written, the next packet
+makes PyAV write it again, and ``avformat_init_output`` reads freed memory. So writes always succeed
+for the library, and the owner of the file checks for an error after each step.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ class VideoFile:
     Parameters
     ----------
     path : Path
-        A file that exists.
+        Existing file.
 
     Attributes
     ----------
     name : str
-        Its path, as PyAV asks for it.
+        Path of the file, an attribute that PyAV requires.
     problem : OSError or None
-        What went wrong first.
+        First error.
     closed : bool
         Whether it is closed; PyAV then writes no trailer.
 
@@ -47,7 +47,7 @@ class VideoFile:
     problem: OSError | None
 
     def write(self, data: bytes) -> int:
-        """Write all bytes, or drop them after an error; the library is told that all is well."""
+        """Write all bytes, or drop them after an error; success is reported either way."""
         if self.problem is None and not self.closed:
             try:
                 self._write_all(data)
@@ -61,21 +61,21 @@ class VideoFile:
         self._file.seek(self._place)
         rest = memoryview(data)
         while rest:
-            # A disk that is nearly full takes a part; only the next call fails.
+            # A nearly full disk accepts a part of the bytes, and only the next call fails.
             rest = rest[self._file.write(rest) or 0 :]
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go to a place, as ``io.IOBase.seek``; the file itself follows with the next write."""
+        """Change the position, as ``io.IOBase.seek``; takes effect at the next write."""
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
         self._place = base + offset
         return self._place
 
     def tell(self) -> int:
-        """Return the place of the next write."""
+        """Return the position of the next write."""
         return self._place
 
     def reopen(self, url: str, flags: int, options: dict[str, str]) -> BinaryIO:
-        """Open the same file for reading: MP4's index is moved to the front when all is written."""
+        """Open the same file for reading, as FFmpeg does to move MP4's index to the front."""
         return self._path.open("rb")
 
     def finish(self) -> None:
@@ -95,7 +95,7 @@ class VideoFile:
             raise self.problem
 
     def drop(self) -> None:
-        """Close the file of a video that nobody wants."""
+        """Close the file of a discarded video."""
         self.closed = True
         with contextlib.suppress(OSError):
             self._file.close()

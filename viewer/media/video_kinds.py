@@ -1,4 +1,4 @@
-"""What can be said of videos before anything that writes them is imported."""
+"""Table of the kinds of video, available without importing an encoder."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ MOST_GIF_RATE = 50.0
 
 @dataclass(frozen=True, slots=True)
 class VideoKind:
-    """What can be said of a kind of video before anything is imported.
+    """Properties of a kind of video.
 
     Attributes
     ----------
     title : str
-        For menus.
+        Name in menus.
     encoders : tuple of str
-        FFmpeg's names, the best first.
+        FFmpeg's names of its encoders, the best first.
     has_alpha : bool
-        Whether it can be transparent.
+        Whether it supports transparency.
     needs_even : bool
-        Whether width and height must be even: colours have half the resolution.
+        Whether width and height must be even, because colours have half the resolution.
     """
 
     title: str
@@ -51,15 +51,15 @@ VIDEOS = {
 
 
 def video_kind(path: Path) -> VideoKind:
-    """Return the kind of video that a file of this name is.
+    """Return the kind of video that a file's suffix names.
 
     Raises
     ------
     UnsupportedFormatError
-        If it is none; the message lists those there are.
+        If there is no such kind; the message lists all kinds.
     """
     suffix = path.suffix.lower()
     if suffix not in VIDEOS:
         known = ", ".join(VIDEOS)
-        raise UnsupportedFormatError(f'videos cannot be written as "{suffix}"; there are: {known}')
+        raise UnsupportedFormatError(f'videos cannot be written as "{suffix}"; supported: {known}')
     return VIDEOS[suffix]

@@ -1,4 +1,4 @@
-"""What a BVH file does not say: the unit of its lengths, its up axis, its exact frame rate."""
+"""Estimates of facts missing from a BVH file: unit, up axis and exact frame rate."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
-_LONG = 2.0  # times as far along z as along y: z is up
-_UPRIGHT = 0.8  # cosine: a body that stands along an axis
-_LOOKS = 16  # frames that are looked at
+_LONG = 2.0  # ratio of the extents along z and y above which z is up
+_UPRIGHT = 0.8  # smallest cosine of the angle to an axis that a body stands along
+_LOOKS = 16  # frames that are examined
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
 _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
 
 
 def frame_rate(source: Source, frame_time: bytes | None) -> float:
-    """Return frames a second: the usual rate that rounds to the seconds as written.
+    """Return frames a second: the standard rate that rounds to the frame time as written.
 
     ``0.0333333`` is 30 a second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
     """
@@ -49,29 +49,29 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     exact = 1.0 / seconds
     if len(digits) < 2:
         return float(round(exact)) if abs(exact - round(exact)) < 1e-9 * exact else exact
-    # Half a unit of the last digit written, as a share of the whole.
+    # Half a unit of the last digit written, relative to the frame time.
     rounding = 0.5 / float(digits)
     nearest = min((*_RATES, float(max(round(exact), 1))), key=lambda rate: abs(rate - exact))
     return nearest if abs(nearest * seconds - 1.0) <= rounding * (1.0 + 1e-9) else exact
 
 
 def guess_unit(points: Floats) -> tuple[str, Facts, str]:
-    """Return the figure's unit, and what was found out.
+    """Return the figure's unit, facts and a note about it.
 
     Parameters
     ----------
     points : (P, 3)
-        The rest pose.
+        Positions of joints and End Sites in the rest pose.
 
     Returns
     -------
     unit : str
-        As in ``Figure.unit``: metres, centimetres or millimetres, whichever makes a size between
-        that of a child and that of a giant; empty if none does.
+        As in ``Figure.unit``: the one of metres, centimetres and millimetres that gives a size
+        between that of a child and that of a giant; empty if none does.
     facts : tuple of (str, str)
         As in ``Figure.facts``: ``("unit", "cm, taken from …")``.
     note : str
-        As in ``SkeletonMotion.unit_note``; empty if the lengths are those of metres.
+        As in ``SkeletonMotion.unit_note``; empty if the unit is metres.
     """
     size = float(np.ptp(points, axis=0).max())
     metres = size * METRES["in"]
@@ -89,14 +89,14 @@ def guess_unit(points: Floats) -> tuple[str, Facts, str]:
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
 ) -> tuple[Literal["y", "z"], Facts, tuple[str, ...]]:
-    """Return the up axis of the rest skeleton: where the head is from the feet, else its long side.
+    """Return the up axis of the rest skeleton: from feet to head, else along its longest side.
 
     Parameters
     ----------
     figure, clip : Figure, SampledClip
-        As read.
+        Figure and clip as read.
     points : (P, 3)
-        The rest pose.
+        Positions of joints and End Sites in the rest pose.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def guess_up(
     facts : tuple of (str, str)
         As in ``Figure.facts``.
     notes : tuple of str
-        As in ``SkeletonMotion.up_notes``; empty if that is y, in the rest pose and in the frames.
+        As in ``SkeletonMotion.up_notes``; empty if y is up in the rest pose and in the frames.
     """
     skeleton = figure.skeleton
     assert skeleton is not None  # the reader made it
@@ -138,7 +138,7 @@ def guess_up(
 
 
 def _axis(direction: Floats) -> str:
-    """Return the axis that a direction mostly lies along, ``"+y"``; nothing if none."""
+    """Return the axis that a direction mostly lies along, ``"+y"``; empty if there is none."""
     axis = int(np.abs(direction).argmax())
     if not abs(direction[axis]) > _UPRIGHT * np.linalg.norm(direction):
         return ""

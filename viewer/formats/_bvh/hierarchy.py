@@ -1,4 +1,4 @@
-"""The HIERARCHY of a BVH file: joints, End Sites and their channels, as the file lists them."""
+"""Parser for the HIERARCHY of a BVH file: joints, End Sites and channels in file order."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._tolerant import number_key
+from viewer.formats._words import number_key
 
 __all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "called", "read_hierarchy"]
 
@@ -20,7 +20,7 @@ CHANNELS = {
         (kind, axis) for kind in ("POSITION", "ROTATION") for axis in "XYZ"
     )
 }
-"""Codes of channel names in capitals: 0 to 2 are positions, 3 to 5 rotations."""
+"""Codes of upper-case channel names: 0 to 2 are positions, 3 to 5 rotations."""
 
 _ITEMS = (b"OFFSET", b"CHANNELS", b"JOINT", b"END", b"ENDSITE")
 
@@ -41,14 +41,14 @@ class BvhJoint:
 
 @dataclass(slots=True)
 class Hierarchy:
-    """All joints in the order of the file, and where its motion begins.
+    """All joints in the order of the file, and the place of its motion.
 
     Attributes
     ----------
     joints : list of BvhJoint
-        End Sites among them; parents come first.
+        Joints and End Sites; parents come first.
     motion : int
-        Offset behind the word MOTION, -1 without one.
+        Offset after the word MOTION, -1 without one.
     """
 
     joints: list[BvhJoint] = field(default_factory=list)
@@ -67,20 +67,20 @@ def read_hierarchy(source: Source) -> Hierarchy:
 
 
 class _Parser:
-    """Walks the words without recursion: real rigs nest, and broken ones nest deeply."""
+    """Parser without recursion, because invalid files may be nested arbitrarily deeply."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.words = source.words()
         self.word: Word | None = None
-        self.keyword = b""  # the word in capitals
+        self.keyword = b""  # the current word in upper case
         self.found: list[BvhJoint] = []
         self.open: list[int] = []
-        self.n_joints = 0  # of those found; the others are End Sites
+        self.n_joints = 0  # number of joints in found; the others are End Sites
         self.extra_braces = 0
 
     def hierarchy(self) -> Hierarchy:
-        """Return the joints and the place of the motion."""
+        """Return the joints and the offset of the motion."""
         self._advance()
         if self.keyword != b"HIERARCHY":
             raise self._fault("F002.bvh-start", looks=self.source.looks_like())
@@ -120,7 +120,7 @@ class _Parser:
             raise self._fault("F002.bvh-item", joint=called(joint))
 
     def _open_joint(self, is_end: bool = False) -> None:
-        assert self.word is not None  # the caller looked at it
+        assert self.word is not None  # the caller checked it
         start, keyword = self.word.start(), self.keyword
         self._advance()
         if keyword == b"END" and self.keyword == b"SITE":
@@ -144,8 +144,8 @@ class _Parser:
         self._advance()
 
     def _begins_item(self) -> bool:
-        """Return whether a name is over because its "{" is missing: a keyword with its number."""
-        assert self.word is not None  # the caller looked at it
+        """Return whether a name ends here because its "{" is missing: a keyword with its number."""
+        assert self.word is not None  # the caller checked it
         if self.keyword not in _ITEMS[:2]:
             return False
         following = self.source.next_word(self.word.end())
@@ -159,7 +159,7 @@ class _Parser:
         self._advance()
 
     def _offset(self, joint: BvhJoint) -> None:
-        assert self.word is not None  # the caller looked at it
+        assert self.word is not None  # the caller checked it
         keyword = self.word
         if joint.offset is not None:
             raise self._fault("F002.bvh-offset-again", joint=called(joint))
@@ -177,7 +177,7 @@ class _Parser:
         joint.offset = values
 
     def _refuse_offset(self, joint: BvhJoint, keyword: Word, found: int) -> None:
-        """Refuse an OFFSET for the word after its numbers, and go on behind it."""
+        """Record a fault of an OFFSET with a wrong number of values, and skip it."""
         refuse, word = self.source.refuse, self._found()
         places = None if joint.is_end else [self.n_joints - 1]
         item = Phrase("of", item="OFFSET", owner=called(joint))
@@ -194,7 +194,7 @@ class _Parser:
             self._advance()
 
     def _channels(self, joint: BvhJoint) -> None:
-        assert self.word is not None  # the caller looked at it
+        assert self.word is not None  # the caller checked it
         keyword = self.word
         if joint.channels is not None:
             raise self._fault("F002.bvh-channels-again", joint=called(joint))
@@ -240,6 +240,6 @@ class _Parser:
 
 
 def called(joint: BvhJoint) -> Phrase:
-    """Return what messages call a joint or End Site."""
+    """Return the phrase that names a joint or End Site in messages."""
     name = Phrase("joint", name=joint.name) if joint.name else Phrase("unnamed-joint")
     return Phrase("end-site", joint=name) if joint.is_end else name

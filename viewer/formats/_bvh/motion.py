@@ -1,4 +1,4 @@
-"""The MOTION of a BVH file: frame time and one row of numbers per frame."""
+"""Parser for the MOTION of a BVH file: frame time and one row of numbers per frame."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._neutral import held_rows
 from viewer.formats._numbers import parse_numbers, to_number
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, held_rows, number_key, read_words, refuse_words
+from viewer.formats._words import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["Motion", "read_motion"]
@@ -33,7 +34,7 @@ class Motion:
     values : (N, C)
         One column per channel: lengths and degrees.
     frame_time : bytes or None
-        Seconds between frames as written; None if the file does not say.
+        Seconds between frames as written; None if missing.
     """
 
     values: Floats
@@ -46,21 +47,21 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     Parameters
     ----------
     source : Source
-        The file; warnings say where fewer or more frames follow than are declared.
+        The file; warned if the number of frames differs from the declared one.
     start : int
-        Offset behind the word MOTION; -1 for a file without one.
+        Offset after the word MOTION; -1 for a file without one.
     n_channels : int
         Numbers per frame, C.
 
     Returns
     -------
     Motion
-        With at least one frame: zeros, so the rest pose, if the file has none.
+        Motion with at least one frame: zeros, hence the rest pose, if the file has none.
 
     Raises
     ------
     FormatError
-        With the line of a word that should be a number, or of a row that is too short or long.
+        For a word that is not a number, or a row that is too short or long; gives its line.
     """
     if start < 0:
         source.warn("F007.bvh-no-motion", source.end)
@@ -101,7 +102,7 @@ def _seconds(source: Source, match: re.Match[bytes]) -> bytes:
 
 
 def _rows(source: Source, start: int, width: int, declared: int | None) -> Floats:
-    """Return all whole frames: (N, C)."""
+    """Return all complete frames: (N, C)."""
     data = source.data
     source.remember("frames", lambda row: source.number_offset(start, len(data), row * width))
     values, bad = parse_numbers(data, start, len(data))
@@ -109,14 +110,14 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
     is_whole = bad < 0 and rest == 0 and whole > 0
     if is_whole and (declared is None or whole == declared):
         return values.reshape(whole, width)
-    repaired = _repaired(source, start, width, declared)
+    repaired = _held_frames(source, start, width, declared)
     if repaired is not None:
         return repaired
     if bad >= 0:
         _refuse_word(source, start, bad, width, declared)
     if rest or (declared is not None and whole != declared):
         _check_lines(source, start, width, declared)
-        _say_difference(source, width, declared, whole, rest)
+        _warn_of_difference(source, width, declared, whole, rest)
     if whole == 0:
         source.warn("F007.bvh-empty", start)
         return _rest(width, None).values
@@ -124,7 +125,7 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
 
 
 def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int | None) -> None:
-    """Refuse a word that is no number; behind the last frame anything may follow."""
+    """Refuse a word that is not a number, unless it follows the last frame."""
     offset = source.word_offset(start, bad)
     match = source.next_word(offset)
     word = b"" if match is None else match.group()
@@ -135,10 +136,10 @@ def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int
     raise source.fault(number_key(word), offset, item=frame, found=word)
 
 
-def _repaired(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
-    """Refuse all faults in the frames, and return those that can be used, each bad one as the last.
+def _held_frames(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
+    """Record all faults in the frames, and return these with the invalid ones replaced.
 
-    None if there is no fault in them, or nobody can tell where each frame begins.
+    None if there is no fault in them, or the starts of the frames are unknown.
     """
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
@@ -170,14 +171,14 @@ def _repaired(source: Source, start: int, width: int, declared: int | None) -> F
     rows = np.full((len(begins), width), np.nan)
     rows[fits] = words.values[begins[fits, None] + np.arange(width)]
     if rest or (declared is not None and len(rows) != declared):
-        _say_difference(source, width, declared, len(rows), rest)
+        _warn_of_difference(source, width, declared, len(rows), rest)
     return held_rows(rows, np.isnan(rows).any(axis=1))
 
 
 def _without_rest(
     words: Words, begins: Places, sizes: Places, width: int
 ) -> tuple[Places, Places, int]:
-    """Return lines without a last one that is cut off, and how many numbers that has."""
+    """Return lines without a truncated last one, and the number of its values."""
     size = int(sizes[-1])
     if size >= width or np.isnan(words.values[begins[-1] :]).any():
         return begins, sizes, 0
@@ -211,7 +212,7 @@ def _check_lines(source: Source, start: int, width: int, declared: int | None) -
     if not odd or len(lines) < 2:
         return
     if len(odd) == len(lines):
-        # No row fits: a frame per line only if the file has as many lines as frames.
+        # No row has the right length: frames are lines only if there are as many of both.
         if len(lines) == declared:
             raise _wrong_row(source, 0, width, lines[0])
         return
@@ -224,7 +225,7 @@ def _wrong_row(source: Source, row: int, width: int, line: tuple[int, int]) -> F
     return source.fault("F002.bvh-row", line[0], frame=row, expected=width, found=line[1])
 
 
-def _say_difference(
+def _warn_of_difference(
     source: Source, width: int, declared: int | None, whole: int, rest: int
 ) -> None:
     expected = None if declared is None else Phrase("bvh-frames", n=declared)

@@ -1,8 +1,8 @@
-"""Body parameters of EasyMocap's records: their layouts by length, gathered person by person.
+"""Body parameters of EasyMocap's records: layouts by length, and rows collected per person.
 
-The first three numbers of ``poses`` are the root's own rotation, 0 in what EasyMocap writes: ``Rh``
-and ``Th`` place the body about the model's origin. Hand components of SMPL-X and MANO leave the
-mean hand out; those of SMPL+H add it.
+The first three numbers of ``poses`` are the root's own rotation, which EasyMocap writes as 0:
+``Rh`` and ``Th`` move the body about the model's origin. Hand components of SMPL-X and MANO exclude
+the mean hand; those of SMPL+H include it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from viewer.formats._easymocap.json_frames import (
     take_row,
     width_of,
 )
-from viewer.formats._easymocap.shapes import COEFFICIENTS, carry, last_given
+from viewer.formats._easymocap.shapes import COEFFICIENTS, hold, last_given
 from viewer.formats._reach import within_text
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.body_motion import BodyMotion
@@ -36,29 +36,29 @@ _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]
 _FACE = _SMPLX.names[22:25]
 _VPOSER = 32
-_SHAPES = 10  # shape numbers that the legacy code puts before those of the expression
+_SHAPES = 10  # shape components before those of the expression in the legacy code
 
 
 @dataclass(frozen=True, slots=True)
 class BodyLayout:
-    """Where the numbers of ``poses`` go.
+    """Assignment of the numbers of ``poses`` to joints.
 
     Attributes
     ----------
     model : str
-        The member of the SMPL family.
+        Member of the SMPL family.
     names : tuple of K str
-        Joints that are turned, the root first.
+        Joints that are rotated, the root first.
     columns : tuple of (int, int)
-        Parts of ``poses`` that turn all but the root, in the order of ``names``.
+        Ranges of ``poses`` for all joints but the root, in the order of ``names``.
     root : int
-        Numbers of the root's own rotation at the beginning: 3 or 0.
+        Number of values of the root's own rotation at the beginning: 3 or 0.
     hands : tuple of (str, int, int)
-        Side, and the part of ``poses`` with components.
+        Side, and the range of ``poses`` with its components.
     is_flat : bool
-        Whether the mean hand is left out unless someone says otherwise.
+        Whether the mean hand is excluded by default.
     widths : tuple of (str, int)
-        Keys of a record that are read, and their numbers.
+        Keys of a record that are read, with their number of values.
     """
 
     model: str
@@ -92,13 +92,13 @@ _LAYOUTS = {
 
 
 def body_layout(record: dict[str, Any]) -> BodyLayout:
-    """Return the layout of a record, as the length of its ``poses`` tells.
+    """Return the layout of a record, determined by the length of its ``poses``.
 
     Raises
     ------
     RecordError
-        If no layout has this length, or the record cannot be used: other records must not be
-        measured by it.
+        If no layout has this length, or the record is invalid, so that it does not determine the
+        layout of others.
     """
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
@@ -126,12 +126,12 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
 
 
 def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
-    """Return a layout with the coefficients that a record is the first to have, at its end.
+    """Return a layout extended by the coefficients that a record has for the first time.
 
     Raises
     ------
     RecordError
-        If they are no finite numbers.
+        If they are not finite numbers.
     """
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
@@ -140,22 +140,22 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
 
 
 RowFault = tuple[int, str, RecordError]
-"""A record that cannot be used: its row, what messages call the part, and what is wrong."""
+"""An invalid record: its row, the name of the invalid part, and the problem."""
 
 Remark = tuple[str, str, str]
-"""What is odd but no fault: the key of its message, the file, and the key of the record."""
+"""A remark, which is not a fault: the key of its message, the file, and the key of the record."""
 
 
 @dataclass(slots=True)
 class Rows:
-    """What one person has in some frames: numbers as they come, and where they come from."""
+    """Values of one person in some frames, in order of arrival, with their origins."""
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
-    places: list[int] = field(default_factory=list)  # in the files' lists of people
+    places: list[int] = field(default_factory=list)  # indices in the files' lists of people
 
     def keep_origin(self, frame: int, path: str, place: int) -> None:
-        """Note where a record comes from that was taken in."""
+        """Record the origin of an accepted record."""
         self.frames.append(frame)
         self.paths.append(path)
         self.places.append(place)
@@ -163,7 +163,7 @@ class Rows:
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
     ) -> Timing:
-        """Return on which frames of the whole recording the kept rows are; absent elsewhere."""
+        """Return the frames of the recording that the kept rows belong to; absent elsewhere."""
         rows = np.full(n_frames, -1, dtype=np.int32)
         frames = np.array(self.frames, dtype=np.int64)
         frames = frames if keep is None else frames[keep]
@@ -178,14 +178,14 @@ class BodyRows(Rows):
     Attributes
     ----------
     layout : BodyLayout
-        Of all records.
+        Layout of all records.
     known : mapping of str to (C,), or None
-        The person's last coefficients before these rows, which ``values`` brings up to date; None
-        for people without a track, whose rows have nothing to do with one another.
+        The person's last coefficients before these rows, which ``values`` updates; None for people
+        without an identity, whose rows are independent of each other.
     buffers : list of array
-        Numbers of the layout's keys, one record behind the other.
+        Values of the layout's keys, record after record.
     remarks : list of Remark
-        Found by ``values``: what is odd but no fault.
+        Remarks that ``values`` adds.
     """
 
     layout: BodyLayout
@@ -199,7 +199,7 @@ class BodyRows(Rows):
         self.widen(self.layout)
 
     def widen(self, layout: BodyLayout) -> None:
-        """Make room for coefficients that no record had so far; see ``with_coefficients``."""
+        """Add coefficients that no record had so far; see ``with_coefficients``."""
         self.layout = layout
         for key, count in layout.widths[len(self.buffers) :]:
             self.buffers.append(array("d", bytes(8 * count * len(self.frames))))
@@ -207,12 +207,12 @@ class BodyRows(Rows):
         self._plan = [(key, count, buffer.fromlist) for (key, count), buffer in self._buffers()]
 
     def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
-        """Take in one record.
+        """Add one record.
 
         Raises
         ------
         RecordError
-            If something is missing, or has another length than before.
+            If a value is missing, or its length differs from before.
         """
         try:
             for key, count, put in self._plan:
@@ -230,7 +230,7 @@ class BodyRows(Rows):
         self.keep_origin(frame, path, place)
 
     def _take_slowly(self, record: dict[str, Any]) -> None:
-        """Take in what may be odd, and say what is wrong with it."""
+        """Add a record that may have faults, with an exact error for the first of them."""
         self._drop_unfinished()
         try:
             for key, count, put in self._plan:
@@ -243,7 +243,7 @@ class BodyRows(Rows):
             raise
 
     def _lack(self, key: str, count: int, put: Callable[[list[Any]], None]) -> None:
-        """Leave room for coefficients that the person's other records have."""
+        """Add placeholders for coefficients that the person's other records have."""
         if key not in COEFFICIENTS:
             raise KeyError(key)
         put([0.0] * count)
@@ -261,16 +261,16 @@ class BodyRows(Rows):
         return zip(self.layout.widths, self.buffers, strict=True)
 
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
-        """Return the numbers by key, which rows can be used, and the faults of the others.
+        """Return the values by key, a mask of valid rows, and the faults of the others.
 
         Returns
         -------
         values : mapping of str to (N, C)
-            Of the rows that can be used.
+            Values of the valid rows.
         keep : (rows,) bool
-            Which ones those are.
+            True for valid rows.
         faults : list of RowFault
-            What is wrong with each of the others.
+            Fault of each invalid row.
         """
         keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
         values: dict[str, Floats] = {}
@@ -278,9 +278,9 @@ class BodyRows(Rows):
         for (key, count), buffer in self._buffers():
             rows = np.frombuffer(buffer, dtype=np.float64).reshape(-1, count)
             if key in COEFFICIENTS:
-                rows = self._carried(key, rows)
+                rows = self._with_missing(key, rows)
             values[key] = rows
-            # NaN passes through the sum; the rows are looked at only if something is wrong.
+            # A single sum finds NaN; rows are examined only if there is one.
             limit = limit_of(key)
             if rows.size and not -limit <= rows.min() <= rows.max() <= limit:
                 is_good = (np.abs(rows) <= limit).all(axis=1)
@@ -293,8 +293,8 @@ class BodyRows(Rows):
             values = {key: rows[keep] for key, rows in values.items()}
         return values, keep, faults
 
-    def _carried(self, key: str, rows: Floats) -> Floats:
-        """Fill coefficients that records leave out, and say whence."""
+    def _with_missing(self, key: str, rows: Floats) -> Floats:
+        """Repeat earlier coefficients where records omit them, and add a remark."""
         lacking = self._lacking[key]
         is_given: Bools = np.ones(len(rows), dtype=np.bool_)
         is_given[lacking] = False
@@ -303,7 +303,7 @@ class BodyRows(Rows):
                 self.remarks.append(("F007.record-no-last", self.paths[lacking[0]], key))
             return rows
         before = self.known.get(key)
-        filled = carry(rows, is_given, before)
+        filled = hold(rows, is_given, before)
         last = last_given(rows, is_given)
         if last is not None:
             self.known[key] = last
@@ -322,7 +322,7 @@ class BodyRows(Rows):
         legacy_expression: bool,
         up: str,
     ) -> BodyMotion:
-        """Return the rows as a motion; see ``BodyMotion`` for what the numbers mean."""
+        """Return the rows as a motion; see ``BodyMotion`` for the meaning of the values."""
         layout, poses = self.layout, values["poses"]
         vectors = np.zeros((len(poses), len(layout.names), 3))
         joint = 1
@@ -362,5 +362,5 @@ class BodyRows(Rows):
 
 
 def _constant(rows: Floats | None) -> Floats | None:
-    """Return one row where all are the same."""
+    """Return a single row if all rows are equal."""
     return rows[:1] if rows is not None and (rows == rows[:1]).all() else rows

@@ -1,4 +1,4 @@
-"""Read calibrated cameras: ``intri.yml`` and ``extri.yml``, files of OpenCV's FileStorage.
+"""Reader of calibrated cameras: ``intri.yml`` and ``extri.yml``, files of OpenCV's FileStorage.
 
 ::
 
@@ -15,7 +15,7 @@
     dist_01: …   H_01: 1080   W_01: 1920         in intri.yml; D_01 is dist_01 as well
     R_01: …      Rot_01: …    T_01: …            in extri.yml: rotation vector, matrix, translation
 
-That is all of YAML that is understood here.
+No other YAML syntax is supported.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from viewer.errors import FormatError
 from viewer.formats._misfit import remark_on
 from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._tolerant import number_key
+from viewer.formats._words import number_key
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
@@ -45,18 +45,18 @@ _INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
 _KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
 _PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
 _ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
-_MOST = 100_000  # numbers of a matrix
-_NEAR = 1e-3  # calibrations are written with few digits
+_MOST = 100_000  # elements of a matrix
+_NEAR = 1e-3  # tolerance for a rotation matrix; calibrations have few digits
 _LARGEST = 1e9  # pixels of a calibration, and scene units to a camera
 _SHORTEST = 1e-3  # focal length, pixels
-_MOST_BENT = 1e6  # coefficient of a lens
+_MOST_BENT = 1e6  # distortion coefficient of a lens
 
 Value = Floats | list[str] | str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Storage:
-    """What a FileStorage file holds.
+    """Content of a FileStorage file.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Storage:
     values : dict
         Matrices, lists of texts and single texts by name.
     lines : dict of str to int
-        Where each key is.
+        Line of each key.
     """
 
     source: Source
@@ -73,7 +73,7 @@ class Storage:
     lines: dict[str, int] = field(default_factory=dict)
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
-        """Return an error at the line of an item; of one that is missing, at the cameras' names."""
+        """Return an error at the line of an item; if it is missing, at the cameras' names."""
         end = self.source.line(self.source.end)
         line = self.lines.get(item, self.lines.get("names", end))
         return _fault(self.source, key, line, item=printable(item, 40), **values)
@@ -86,21 +86,21 @@ def _fault(source: Source, key: str, line: int, **values: Any) -> FormatError:
 def find_cameras(
     folders: Sequence[Path], max_size: int
 ) -> tuple[tuple[CameraView, ...], list[Diagnostic]]:
-    """Return the cameras of the first folder that has their files.
+    """Return the cameras of the first folder with calibration files.
 
     Parameters
     ----------
     folders : sequence of Path
-        Where to look.
+        Folders to search, in this order.
     max_size : int
         Larger files, in bytes, are refused.
 
     Returns
     -------
     views : tuple of CameraView
-        In the order of the files; none if there are no files, or they cannot be used.
+        Cameras in the order of the files; empty if there are no files or they are invalid.
     notes : list of Diagnostic
-        What cannot be used and why.
+        Faults of the files.
     """
     for folder in folders:
         there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]
@@ -172,14 +172,14 @@ def _camera(name: str, inner: Storage, outer: Storage) -> CameraView:
 
 
 def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGEST) -> None:
-    """Refuse numbers beyond those with which single precision can draw."""
+    """Refuse numbers too large for rendering in single precision."""
     worst = float(values.ravel()[np.abs(values).argmax()]) if values.size else 0.0
     if abs(worst) > largest:
         raise file.fault("F003.camera-limit", item=key, limit=largest, found=worst)
 
 
 def _rotation(file: Storage, name: str) -> Floats:
-    """Return R: the matrix if the file has it, else of the rotation vector."""
+    """Return R: the matrix if the file has it, else that of the rotation vector."""
     if f"Rot_{name}" not in file.values:
         return rotation_vector_to_matrix(_matrix(file, f"R_{name}", (3,)))
     rotation = _matrix(file, f"Rot_{name}", (3, 3))
@@ -207,19 +207,19 @@ def _pixels(value: Value | None) -> int:
 
 @dataclass(slots=True)
 class _Matrix:
-    """A matrix whose lines are being read."""
+    """A matrix being read line by line."""
 
     key: str
     line: int
     rows: int = -1
     columns: int = -1
     data: list[bytes] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)  # of each number
-    is_open: bool = False  # whether the list of numbers goes on
+    lines: list[int] = field(default_factory=list)  # line of each number
+    is_open: bool = False  # whether the list of numbers continues on the next line
 
 
 def read_storage(source: Source) -> Storage:
-    """Return what a FileStorage file holds.
+    """Return the content of a FileStorage file.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def read_storage(source: Source) -> Storage:
     Raises
     ------
     FormatError
-        With the line that is not understood.
+        If a line is not supported; gives the line.
     """
     file = Storage(source)
     values = file.values
@@ -263,7 +263,7 @@ def read_storage(source: Source) -> Storage:
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines that say something, with their numbers."""
+    """Yield non-empty lines without comments, with their numbers."""
     for number, line in enumerate(data.splitlines(), start=1):
         bare = line.strip()
         if bare and not bare.startswith((b"%", b"#")) and bare not in (b"---", b"..."):
@@ -275,7 +275,7 @@ def _text(word: bytes) -> str:
 
 
 def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None:
-    """Take in one line of a matrix."""
+    """Parse one line of a matrix."""
     part = None if matrix.is_open else _PART.fullmatch(line)
     if part is None and not matrix.is_open:
         raise _fault(source, "F002.camera-part", number, found=line.strip())
@@ -303,7 +303,7 @@ def _continue(source: Source, matrix: _Matrix, line: bytes, number: int) -> None
 
 
 def _close(source: Source, matrix: _Matrix | None, values: dict[str, Value]) -> None:
-    """Make an array of a matrix that is complete."""
+    """Convert a complete matrix to an array."""
     if matrix is None:
         return
     if min(matrix.rows, matrix.columns) < 0:

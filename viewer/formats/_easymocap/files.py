@@ -1,4 +1,4 @@
-"""Which files a recording of EasyMocap is made of, and where they are on one timeline."""
+"""Frame files of an EasyMocap recording and their frames on a common timeline."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from viewer.phrases import printable
 __all__ = ["BODIES", "POINTS", "FrameFiles", "FrameFolder", "find_frames"]
 
 BODIES = ("smpl_full", "smplfull", "smpl")
-"""Folders of body parameters, the fullest first."""
+"""Folders of body parameters, the most complete first."""
 
 POINTS = "keypoints3d"
 """Folder of keypoints."""
 
 _SUFFIX = ".json"
-_MOST_HOLES = 10  # frames for every file, and beside those as many as follows
+# A timeline may have this many frames for every file, plus a constant.
+_MOST_HOLES = 10
 _FEW = 1000
 
 
@@ -32,7 +33,7 @@ class FrameFolder:
     path : Path
         The folder.
     has_bodies, has_points : bool
-        What is looked for in its files.
+        Data to read from its files.
     names : dict of int to str
         File names by frame, counted from the first frame of the recording.
     """
@@ -50,11 +51,11 @@ class FrameFiles:
     Attributes
     ----------
     folders : list of FrameFolder
-        Read frame by frame, in this order.
+        Folders, which are read in this order for each frame.
     frames : list of int
-        Those that have a file, rising.
+        Frames with a file, ascending.
     n_frames, first_frame : int
-        Length of the timeline, and what the files call its first frame.
+        Length of the timeline, and the file number of its first frame.
     """
 
     folders: list[FrameFolder]
@@ -64,17 +65,17 @@ class FrameFiles:
 
 
 def find_frames(source: Source) -> FrameFiles:
-    """Find the frame files of a folder that EasyMocap wrote, or of one inside it, or one file.
+    """Find the frame files of an output folder of EasyMocap, a subfolder of it, or a single file.
 
     Parameters
     ----------
     source : Source
-        What was left aside is added to its warnings.
+        The folder or file; ignored files are added to its warnings.
 
     Raises
     ------
     FormatError
-        If there are none, or a folder cannot be looked into.
+        If there are none, or a folder cannot be listed.
     """
     if not source.is_folder:
         folder = FrameFolder(source.path.parent)
@@ -95,7 +96,7 @@ def find_frames(source: Source) -> FrameFiles:
 
 
 def _look(source: Source, folder: Path) -> tuple[list[str], list[str]]:
-    """Return the names of a folder's frame files and of the folders in it, sorted."""
+    """Return the names of a folder's frame files and of its subfolders, sorted."""
     files, folders, others = [], [], []
     try:
         with os.scandir(folder) as entries:
@@ -116,7 +117,7 @@ def _look(source: Source, folder: Path) -> tuple[list[str], list[str]]:
 
 
 def _folders(source: Source, names: list[str], inside: list[str]) -> list[FrameFolder]:
-    """Return the folders that hold frames: those inside by name, or the one that was opened."""
+    """Return the folders with frames: known subfolders, or the folder that was opened."""
     bodies = [name for name in BODIES if name in inside]
     points = [POINTS] if POINTS in inside else []
     if not bodies and not points:
@@ -133,7 +134,7 @@ def _folders(source: Source, names: list[str], inside: list[str]) -> list[FrameF
 
 
 def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> list[str]:
-    """Go into the first folder that has frames: fits of one view each have a folder."""
+    """Descend into the first subfolder with frames: fits of single views have one for each."""
     holding = [(name, files) for name in inside if (files := _look(source, folder.path / name)[0])]
     if not holding:
         return []
@@ -146,7 +147,7 @@ def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> lis
 
 
 def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[str]]) -> FrameFiles:
-    """Give every file its frame: numbers keep their holes, other names follow one another."""
+    """Assign a frame to every file: numbered files keep their gaps, others are consecutive."""
     stems = {name: name[: -len(_SUFFIX)] for names in found for name in names}
     files = FrameFiles(folders)
     place: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""One frame file of EasyMocap: its list of people, and messages about its faults."""
+"""Reader of one frame file of EasyMocap: its list of people, and the faults in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._json_places import (
     MOST_DIGITS,
@@ -41,16 +41,16 @@ __all__ = [
 
 Record = dict[str, Any]
 _TRANSLATION = "Th"
-_WRAPPER = "annots"  # key of the people, in files that hold more
+_WRAPPER = "annots"  # key of the people in files with more content
 
 
 class RecordError(MisfitError):
-    """A person's record, or a part of it, that cannot be used.
+    """A person's record, or a part of it, that is invalid.
 
     Attributes
     ----------
     key : str
-        What is at fault; empty for the record itself.
+        Key of the invalid value; empty for the record itself.
     code : str
         A key of ``CODES``.
     """
@@ -61,7 +61,7 @@ class RecordError(MisfitError):
 
 
 class _RepeatedKeyError(ValueError):
-    """An object that has a key twice, which is the text."""
+    """An object with a repeated key, which is the text of the error."""
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
@@ -73,7 +73,8 @@ def _unique(pairs: list[tuple[str, Any]]) -> Record:
     return values
 
 
-_decode = json.JSONDecoder(object_pairs_hook=_unique).decode  # made once: making it takes longer
+# Made once, because creating a decoder is slow.
+_decode = json.JSONDecoder(object_pairs_hook=_unique).decode
 
 
 def load_people(path: str, max_size: int) -> list[Any]:
@@ -82,14 +83,14 @@ def load_people(path: str, max_size: int) -> list[Any]:
     Parameters
     ----------
     path : str
-        The file, which is a regular one.
+        A regular file.
     max_size : int
         Larger files, in bytes, are refused before they are read.
 
     Raises
     ------
     FormatError
-        If it cannot be read, is no JSON, or holds no list of people.
+        If it cannot be read, or is not JSON with a list of people.
     """
     text = _text(path, max_size)
     try:
@@ -126,13 +127,13 @@ def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
     path, max_size
         As for ``load_people``, which has read the file.
     place : int
-        Which of the people.
+        Index of the person.
     key : str
         Empty for the record itself.
     """
     try:
         text = _text(path, max_size)
-    except FormatError:  # it changed since
+    except FormatError:  # the file has changed since
         return None
     where: Keys = (place, key) if key else (place,)
     if text.lstrip().startswith("{"):
@@ -157,7 +158,7 @@ def _text(path: str, max_size: int) -> str:
 
 
 def _read(path: str, max_size: int) -> bytes:
-    # Thousands of small files: a stream object for each would take as long as reading it.
+    # For thousands of small files, creating stream objects would take as long as reading.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
     try:
         size = os.fstat(handle).st_size
@@ -172,12 +173,12 @@ def _read(path: str, max_size: int) -> bytes:
 
 
 def person_of(record: Any, place: int) -> int:
-    """Return whose record it is: ``id``, ``personID``, or else its place in the list.
+    """Return the person of a record: ``id``, ``personID``, or else its index in the list.
 
     Raises
     ------
     RecordError
-        If it is no record, or names nobody.
+        If it is not a record, or its identity is invalid.
     """
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
@@ -194,17 +195,17 @@ def person_of(record: Any, place: int) -> int:
 
 
 def has_numbers(record: Record, key: str) -> bool:
-    """Return whether a record has a key, and more than an empty list or matrix under it."""
+    """Return whether a record has a key whose value is not an empty list or matrix."""
     return key in record and record[key] not in ([], [[]])
 
 
 def row_of(record: Record, key: str) -> list[Any]:
-    """Return the numbers of a key, which may be written as a matrix of one row.
+    """Return the numbers of a key, which may be stored as a matrix of one row.
 
     Raises
     ------
     RecordError
-        If it is no list.
+        If it is not a list.
     """
     values = record.get(key)
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
@@ -216,24 +217,24 @@ def row_of(record: Record, key: str) -> list[Any]:
 
 
 def limit_of(key: str) -> float:
-    """Return how large the numbers of a key may be."""
+    """Return the largest valid magnitude of the numbers of a key."""
     return FARTHEST if key == _TRANSLATION else LARGEST
 
 
 def width_of(record: Record, key: str, count: int | None = None) -> int:
-    """Return how many numbers a key has, all of them finite, so that others can be measured by it.
+    """Return the number of values of a key, all finite, as the reference for other records.
 
     Parameters
     ----------
     record, key
-        Where to look.
+        Record and key.
     count : int, optional
-        How many it must have; any number if left out.
+        Expected number of values; any number if omitted.
 
     Raises
     ------
     RecordError
-        If it is no list, has more or fewer, or others than finite numbers are among them.
+        If it is not a list, has more or fewer values, or has any that is not a finite number.
     """
     count = len(row_of(record, key)) if count is None else count
     numbers = array("d")
@@ -246,12 +247,12 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
 
 
 def take_row(record: Record, key: str, count: int, put: Any) -> None:
-    """Hand the numbers of a key to ``put``, the ``fromlist`` of an ``array("d")``.
+    """Pass the numbers of a key to ``put``, the ``fromlist`` of an ``array("d")``.
 
     Raises
     ------
     RecordError
-        If there are more or fewer, or others than numbers.
+        If there are more or fewer values, or any is not a number.
     """
     try:
         values = record[key]
@@ -261,7 +262,7 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
             put(values)
             return
     except (KeyError, TypeError, ValueError, OverflowError):
-        pass  # looked at below
+        pass  # reported below
     values = row_of(record, key)
     if len(values) != count:
         raise RecordError(key, Phrase("record-count", expected=count, found=len(values)))

@@ -1,7 +1,7 @@
-"""Keypoints of EasyMocap's records, gathered person by person.
+"""Keypoints of EasyMocap's records, collected per person.
 
-``keypoints3d`` holds rows of x, y, z and confidence, or of three numbers seen for certain; hands
-and face may be beside it in keys of their own. A confidence of 0 is "not seen".
+``keypoints3d`` has rows of x, y, z and confidence, or of x, y, z with full confidence; hands and
+face may have keys of their own. A confidence of 0 means "not detected".
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows
 from viewer.formats._easymocap.json_frames import RecordError
 from viewer.formats._numbers import LARGEST
@@ -38,14 +38,14 @@ def point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, 
     Parameters
     ----------
     record : dict
-        Of one person.
+        Record of one person.
     title : str
-        The layout by name, where ``keypoints3d`` has that number of points.
+        Name of the layout, used if ``keypoints3d`` has that number of points.
 
     Raises
     ------
     RecordError
-        If a key holds no rows.
+        If the value of a key is not a list of rows.
     """
     parts = [(key, _count(record, key)) for key in (KEY, *_BESIDE) if key in record]
     counts = [count for _, count in parts]
@@ -58,7 +58,7 @@ def point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, 
             beside[key] = _one_hand(side)
     joined = joined_layout("", [body, *beside.values()])
     whole = keypoint_layout(len(joined.names))
-    # Body, hands and face in the usual order are a layout with a name of its own.
+    # Body, hands and face in the standard order are a layout with its own name.
     named = whole if whole.names == joined.names else None
     text = " + ".join([body.title, *beside])
     return named or PointLayout(text, joined.names, joined.limbs, joined.sides), tuple(parts)
@@ -88,11 +88,11 @@ class PointRows(Rows):
     Attributes
     ----------
     layout : PointLayout
-        Of all records.
+        Layout of all records.
     parts : tuple of (str, int)
-        Keys of a record, and their numbers of points.
+        Keys of a record, with their number of points.
     buffer : array
-        x, y, z, confidence of all points, one record behind the other.
+        x, y, z, confidence of all points, record after record.
     """
 
     layout: PointLayout
@@ -100,12 +100,12 @@ class PointRows(Rows):
     buffer: array[float] = field(default_factory=lambda: array("d"))
 
     def add(self, record: dict[str, Any], frame: int, path: str, place: int) -> None:
-        """Take in one record.
+        """Add one record.
 
         Raises
         ------
         RecordError
-            If something is missing, or has another number of points than before.
+            If a key is missing, or its number of points differs from before.
         """
         before = len(self.buffer)
         try:
@@ -117,12 +117,12 @@ class PointRows(Rows):
         self.keep_origin(frame, path, place)
 
     def check_any(self) -> None:
-        """Refuse rows in which no keypoint can be used: others must not be measured by them.
+        """Refuse rows without a valid keypoint, which must not determine the layout of others.
 
         Raises
         ------
         RecordError
-            If every keypoint is at fault.
+            If every keypoint is invalid.
         """
         if _is_odd(self._rows()).all():
             raise RecordError(KEY, Phrase("record-no-rows"))
@@ -139,7 +139,7 @@ class PointRows(Rows):
                     self.buffer.fromlist(list(chain.from_iterable(certain)))
                     return
         except (TypeError, ValueError, OverflowError):
-            pass  # said below
+            pass  # reported below
         if not isinstance(rows, list):
             raise RecordError(key, Phrase("record-points", expected=count, found=describe(rows)))
         if len(rows) != count:
@@ -147,7 +147,7 @@ class PointRows(Rows):
         raise RecordError(key, Phrase("record-other-rows"))
 
     def points(self) -> tuple[Floats, list[RowFault]]:
-        """Return the points (N, K, 4), and what was wrong with some."""
+        """Return the points (N, K, 4), and the faults of invalid rows."""
         points = self._rows().copy()
         is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
         points[is_odd | is_unseen] = 0.0
@@ -164,7 +164,7 @@ class PointRows(Rows):
 
 
 def _is_odd(points: Floats) -> Bools:
-    """Return which of (N, K, 4) points count as not seen though they claim to be."""
+    """Return a mask of points, (N, K, 4), that are invalid in spite of their confidence."""
     confidence = points[..., 3]
     is_good = (np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)
     return ~is_good & (confidence != 0.0)

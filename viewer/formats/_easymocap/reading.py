@@ -1,4 +1,4 @@
-"""One pass over a recording's frame files, in growing parts; what is wrong becomes a gap."""
+"""Sequential reading of a recording's frame files in growing parts, with gaps for faults."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ from viewer.rig.motion.body_motion import BodyMotion
 
 __all__ = ["Options", "Reading"]
 
-_SIZES = (64, 256, 1024, 4096)  # frames of a part; all further ones have the last number
+_SIZES = (64, 256, 1024, 4096)  # frames of a part; all further parts have the last size
 _MOST_WARNINGS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the files leave open; see ``open_capture``."""
+    """Settings that the files do not state; see ``open_capture``."""
 
     name: str
     frame_rate: float
@@ -64,18 +64,18 @@ class _Part:
 
 @dataclass(slots=True, eq=False)
 class Reading:
-    """One pass over the files, what it has learnt so far, and its warnings.
+    """One pass over the files, with its state and warnings.
 
     Attributes
     ----------
     files : FrameFiles
-        What is read.
+        Files to read.
     options : Options
-        What the files leave open.
+        Settings that the files do not state.
     body_layout, point_layout : layouts or None
-        Of the first record that had one; all others must be alike, but may bring coefficients.
+        Layout of the first record that has one; others must agree, but may add coefficients.
     first_fault : Diagnostic or None
-        What was wrong first.
+        First fault.
     """
 
     files: FrameFiles
@@ -92,7 +92,7 @@ class Reading:
     _said: set[tuple[object, ...]] = field(default_factory=set)
 
     def parts(self) -> Iterator[CapturePart]:
-        """Yield the frames up to the first with somebody in it, then more and more at a time."""
+        """Yield the frames up to the first with a person, then parts of growing size."""
         frames, n_frames = self.files.frames, self.files.n_frames
         self._prefixes = [f"{folder.path}{os.sep}" for folder in self.files.folders]
         sizes = iter(_SIZES)
@@ -128,7 +128,7 @@ class Reading:
             except RecordError as problem:
                 self._fault_of(path, place, problem, problem.key)
                 continue
-            if person < 0:  # nobody knows who: told apart within the frame
+            if person < 0:  # unknown identity: distinct only within the frame
                 person = min(seen) - 1 if -1 in seen else -1
                 self.note("F007.record-untracked", path)
             if person in seen:
@@ -137,12 +137,12 @@ class Reading:
                 self._fault(Diagnostic("F002.record-twice", Path(path), line, values=values))
                 continue
             if "id" not in record or "personID" in record:
-                self._say_of_ids(path, record)
+                self._note_ids(path, record)
             seen.add(person)
             self._take_person(person, record, folder, frame, (path, place), part)
 
-    def _say_of_ids(self, path: str, record: dict[str, Any]) -> None:
-        """Say whose number is used where there is none, or two that differ."""
+    def _note_ids(self, path: str, record: dict[str, Any]) -> None:
+        """Remark on the identity used where a record has none, or two that differ."""
         if "id" not in record and "personID" not in record:
             self.note("F007.record-no-id", path)
         elif "id" in record and record["id"] != record["personID"]:
@@ -191,7 +191,7 @@ class Reading:
             self.note("F007.record-vertices", path)
 
     def _layout_of(self, record: dict[str, Any], path: str) -> BodyLayout:
-        """Return the layout of all bodies, wider from the first record with coefficients on."""
+        """Return the layout of all bodies, extended by the first record with coefficients."""
         layout = self.body_layout
         if layout is None:
             layout = body_layout(record)
@@ -218,7 +218,7 @@ class Reading:
         part.points[person] = rows
 
     def _finished(self, part: _Part, stop: int) -> CapturePart:
-        """Return what was gathered, as motions on the whole recording's timeline."""
+        """Return the collected rows as motions on the timeline of the whole recording."""
         options, files = self.options, self.files
         bodies: dict[int, BodyMotion] = {}
         points: dict[int, tuple[PointLayout, PointClip]] = {}
@@ -245,12 +245,12 @@ class Reading:
             clip = PointClip(options.name, seen.timing(*where), places)
             points[person] = seen.layout, clip
         if stop == files.n_frames:
-            self._found += self._last_words()
+            self._found += self._final_messages()
         found, self._found = self._found, []
         return CapturePart(stop, bodies, points, tuple(found))
 
-    def _last_words(self) -> list[Diagnostic]:
-        """Return what is only known when everything was read."""
+    def _final_messages(self) -> list[Diagnostic]:
+        """Return the messages that require the whole recording."""
         found: list[Diagnostic] = []
         unseen = [person for person, has_seen in self._has_seen.items() if not has_seen]
         values: dict[str, Any] = {"name": self.options.name}
@@ -268,13 +268,13 @@ class Reading:
             self._fault_of(rows.paths[row], rows.places[row], problem, label, name)
 
     def _fault_of(self, path: str, place: int, problem: RecordError, *names: str) -> None:
-        """Note what is wrong with a person's record, or a key of it."""
+        """Record a fault of a person's record, or of a key of it."""
         line = self._line(path, place, problem.key)
         values = {"item": ": ".join(filter(None, names)), "problem": problem.problem}
         self._fault(Diagnostic(f"{problem.code}.record", Path(path), line, values=values))
 
     def _line(self, path: str, place: int, key: str) -> int | None:
-        # Finding the line reads the file again, which is not done for faults that nobody sees.
+        # Finding the line reads the file again, which is skipped for faults that are not shown.
         if self._n_faults >= _MOST_WARNINGS:
             return None
         return record_line(path, self.options.max_size, place, key)
@@ -286,7 +286,7 @@ class Reading:
             self._found.append(remark_on("F007.record", fault))
 
     def note(self, key: str, path: str, **values: Any) -> None:
-        """Remark once on what is odd in the files."""
+        """Record a remark about the files, each only once."""
         mark = key, *values.values()
         if mark not in self._said:
             self._said.add(mark)

@@ -1,4 +1,4 @@
-"""The ``f`` lines of an ``.obj``: which vertex, texture coordinate and normal each corner has."""
+"""Parser for the ``f`` lines of an ``.obj``: vertex, texture coordinate and normal of corners."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.rig.arrays import Bools, Floats
 __all__ = ["CORNER_KINDS", "FEWEST", "CornerFault", "FaceRows", "fits_corner", "read_faces"]
 
 CORNER_KINDS = ("v", "vt", "vn")
-"""Keywords of what the three numbers of a corner refer to."""
+"""Keywords of the elements that the three numbers of a corner index."""
 
 FEWEST = 3
 """Corners of a face."""
@@ -24,14 +24,14 @@ _SLASH = ord("/")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CornerFault:
-    """Broken corners of one kind.
+    """Faulty corners of one kind.
 
     Attributes
     ----------
     key, offset, values : str, int, dict
         The fault of the first, as ``Source.refuse`` takes it.
     faces : (n,)
-        Which faces they are of, one for each corner.
+        Face of each corner.
     """
 
     key: str
@@ -42,19 +42,19 @@ class CornerFault:
 
 @dataclass(frozen=True, slots=True)
 class FaceRows:
-    """The corners of some faces, one face after the other.
+    """The corners of some faces, face after face.
 
     Attributes
     ----------
     counts : (F,)
         Corners of each face, 3 or more.
     corners : (C, 3)
-        Vertex, texture coordinate and normal of each, from 0; -1 where it has none. Whether they
-        exist is known only when the whole file is read.
+        Vertex, texture coordinate and normal of each, from 0; -1 if missing. Their range can be
+        checked only when the whole file has been read.
     offsets : (F,)
-        Where each face is in the file.
+        Offset of each face in the file.
     faults : tuple of CornerFault
-        Told when it is known which triangles the faces become.
+        Faults to record when the triangles of the faces are known.
     """
 
     counts: Places
@@ -64,7 +64,7 @@ class FaceRows:
 
 
 def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
-    """Read the faces of some lines, None if one has a fault.
+    """Read the faces of some lines; None if any has a fault.
 
     Negative indices count back from the last ``v``, ``vt`` or ``vn`` before the face.
 
@@ -73,7 +73,7 @@ def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
     lines : Lines
         Some lines of a file.
     before : dict of str to int
-        How many lines of each keyword came before these.
+        Number of earlier lines with each keyword.
     """
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
@@ -96,14 +96,14 @@ def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
 def _corner_numbers(rows: Rows, begins: Places) -> Places | None:
     """Return the three numbers of every corner as written, 0 where there is none: (C, 3).
 
-    None if a corner is none.
+    None if a corner is invalid.
     """
     values, bad = parse_numbers(rows.body.replace(b"/", b" "), 0, len(rows.body))
-    if bad >= 0 or (values == 0.0).any():  # nothing has the index 0; below, it is a missing one
+    if bad >= 0 or (values == 0.0).any():  # 0 is no index, and means "missing" below
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
-        # The most common file besides that of three numbers a corner: vertices alone.
+        # The second most common kind of file has vertices alone.
         return _spread(values, np.ones(len(begins), np.int64), None)
     fits, n_numbers, has_gap = fits_corner(rows, begins)
     if not fits.all():
@@ -116,30 +116,30 @@ def _number_begins(rows: Rows) -> Places:
 
 
 def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
-    """Look at the slashes of corners.
+    """Classify corners by their slashes.
 
     Parameters
     ----------
     rows : Rows
-        Of faces.
+        Rows of faces.
     begins : (C,)
-        Where each corner begins in their body.
+        Start of each corner in their body.
 
     Returns
     -------
     fits : (C,) bool
-        Which are v, v/vt, v//vn or v/vt/vn, whatever stands for a number.
+        True for v, v/vt, v//vn and v/vt/vn; the numbers are not checked.
     n_numbers : (C,)
-        How many numbers each has.
+        Number of values of each.
     has_gap : (C,) bool
-        Which are v//vn.
+        True for v//vn.
     """
     number_begins = _number_begins(rows)
     slashes = np.flatnonzero(rows.letters == _SLASH)
     after = np.append(begins[1:], len(rows.letters))
     n_slashes = np.searchsorted(slashes, after) - np.searchsorted(slashes, begins)
     n_numbers = np.searchsorted(number_begins, after) - np.searchsorted(number_begins, begins)
-    # Of "1//3" the middle one is missing, and that alone: "1/", "/1" and "1///2" are no corners.
+    # Only the middle number may be missing, as in "1//3": "1/", "/1" and "1///2" are invalid.
     doubles = slashes[:-1][np.diff(slashes) == 1]
     has_gap = np.searchsorted(doubles, after) - np.searchsorted(doubles, begins) == 1
     fits = np.where(has_gap, (n_slashes == 2) & (n_numbers == 2), n_numbers == n_slashes + 1)
@@ -150,7 +150,7 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
 
 
 def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Places | None:
-    """Put the numbers of each corner into its row; with a gap the second is the third."""
+    """Arrange the numbers of corners in rows of three; with a gap the second becomes the third."""
     whole = np.clip(values, -(2.0**40), 2.0**40).astype(np.int64)
     if (whole != values).any():
         return None

@@ -1,4 +1,4 @@
-"""Lines of an ``.obj`` with faults: each is recorded, and something neutral stands in its place."""
+"""Parser for lines of an ``.obj`` with faults: records them and substitutes neutral values."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from viewer.formats._obj.faces import CORNER_KINDS, FEWEST, CornerFault, FaceRow
 from viewer.formats._obj.lines import Lines, NumberRows, Places, Rows, rows_of
 from viewer.formats._polygons import first_known, triangles_of
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, refuse_words
+from viewer.formats._words import Words, refuse_words
 from viewer.rig.arrays import Bools
 
 __all__ = ["checked_corners", "faulty_faces", "faulty_rows"]
 
 _LOST = -(2**40)
-"""In place of a vertex that cannot be told: no file has so many."""
+"""Stands for an unknown vertex; no file has so many."""
 
 
 def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
@@ -25,20 +25,20 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     Parameters
     ----------
     source : Source
-        Takes the faults.
+        The file, which records the faults.
     lines : Lines
-        Some lines of it.
+        Lines of the file.
     keyword : str
         v, vt or vn.
     width : int
-        Numbers that every line must have at least.
+        Smallest number of values in a line.
     first : int
-        How many lines of this keyword came before.
+        Number of earlier lines with this keyword.
 
     Returns
     -------
     table, counts, values, rows
-        As ``number_rows``, with NaN for words that are no numbers and in rows that are too short.
+        As ``number_rows``, with NaN for words that are not numbers and in rows that are too short.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
@@ -50,7 +50,7 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     part: Part = "positions" if keyword == "v" else ""
     bad = words.bad
     is_used = bad - firsts[owners[bad]] < width
-    parts: tuple[Part, Part] = (part, "")  # further numbers are nothing that checks look at
+    parts: tuple[Part, Part] = (part, "")  # checks do not use further numbers
     for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
         owned = owners[bad[chosen]] + first
         refuse_words(
@@ -86,16 +86,16 @@ def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     Parameters
     ----------
     source : Source
-        Takes the faults of faces that are left out.
+        The file, which records the faults of omitted faces.
     lines : Lines
-        Some lines of it.
+        Lines of the file.
     before : dict of str to int
-        How many lines of each keyword came before these.
+        Number of earlier lines with each keyword.
 
     Returns
     -------
     FaceRows
-        With what must be said when it is known which triangles a face becomes.
+        Faces, with the faults to record when their triangles are known.
     """
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
@@ -138,7 +138,7 @@ def _corner_fault(source: Source, offset: int, faces: Places) -> CornerFault:
 
 
 def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
-    """Return the numbers of every corner, 0 where there is none, (C, 3), and which are broken."""
+    """Return the numbers of every corner, 0 if missing, (C, 3), and a mask of invalid corners."""
     values = parse_words(rows.body.replace(b"/", b" "), 0, len(rows.body))
     fits, n_numbers, has_gap = fits_corner(rows, begins)
     firsts = np.cumsum(n_numbers) - n_numbers
@@ -150,7 +150,7 @@ def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
         (fits & (n_numbers > 2), 2, 2),
     ):
         given = values[firsts[chosen] + place]
-        # Indices count from 1: a 0 is none, and must not be taken for a missing one.
+        # Indices count from 1, so an explicit 0 is invalid and differs from a missing index.
         numbers[chosen, column] = np.where(given == 0.0, np.nan, given)
     whole = np.clip(np.nan_to_num(numbers), -(2.0**40), 2.0**40).astype(np.int64)
     lost = ~fits | (whole != numbers).any(axis=1) | (whole[:, 0] == 0)
@@ -158,21 +158,21 @@ def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
 
 
 def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int]) -> Places:
-    """Return the corners of all faces, those of nothing replaced by others of their face.
+    """Return the corners of all faces, with each invalid one replaced by another of its face.
 
     Parameters
     ----------
     source : Source
-        Takes the faults.
+        The file, which records the faults.
     faces : list of FaceRows
-        All of the file.
+        All faces of the file.
     ends : dict of str to int
-        How many lines of each keyword there are.
+        Number of lines with each keyword.
 
     Returns
     -------
     (C, 3)
-        Of texture coordinates and normals -1 where the index is wrong.
+        Corners; -1 for invalid indices of texture coordinates and normals.
     """
     corners = np.concatenate([np.zeros((0, 3), np.int64), *(rows.corners for rows in faces)])
     limits = np.array([ends[keyword] for keyword in CORNER_KINDS])

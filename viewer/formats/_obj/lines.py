@@ -40,7 +40,7 @@ class Lines:
     base : int
         Where they begin in the file.
     data : bytes
-        Their text; a continued line is one, its parts joined by blanks.
+        Their text; continued lines are joined by blanks.
     letters : (N,) uint8
         The same.
     starts, ends : (L,)
@@ -66,7 +66,7 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """What stands behind the keyword in all lines of one keyword.
+    """The text after the keyword in all lines with one keyword.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def _split(data: bytes, base: int) -> Lines:
         "v": is_v & ends_at_1,
         "vt": is_v & (second == ord("t")) & ends_at_2,
         "vn": is_v & (second == ord("n")) & ends_at_2,
-        # "fo" is an old word for "f".
+        # "fo" is an obsolete keyword for "f".
         "f": (first == ord("f")) & (ends_at_1 | ((second == ord("o")) & ends_at_2)),
     }
     rest = ~(_is_blank(first) | (first == ord("#")))
@@ -136,7 +136,7 @@ def _is_blank(letters: Letters) -> Bools:
 
 
 def rows_of(lines: Lines, keyword: str) -> Rows:
-    """Gather what stands behind a keyword."""
+    """Return the text after a keyword in all lines that have it."""
     chosen = lines.of[keyword]
     starts = lines.starts[chosen] + len(keyword)
     if keyword == "f":
@@ -154,7 +154,7 @@ NumberRows = tuple[Floats, Places, Floats, Rows]
 
 
 def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
-    """Parse the numbers behind a keyword.
+    """Parse the numbers after a keyword.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     keyword : str
         v, vt or vn.
     width : int
-        Numbers that every line must have at least.
+        Smallest number of values in a line.
 
     Returns
     -------
@@ -176,7 +176,7 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     rows : Rows
         Where they come from.
 
-    None instead of all of them if a line has too few numbers, or a word is none.
+    None instead if a line has too few numbers, or a word is not a number.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)

@@ -19,7 +19,7 @@ from viewer.rig.mesh import Material
 
 __all__ = ["read_libraries"]
 
-# How many values follow each option of a map; the numbers of -o, -s and -t may be one to three.
+# Number of values after each option of a map; -o, -s and -t have one to three.
 _OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1,
     "-imfchan": 1, "-type": 1, "-cc": 1,
@@ -85,7 +85,7 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
 
 
 def _read(library: Source, pictures: dict[str, tuple[str, int, Source]], known: set[str]) -> None:
-    """Note where each material's picture is."""
+    """Record the location of each material's picture."""
     name = ""
     position = 0
     for line in library.data.replace(b"\r", b"\n").split(b"\n"):
@@ -102,7 +102,7 @@ def _read(library: Source, pictures: dict[str, tuple[str, int, Source]], known: 
 
 
 def _without_options(text: str) -> str:
-    """Return the file's name behind the options of a map; it may hold blanks."""
+    """Return the file name after the options of a map; it may contain blanks."""
     rest = text
     while rest.startswith("-"):
         option, _, behind = rest.partition(" ")

@@ -1,4 +1,4 @@
-"""Everything an ``.obj`` holds, as arrays, before anything is put together."""
+"""The content of an ``.obj`` as arrays, before a mesh is made of it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["ObjParts", "read_parts"]
 
-# Smoothing groups and what programs other than viewers need.
+# Smoothing groups, and keywords that a viewer does not need.
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
 _SHAPES = {b"l": "line", b"p": "point"}
 _RUNS = (b"usemtl", b"g", b"o")
@@ -23,7 +23,7 @@ _RUNS = (b"usemtl", b"g", b"o")
 
 @dataclass(slots=True)
 class ObjParts:
-    """What the file holds.
+    """Content of the file.
 
     Attributes
     ----------
@@ -66,11 +66,11 @@ class _Gathered:
     )
     libraries: list[tuple[bytes, int]] = field(default_factory=list)
     odd: Counter[bytes] = field(default_factory=Counter)
-    # What is left out: how many vertices, and where the first is.
+    # Ignored data: the number of vertices, and the offset of the first.
     unused: dict[str, list[int]] = field(default_factory=dict)
 
     def leave_out(self, what: str, count: int, offset: int) -> None:
-        """Count what is said once, when the whole file is read."""
+        """Count ignored data, which is reported once when the whole file has been read."""
         self.unused.setdefault(what, [0, offset])[0] += count
 
 
@@ -80,12 +80,12 @@ def read_parts(source: Source) -> ObjParts:
     Parameters
     ----------
     source : Source
-        Is warned of what is left out.
+        The file; ignored data is added to its warnings.
 
     Raises
     ------
     FormatError
-        With the line that breaks the grammar, or refers to what is not there.
+        For a line that breaks the grammar, or has an index out of range.
     """
     gathered = _Gathered()
     for lines in pieces(source):
@@ -168,7 +168,7 @@ def _normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
 
 
 def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
-    """Take in names of materials, groups and objects; say what is not known."""
+    """Record names of materials, groups and objects; warn of unknown keywords."""
     for line in lines.others.tolist():
         words = lines.text(line).split(None, 1)
         rest = words[1] if len(words) > 1 else b""

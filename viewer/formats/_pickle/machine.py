@@ -1,8 +1,8 @@
 """The state of the pickle machine: the bytes, a stack with marks, the memo, and a budget.
 
-A pickle is a list of steps for a machine with a stack. What each step does is in
-``_pickle_steps.py``; here is what they have in common. Nothing is recursive, no length is believed
-before the bytes are known to be there, and the budget bounds time and memory whatever the steps do.
+A pickle is a list of steps for a machine with a stack. The steps are in
+``steps.py``; this module has the state they share. Nothing is recursive, no length is trusted
+before the bytes are known to exist, and the budget bounds time and memory whatever the steps do.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _INTEGER = re.compile(rb"[+-]?[0-9]+")
 
 
 class Machine:
-    """A pickle while it is read.
+    """A pickle being read.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Machine:
         return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
 
     def next_step(self) -> int:
-        """Return the code of the next step, and pay for it."""
+        """Return the code of the next step, and charge it to the budget."""
         self._step_at = self.at
         if self.at >= len(self.data):
             raise self.cut_short(1, 0)
@@ -59,7 +59,7 @@ class Machine:
         return self.data[self.at - 1]
 
     def spend(self, count: int) -> None:
-        """Pay for so many items; refuse a pickle that makes more than any real one."""
+        """Charge a number of items to the budget; refuse a pickle that exceeds it."""
         self._budget -= count
         if self._budget < 0:
             raise self.fail(Phrase("pickle-steps", most=_MAX_STEPS))
@@ -80,7 +80,7 @@ class Machine:
         return start
 
     def span(self, width: int, coding: str | None = None, *, is_signed: bool = False) -> Span:
-        """Read a length of ``width`` bytes, and mark as many bytes after it."""
+        """Read a length of ``width`` bytes, and return the span of that many bytes after it."""
         start = self.skip(self.number(width, is_signed=is_signed))
         return Span(self.data, start, self.at, coding)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TypeGuard
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Opaque
+from viewer.formats._archive.values import Opaque
 from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.phrases import printable
@@ -80,7 +80,7 @@ def find(module: str, name: str) -> StandIn:
 
 
 def call(function: object, arguments: object) -> tuple[object, int]:
-    """Return what a function would make of its arguments, and how many items were copied.
+    """Return the result of a function for its arguments, and the number of copied items.
 
     Parameters
     ----------

@@ -1,21 +1,21 @@
-"""Read pickles of arrays and plain data, without Python's unpickler and without running anything.
+"""Reader of pickles of arrays and plain data, without Python's unpickler and without running code.
 
 ::
 
-    _pickle.py           this file: the whole must be a dict of named values
-    _pickle_steps.py     what each step of the protocols 0 to 5 does
-    _pickle_machine.py   bytes, stack, memo and budget of the machine that takes the steps
-    _pickle_names.py     the only names allowed, and the only arguments they take
-    _pickle_values.py    the inert things that the names stand for
-    _pickle_resolve.py   from those to arrays, sparse matrices and plain data, key by key
+    reading.py      this file: the whole must be a dict of named values
+    steps.py        the steps of protocols 0 to 5
+    machine.py      bytes, stack, memo and budget of the machine that executes the steps
+    names.py        the only names allowed, and the only arguments they take
+    values.py       inert values that the names stand for
+    resolving.py    these values turned into arrays, sparse matrices and plain data, key by key
 
-Arrays are views of the file's bytes. They begin where the file has them, often at an address that
-their element size does not divide: whoever computes with one in a loop should copy it.
+Arrays are views of the file's bytes. They are often unaligned, so an array that is used in a loop
+should be copied first.
 """
 
 from __future__ import annotations
 
-from viewer.formats._archive import Archive, Value
+from viewer.formats._archive.values import Archive, Value
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.resolving import resolve
 from viewer.formats._pickle.steps import run
@@ -27,7 +27,7 @@ __all__ = ["open_pickle"]
 
 
 def open_pickle(source: Source) -> Archive:
-    """Open a pickle; see ``open_archive`` for what it raises.
+    """Open a pickle; raises as ``open_archive`` does.
 
     Parameters
     ----------

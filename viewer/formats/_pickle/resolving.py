@@ -1,7 +1,7 @@
-"""From what a pickle built to what a reader asks for, one key at a time.
+"""Conversion of the values that a pickle built to those of an archive, one key at a time.
 
-Values are converted when a key is asked for, so a key that nobody needs costs nothing and cannot
-spoil the others. Whatever is shared or contains itself is walked within a budget and a depth.
+Values are converted on demand, so a key that is not needed costs nothing and cannot invalidate the
+others. Shared and self-containing values are traversed within a budget and a depth.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Opaque, Sparse, Value
+from viewer.formats._archive.values import Opaque, Sparse, Value
 from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes
 from viewer.phrases import printable
@@ -46,12 +46,12 @@ def resolve(path: Path, size: int, key: str, value: object) -> Value:
     key : str
         The name of the value, for messages.
     value : object
-        What the machine made.
+        Value that the machine built.
 
     Raises
     ------
     FormatError
-        If an array, matrix or expression contradicts itself, or a text is none.
+        If an array, matrix or expression is inconsistent, or a text cannot be decoded.
     """
     try:
         return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)

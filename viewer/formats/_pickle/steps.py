@@ -1,8 +1,7 @@
-r"""What each step of a pickle does, protocols 0 to 5.
+r"""The steps of a pickle, protocols 0 to 5.
 
 Steps are named as in Python's ``pickletools``. Those that reach outside the file are refused:
-persistent ids, extension codes and out-of-band buffers. Everything that has a name is decided in
-``_pickle_names.py``.
+persistent ids, extension codes and out-of-band buffers. Names are resolved in ``names.py``.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ _LAST_PROTOCOL = 5
 _MAX_INTEGER = 1024  # bytes
 _LONGEST_NAME = 256
 _FLOAT = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|-?inf|-?nan")
-# What repr() of Python 2 writes. Others are refused, as the decoder warns about some of them.
+# Escapes of Python 2's repr(). Others are refused, because the decoder warns about some of them.
 _ODD_ESCAPE = re.compile(rb"\\(?!x[0-9a-fA-F]{2}|[nrt'\"])")
 
 
@@ -343,7 +342,7 @@ _STEPS: dict[int, Step] = {
     # Framing
     0x80: _protocol,
     0x95: _frame,
-    # What reaches outside the file
+    # Steps that reach outside the file
     ord("P"): _refused(Phrase("noun-persistent")),
     ord("Q"): _refused(Phrase("noun-persistent")),
     0x82: _refused(Phrase("noun-extension")),

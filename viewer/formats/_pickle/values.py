@@ -1,4 +1,4 @@
-"""What the pickle machine has on its stack: inert things that only remember what they were.
+"""Inert values on the stack of the pickle machine, which stand for classes and objects.
 
 Numbers, None, lists, tuples and dicts are Python's own. Everything with a name in the pickle is one
 of the classes here, made anew for each file, so nothing a pickle does to them outlives it.
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
+from viewer.formats._archive.npz import array_dtype, item_count, shaped
 from viewer.formats._misfit import MisfitError
-from viewer.formats._npz import array_dtype, item_count, shaped
 from viewer.rig.arrays import Deferred
 
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
@@ -214,7 +214,7 @@ def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
 
 
 def noun(value: object) -> Phrase:
-    """Return what a thing on the stack is, for a message.
+    """Return a description of a value on the stack for messages.
 
     >>> str(noun([1, 2])), str(noun(StandIn("numpy.ndarray", "ndarray")))
     ('a list', 'numpy.ndarray')

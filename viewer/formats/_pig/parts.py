@@ -1,4 +1,4 @@
-"""The arrays of a PIG model, from its text folder or an archive, checked alike."""
+"""The arrays of a PIG model, from its text folder or an archive, with the same checks."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part as FaultPart
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import Archive
-from viewer.formats._container import archive_of, finite
+from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._table import read_table
 from viewer.phrases import printable
@@ -52,7 +52,7 @@ _PARTS: dict[str, FaultPart] = {
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One array and where it came from.
+    """One array and its origin.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Part:
     values : (N, columns)
         Numbers; of a sparse matrix (joint, vertex, weight) rows.
     source : Source
-        Takes faults.
+        The file, which records faults.
     offset_of : callable or None
         Returns where a row is in a text; None for archives, which have no lines.
     """
@@ -137,7 +137,7 @@ def _from_folder(source: Source) -> PigFiles:
 def _text_part(source: Source, name: str, columns: int) -> Part:
     rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
     if name not in CORE and np.isnan(rows.sum()):
-        rows = rows[:0]  # nobody needs a part of it
+        rows = rows[:0]  # an incomplete array is of no use
     return Part(f"{name}.txt", rows, source, offset_of)
 
 

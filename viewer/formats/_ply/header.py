@@ -75,7 +75,7 @@ def read_header(source: Source) -> Header:
     Raises
     ------
     FormatError
-        With the line of what is not understood.
+        For a line that is not understood; gives the line.
     """
     header = Header()
     position, number, has_format = 0, 0, False

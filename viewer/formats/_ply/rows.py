@@ -1,4 +1,4 @@
-"""The numbers behind the header of a ``.ply``: text or bytes, elements one after the other."""
+"""Parser for the rows after the header of a ``.ply``: text or binary, element after element."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.formats._numbers import parse_numbers, parse_words
 from viewer.formats._ply.header import CORNERS, Element, Header, Property
 from viewer.formats._polygons import triangles_of
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, number_key
+from viewer.formats._words import Words, number_key
 
 __all__ = ["Table", "read_tables"]
 
@@ -29,9 +29,9 @@ class Table:
     Attributes
     ----------
     element : Element
-        What the header says of it.
+        Its declaration in the header.
     columns : dict of str to (N,)
-        Its properties that are no lists.
+        Its properties that are not lists.
     lists : dict of str to ((N,), (M,))
         Its lists: how many values each row has, and the values of all rows.
     offsets : (N,) or None
@@ -57,7 +57,7 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     Raises
     ------
     FormatError
-        If there are fewer numbers than the header says, or something else than numbers.
+        If there are fewer numbers than the header declares, or words that are not numbers.
     """
     body: _Text | _Binary
     body = _Binary(source, header) if header.order else _Text(source, header)
@@ -85,7 +85,7 @@ def _flat(starts: Places, counts: Places, step: int) -> Places:
 
 
 class _Text:
-    """Numbers as words, one row a line; NaN stands for words that are no numbers."""
+    """Numbers as words, one row per line; NaN stands for words that are not numbers."""
 
     def __init__(self, source: Source, header: Header) -> None:
         self.source, self.start = source, header.end
@@ -162,7 +162,7 @@ class _Text:
     def _refuse_words(
         self, table: Table, words: Places, rows: Places, part: Part, places: Places | None
     ) -> None:
-        """Refuse words that are no numbers, each in a row of a table."""
+        """Refuse words that are not numbers, each in a row of a table."""
         if len(words):
             item = Phrase("ply-row", element=table.element.name, row=int(rows[0]))
             self._refuse_first(words, item, part, places)
@@ -192,7 +192,7 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn of lines that no element has."""
+        """Warn of lines after those of the last element."""
         left = len(self.firsts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)
@@ -281,7 +281,7 @@ class _Binary:
         return place - start
 
     def _walked(self, element: Element) -> Places:
-        """Walk from row to row: where lists differ in length nothing else tells where one begins.
+        """Return the starts of rows, followed one by one because their lists differ in length.
 
         A step per face, not per vertex; files of triangles alone never come here.
         """
@@ -325,12 +325,12 @@ class _Binary:
         return whole, values, cursor + whole * size
 
     def end(self, element: Element, cursor: Places) -> None:
-        """Go on behind the last row."""
+        """Continue after the last row."""
         if len(cursor):
             self.position = int(cursor[-1])
 
     def finish(self) -> None:
-        """Warn of bytes that no element has."""
+        """Warn of bytes after those of the last element."""
         left = len(self.data) - self.position
         if left:
             self.source.warn("F006.ply-bytes", n=left)

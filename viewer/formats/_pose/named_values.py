@@ -1,4 +1,4 @@
-"""Values by name, from a JSON text or an archive, with the place of whatever is wrong in them."""
+"""Values by name, from a JSON text or an archive, with the places of faults in them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._json_places import (
     constant_place,
     nesting_place,
@@ -32,7 +32,7 @@ _MOST_DIGITS = 18  # of whole numbers that surely fit 64 bits; longer ones are t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedValues:
-    """What a file holds by name.
+    """Named values of a file.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def parse_json(source: Source) -> NamedValues:
     Raises
     ------
     FormatError
-        With the line of what is no JSON, of a number like NaN, or of a key that comes twice.
+        For invalid JSON, a number like NaN, or a repeated key; gives the line.
     """
     text = source.data.decode("utf-8", "surrogateescape")
     odd: set[str] = set()  # what Python takes and JSON does not
@@ -150,7 +150,7 @@ def _whole(digits: str) -> int | float:
 
 
 def _odd_json(source: Source, text: str) -> FormatError:
-    """Return an error on NaN, an infinity, or a key that comes twice."""
+    """Return the error about NaN, an infinity, or a repeated key."""
     constant, repeated = constant_place(text), repeated_key(text)
     if constant is not None:
         return source.fault(
@@ -192,6 +192,6 @@ def _is_of(one: Any, kinds: str) -> bool:
 
 
 def described(value: Any) -> Phrase:
-    """Return what a value is, for a message: an array by its shape and type."""
+    """Return a description of a value for messages: an array by its shape and type."""
     is_array = isinstance(value, np.ndarray)
     return describe(Deferred(value.shape, value.dtype, lambda: value) if is_array else value)

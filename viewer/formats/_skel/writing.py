@@ -1,4 +1,4 @@
-"""Figures as ``.skel`` text; see ``skel.py`` for its grammar."""
+"""Writer of ``.skel`` files; see ``skel.py`` for the grammar."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from viewer.rig.skeleton import Skeleton, joint_label
 __all__ = ["KEYWORDS", "UNLIMITED", "write"]
 
 UNLIMITED = 100_000.0
-"""The course's word for "no limit", written out by some files."""
+"""The course's value for "no limit", which some files contain."""
 
 KEYWORDS = frozenset(
     (b"offset", b"boxmin", b"boxmax", b"pose", b"rotxlimit", b"rotylimit", b"rotzlimit")
 ) | {b"balljoint"}
-"""Words that begin an item of a joint, and so are no part of a name."""
+"""Words that begin an item of a joint, and cannot be part of a name."""
 
 _DEEPEST = 32  # tabs that a line begins with
 

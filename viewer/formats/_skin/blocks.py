@@ -10,7 +10,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, read_words
+from viewer.formats._words import Words, read_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["KEYWORDS", "Block", "find_block", "read_count", "to_whole", "unclosed", "words_of"]
@@ -110,5 +110,5 @@ def to_whole(values: Floats) -> tuple[Ints, int]:
     """Return numbers as int32, and the place of the first that this changes, -1 for none."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
-    whole.flags.writeable = False  # so that nobody has to copy it
+    whole.flags.writeable = False  # so that it need not be copied
     return whole, int(differs.argmax()) if differs.any() else -1

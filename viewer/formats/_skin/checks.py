@@ -1,14 +1,14 @@
-"""What a ``.skin`` file may get wrong beyond its grammar: indices, weights, bindings."""
+"""Checks of a ``.skin`` file beyond its grammar: indices, weights and bindings."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from viewer.formats._neutral import neutral_corners
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.rows import LOST
 from viewer.formats._skin.sections import Sections, check_declared
 from viewer.formats._source import Source
-from viewer.formats._tolerant import mended_corners
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, bounding_box
@@ -83,7 +83,7 @@ def even_counts(source: Source, sections: Sections) -> None:
 
 def _fit_weights(sections: Sections, count: int) -> None:
     """Leave out the influences of further vertices, or give missing vertices none."""
-    assert sections.starts is not None  # the caller looked
+    assert sections.starts is not None  # the caller checked it
     starts = sections.starts[: count + 1]
     sections.starts = np.pad(starts, (0, count + 1 - len(starts)), mode="edge")
     sections.joints = sections.joints[: starts[-1]]
@@ -92,7 +92,7 @@ def _fit_weights(sections: Sections, count: int) -> None:
 
 def unbound_skin(sections: Sections) -> Skin:
     """Return a skin of a file without bindings, its joints bound where they are at rest."""
-    assert sections.starts is not None  # the caller looked
+    assert sections.starts is not None  # the caller checked it
     fits = sections.joints >= 0
     joints = np.where(fits, sections.joints, 0).astype(np.int32)
     count = int(joints.max(initial=0)) + 1
@@ -107,7 +107,7 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
         source.warn("F007.skin-texcoords", sections.offsets["texcoords"])
     if mesh.uvs is None and has_texture:
         source.warn("F005.skin-texture", sections.offsets["material"])
-    # Some thousand vertices tell where the others are.
+    # A sample of a few thousand vertices is enough to locate the figure.
     some = mesh.positions[:: max(1, mesh.n_vertices // 4096)]
     # The middle value instead of np.median, which imports numpy.ma: 14 ms at the start.
     middle = len(some) // 2
@@ -148,7 +148,7 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
                     limit=n_vertices,
                     found=int(rows[row, corner]),
                 )
-            rows = mended_corners(rows, fits)
+            rows = neutral_corners(rows, fits)
         tables.append(rows)
         first += len(rows)
     return tables[0] if len(tables) == 1 else np.concatenate(tables)
@@ -156,7 +156,7 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
 
 def invert_bindings(source: Source, sections: Sections) -> Floats:
     """Return the inverse bind matrices, (J, 4, 4); refuse bindings that a float32 has none for."""
-    assert sections.bindings is not None  # the caller looked
+    assert sections.bindings is not None  # the caller checked it
     linear = sections.bindings[:, :3, :3]
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
     determinants = np.linalg.det(linear)
@@ -176,7 +176,7 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
             matrix=index,
             determinant=float(determinants[index]),
         )
-        # A joint that is where it was bound, unturned.
+        # A singular binding is replaced by its translation alone.
         inverse[flat] = translation_matrix(-bindings[flat, :3, 3])
         linear = np.where(flat[:, None, None], np.eye(3), linear)
     if len(linear):
@@ -201,7 +201,7 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
     fits = (joints >= 0) & (joints < n_joints)
     if fits.all():
         return joints, weights
-    assert sections.starts is not None  # the caller looked
+    assert sections.starts is not None  # the caller checked it
     wrong = np.flatnonzero(~fits)
     vertices = np.searchsorted(sections.starts, wrong, side="right") - 1
     vertex = int(vertices[0])
@@ -219,7 +219,7 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
 
 
 def check_weights(source: Source, skin: Skin) -> None:
-    """Warn, once each, of weights that are negative, missing, or do not add up to 1."""
+    """Warn, once each, of weights that are negative, missing, or do not sum to 1."""
     moved = has_influence(skin)
     if not moved.all():
         first = int((~moved).argmax())

@@ -1,4 +1,4 @@
-"""Where the influences of each vertex begin in a ``skinweights`` section."""
+"""Places of the vertices' influence counts in a ``skinweights`` section."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SMALL = 1 << 29  # numbers for which three times their count is an int32
 def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
     """Return the places of the vertices' counts, (V,), or None if they do not fill the block.
 
-    Each count tells where the next one is, so they can only be followed one by one. Squaring
+    Each count determines the place of the next, so they must be followed one by one. Squaring
     the map "place to next place" four times makes each step of that loop pass 16 vertices.
     """
     size = len(values)

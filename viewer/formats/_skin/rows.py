@@ -1,8 +1,8 @@
 """Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
 
-A block without faults is parsed at once. Otherwise every word is looked at: each fault is recorded,
-and NaN stands in its place. Lines mean nothing to the format, but most files have a vertex or
-triangle a line: there, one that is too short or too long costs no other.
+A block without faults is parsed at once. Otherwise every word is examined: each fault is recorded
+and replaced by NaN. Lines have no meaning in the format, but most files have one vertex or triangle
+per line, so that a line of a wrong length does not affect others.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from viewer.errors import FormatError
 from viewer.formats._numbers import parse_numbers
 from viewer.formats._skin.blocks import Block, to_whole, words_of
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, refuse_words
+from viewer.formats._words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["LOST", "OffsetOf", "read_rows", "whole_corners"]
 
 LOST = -(2**31)
-"""In place of a corner that is no whole number."""
+"""Stands for a corner that is not a whole number."""
 
 Places = NDArray[np.int64]
 OffsetOf = Callable[[int], int]
@@ -45,7 +45,7 @@ def read_rows(
     Parameters
     ----------
     source : Source
-        Takes the faults.
+        The file, which records the faults.
     block : Block
         Where the numbers are.
     count : int
@@ -67,11 +67,11 @@ def read_rows(
     Raises
     ------
     FormatError
-        If it cannot be told which numbers make a row.
+        If the rows cannot be told apart.
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
-        values.flags.writeable = False  # so that nobody has to copy it
+        values.flags.writeable = False  # so that it need not be copied
         begin, end = block.start, block.end
         return values.reshape(count, width), lambda row: source.number_offset(
             begin, end, width * row
@@ -155,7 +155,7 @@ def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int)
     Parameters
     ----------
     source : Source
-        Takes the faults.
+        The file, which records the faults.
     rows, offset_of : (T, 3), callable
         As ``read_rows`` gives them: its own faults are known.
     first : int

@@ -1,4 +1,4 @@
-"""The sections of a ``.skin`` file as arrays: what is where, before anything is judged."""
+"""Parser for the sections of a ``.skin`` file, as arrays before any check."""
 
 from __future__ import annotations
 

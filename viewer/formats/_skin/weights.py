@@ -1,7 +1,7 @@
 """The ``skinweights`` section of a ``.skin`` file.
 
 A count for each vertex, and that many pairs of joint and weight. Without faults the numbers are
-taken at once; otherwise every word is looked at, and a vertex that cannot be told has no influence.
+parsed at once; otherwise every word is examined, and an unreadable vertex gets no influence.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from viewer.formats._skin.blocks import Block, to_whole, words_of
 from viewer.formats._skin.influence_counts import find_heads
 from viewer.formats._skin.rows import OffsetOf
 from viewer.formats._source import Source
-from viewer.formats._tolerant import Words, refuse_words
+from viewer.formats._words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["read_weights"]
@@ -31,7 +31,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
     Parameters
     ----------
     source : Source
-        Takes the faults.
+        The file, which records the faults.
     block : Block
         Where the numbers are.
     count : int
@@ -42,7 +42,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
     starts : (N + 1,)
         Where the influences of each vertex begin; one that cannot be told has none.
     joints, weights : (M,)
-        Both 0 where one is no number.
+        Both 0 where either is not a number.
     offset_of : callable
         Gives the offset of a vertex.
 
@@ -140,7 +140,7 @@ def _refuse_lines(
 def _faulty_pairs(
     source: Source, words: Words, places: Places, owners: Places
 ) -> tuple[Ints, Floats]:
-    """Return joints and weights, both 0 where one is no number."""
+    """Return joints and weights, both 0 where either is not a number."""
     joints, weights = words.values[places], words.values[places + 1]
     bad = np.flatnonzero(np.isnan(np.stack([joints, weights], axis=1)).any(axis=1))
     at = np.where(np.isnan(joints[bad]), places[bad], places[bad] + 1)
@@ -173,7 +173,7 @@ def _faulty_pairs(
 def _no_influences(
     source: Source, block: Block, words: Words, known: Floats, count: int
 ) -> FormatError:
-    """Follow the counts, slowly, to where they go wrong."""
+    """Return the error of the first wrong count, found by following the counts slowly."""
     numbers = known.tolist()
     heads: list[int] = []
     position = 0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.formats._archive import Archive
-from viewer.formats._container import are_indices, finite
+from viewer.formats._archive.checking import are_indices, finite
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.rig.annotations import Keypoints
 from viewer.rig.arrays import Deferred, Floats, Ints
@@ -62,7 +62,7 @@ def model_shapes(
 
 
 def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
-    """Return what the coefficients mean where a file says so, as the bundled body does."""
+    """Return the names of the coefficients if the file has them, as the bundled body does."""
     if archive.has("shape_names"):
         values = archive.array("shape_names", (count,), "SU").values()
         used.append("shape_names")

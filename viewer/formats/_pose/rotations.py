@@ -1,4 +1,4 @@
-"""How joints are turned, as pose files say it: arrays beside the values of the DOFs."""
+"""Rotations of joints in pose files: arrays in addition to the values of the DOFs."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive import describe
+from viewer.formats._archive.values import describe
 from viewer.formats._pose.named_values import NamedValues
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.pose_transfer import JointRotations
 
-__all__ = ["KEYS", "named_turns", "read_turns"]
+__all__ = ["KEYS", "named_rotations", "read_rotations"]
 
 KEYS = (
     "joint_turns",
@@ -24,25 +24,25 @@ KEYS = (
     "dof_layout",
     "figure",
 )
-"""What is read; nothing is unless the first is there."""
+"""Keys that are read; all are ignored if the first is missing."""
 
 _UPS = ("y", "z")
-_SHORTEST = 1e-6  # of a quaternion: a shorter one says nothing
+_SHORTEST = 1e-6  # length of a quaternion; a shorter one has no reliable direction
 _LONGEST_WORD = 200  # characters
 
 
-def read_turns(named: NamedValues) -> JointRotations | None:
-    """Return the turns in a pose file, None if there are none.
+def read_rotations(named: NamedValues) -> JointRotations | None:
+    """Return the joint rotations in a pose file, None if there are none.
 
     Parameters
     ----------
     named : NamedValues
-        What it holds by name.
+        Values of the file by name.
 
     Raises
     ------
     FormatError
-        If they are incomplete or no quaternions.
+        If they are incomplete or not quaternions.
     """
     values = named.values
     if values.get("joint_turns") is None:
@@ -64,8 +64,8 @@ def read_turns(named: NamedValues) -> JointRotations | None:
     )
 
 
-def named_turns(turns: JointRotations) -> dict[str, Any]:
-    """Return turns by the names that files have for them; what is at rest is left out."""
+def named_rotations(turns: JointRotations) -> dict[str, Any]:
+    """Return joint rotations by their keys in files; transforms at rest are omitted."""
     named: dict[str, Any] = {
         "figure": printable(turns.figure, _LONGEST_WORD),
         "up": turns.up,

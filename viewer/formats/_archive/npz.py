@@ -1,4 +1,4 @@
-r"""Read ``.npz`` and ``.npy`` files: arrays only, never the objects that may be pickled in them.
+r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never the objects that are pickled in them.
 
 ::
 
@@ -6,9 +6,9 @@ r"""Read ``.npz`` and ``.npy`` files: arrays only, never the objects that may be
     npy    = "\x93NUMPY" version length header values
     header = "{" "'descr': '<f8'" "'fortran_order': False" "'shape': (6890, 3)" "}"   in any order
 
-At opening the zip directory and the headers are read, and every size is held against the others.
-Values are read when they are asked for, from the file if there is one. The header is matched by
-its grammar; numpy's own reader evaluates it as Python text, and warns about files of Python 2.
+On opening, the zip directory and the headers are read, and all sizes are compared with each other.
+Values are read on demand, from the file if there is one. The header is matched by its grammar;
+numpy's own reader evaluates it as Python code, and warns about files of Python 2.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
-from viewer.formats._archive import Archive, Opaque, Value
+from viewer.formats._archive.values import Archive, Opaque, Value
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
@@ -42,18 +42,18 @@ from viewer.rig.arrays import Deferred
 __all__ = ["array_dtype", "item_count", "open_npy", "open_npz", "shaped"]
 
 _DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
-_LONGEST_TEXT = 1 << 20  # letters in one element
+_LONGEST_TEXT = 1 << 20  # characters in one element
 _MAX_AXES = 32
-_MAX_BYTES = 1 << 60  # of an array; numpy cannot count beyond, not even where an axis is 0
-_LAST_LETTER = 0x10FFFF  # of Unicode; numpy stores 4 bytes and does not look
+_MAX_BYTES = 1 << 60  # of an array; numpy cannot count beyond, even if an axis is 0
+_LAST_LETTER = 0x10FFFF  # of Unicode; numpy stores 4 bytes without checking them
 
-_LONGEST_DIRECTORY = 2 << 20  # bytes, some 30,000 members; each takes memory when it is read
+_LONGEST_DIRECTORY = 2 << 20  # bytes, about 30,000 members, each of which takes memory
 _MAX_RATIO = 100  # of unpacked to packed size; smooth motions reach 10 to 20
-_SMALL = 64 << 20  # bytes; below that any ratio is fine, for arrays of zeros
+_SMALL = 64 << 20  # bytes; below that any ratio is accepted, for arrays of zeros
 _ENCRYPTED = 0x41  # flag bits 0 and 6
 _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
 _CHUNK = 1 << 20
-# All that Python's zipfile raises on damaged archives, found by the thousand in the tests.
+# All that Python's zipfile raises for damaged archives, as found by the mutation tests.
 _DAMAGE = (
     zipfile.BadZipFile,
     zipfile.LargeZipFile,
@@ -79,7 +79,7 @@ _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 def array_dtype(code: str) -> np.dtype[Any] | None:
     """Return a type of numbers or text in numpy's spelling, or None for all others.
 
-    Records, sub-arrays, objects, dates and what differs between machines are among those.
+    Not supported are records, sub-arrays, objects, dates and platform-dependent types.
 
     >>> array_dtype(">f4"), array_dtype("|O"), array_dtype("S0")
     (dtype('>f4'), None, None)
@@ -91,12 +91,12 @@ def array_dtype(code: str) -> np.dtype[Any] | None:
 
 
 def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
-    """Return how many elements a shape has, or None if numpy could not hold it.
+    """Return the number of elements of a shape, or None if numpy does not support it.
 
     >>> item_count((6890, 3), 8), item_count((0, 1 << 62), 8)
     (20670, None)
     """
-    # An axis of length 0 hides others that are too long.
+    # An axis of length 0 makes the product 0 even if others are too long.
     if (
         len(shape) > _MAX_AXES
         or math.prod(max(side, 1) for side in shape) > _MAX_BYTES // item_size
@@ -106,15 +106,16 @@ def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
 
 
 def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDArray[Any]:
-    """Give flat values their shape, C order and the processor's byte order; a copy if needed.
+    """Return flat values in their shape, C order and native byte order; a copy if needed.
 
     Raises
     ------
     MisfitError
-        If an element of a text is no letter.
+        If an element of a text is not a valid character.
     """
     if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
-        flat = flat.view(np.uint8) != 0  # numpy takes any byte for a truth value, then errs
+        # numpy accepts any byte as bool, and then computes wrong results.
+        flat = flat.view(np.uint8) != 0
     array = flat.reshape(shape, order="F" if is_fortran else "C")
     array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("=")).reshape(shape)
     if array.dtype.kind == "U" and array.size:
@@ -137,7 +138,7 @@ class _Header:
 
 
 class _Reader(io.BufferedReader):
-    """A file of which nobody reads much at once, as zipfile does with a directory that says so."""
+    """A file with a limit on single reads: zipfile trusts the stated size of a directory."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is None or size < 0:
@@ -150,11 +151,11 @@ class _Reader(io.BufferedReader):
 
 
 class _Storage:
-    """The file behind a source, opened anew for each reading; without one, the bytes."""
+    """The file of a source, opened anew for each read; its bytes if there is no file."""
 
     def __init__(self, source: Source) -> None:
         self.path = source.path
-        self._data = source._data  # None if nobody has read the file yet, and nobody needs to
+        self._data = source._data  # None unless the file has been read already
         self._stamp: tuple[int, int] | None = None
         try:
             status = self.path.stat()
@@ -169,7 +170,7 @@ class _Storage:
             self._data, self.size = None, self._stamp[0]
 
     def _is_in_file(self) -> bool:
-        """Return whether bytes that were read are those of the file, less closing Ctrl-Z."""
+        """Return whether the bytes are those of the file, apart from a final Ctrl-Z."""
         if self._data is None:
             return True
         with self.path.open("rb") as file:
@@ -179,7 +180,7 @@ class _Storage:
         return self._data[:_CHUNK] == head[: len(self._data)] and not rest.strip(b"\x1a")
 
     def open(self) -> IO[bytes]:
-        """Return the file as it was at the first look."""
+        """Open the file, which must be unchanged since it was first opened."""
         if self._data is not None:
             return _Reader(cast("io.RawIOBase", io.BytesIO(self._data)))
         try:
@@ -203,7 +204,7 @@ def _reason(problem: Exception) -> object:
 
 
 def open_npz(source: Source, max_size: int) -> Archive:
-    """Open an ``.npz`` file; see ``open_archive`` for what it raises.
+    """Open an ``.npz`` file; raises as ``open_archive`` does.
 
     Parameters
     ----------
@@ -224,7 +225,7 @@ def open_npz(source: Source, max_size: int) -> Archive:
 
 
 def open_npy(source: Source, max_size: int) -> Archive:
-    """Open an ``.npy`` file as an archive with the only key "arr_0"."""
+    """Open an ``.npy`` file as an archive with the single key "arr_0"."""
     key = "arr_0"
     storage = _Storage(source)
     with storage.open() as stream:
@@ -245,7 +246,7 @@ def _key(member: zipfile.ZipInfo) -> str:
 def _check_members(
     source: Source, members: list[zipfile.ZipInfo], size: int, max_size: int
 ) -> None:
-    """Refuse what could not be read, or would become too large, before anything is unpacked."""
+    """Refuse unreadable or too large members, before anything is unpacked."""
     for name, count in Counter(map(_key, members)).items():
         if count > 1:
             raise source.fault("F002.npz-twice", item=printable(name, 60), found=count)
@@ -276,7 +277,7 @@ def _open_member(storage: _Storage, archive: zipfile.ZipFile, member: zipfile.Zi
 
 
 def _read_header(storage: _Storage, key: str, stream: IO[bytes], size: int) -> _Header | Opaque:
-    """Read what comes before the values, and check that these take the rest of ``size`` bytes."""
+    """Read the header, and check that the values take the rest of ``size`` bytes."""
     lead = stream.read(8)
     layout = _LEAD.get(lead[6:8])
     if not lead.startswith(b"\x93NUMPY") or layout is None:
@@ -358,7 +359,7 @@ def _load(storage: _Storage, key: str, header: _Header, stream: IO[bytes]) -> ND
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
         raise storage.fault(key, Phrase("npy-memory", size=size)) from None
-    # Chunk by chunk, as reading at once would hold everything twice.
+    # In chunks, because reading at once would need twice the memory.
     room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
     done = 0
     while done < size:

@@ -1,10 +1,10 @@
-"""Pickles, ``.npz`` and ``.npy`` files opened as archives, as their first bytes tell."""
+"""Opening of archives: pickles, ``.npz`` and ``.npy`` files, detected by their first bytes."""
 
 from __future__ import annotations
 
 import re
 
-from viewer.formats._archive import Archive
+from viewer.formats._archive.values import Archive
 from viewer.formats._source import MAX_SIZE, Source
 
 __all__ = ["is_archive", "open_archive"]
@@ -12,7 +12,7 @@ __all__ = ["is_archive", "open_archive"]
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
-# Protocols 2 to 5 announce themselves; 0 and 1 begin with what they build.
+# Protocols 2 to 5 have a header; 0 and 1 begin with the value that they build.
 _PICKLE = re.compile(
     rb"\x80[\x02-\x05]|\(d[pqSUVX(.]|\}[q(.]|\(lp[0-9]|\][q(.]"
     rb"|c(?:__builtin__|builtins|copy_reg|collections|numpy|scipy|chumpy|os|posix|nt)[\w.]*\r?\n"
@@ -29,22 +29,22 @@ def is_archive(head: bytes) -> bool:
 
 
 def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
-    """Open a pickle, ``.npz`` or ``.npy`` file, as its first bytes tell.
+    """Open a pickle, ``.npz`` or ``.npy`` file, detected by its first bytes.
 
     Parameters
     ----------
     source : Source
-        The file. Odd but harmless things are added to its warnings.
+        The file. Harmless faults are added to its warnings.
     max_size : int
         Largest size of all members of an ``.npz`` together, unpacked, in bytes.
 
     Raises
     ------
     FormatError
-        If it is none of these, is damaged, or holds anything but data.
+        If it is none of these, is damaged, or contains anything but data.
     """
-    # Reading figures of other formats should not pay for these.
-    from viewer.formats._npz import open_npy, open_npz
+    # Imported late, so that readers of other formats do not import them.
+    from viewer.formats._archive.npz import open_npy, open_npz
     from viewer.formats._pickle.reading import open_pickle
 
     head = source.peek(4096)

@@ -1,8 +1,8 @@
-"""Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without running what is in them.
+"""Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without running code in them.
 
 A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever given to
-Python's own unpickler: ``_pickle.py`` understands the few steps that arrays and plain data take,
-and refuses all others by name. What a file holds beyond that arrives as ``Opaque``.
+Python's own unpickler: ``_pickle/`` supports the few steps needed for arrays and plain data, and
+refuses all others by name. All other values are returned as ``Opaque``.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ __all__ = [
     "describe",
 ]
 
-_MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; a mesh has far fewer vertices
+_MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; meshes have far fewer vertices
 _WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
-"""What phrases about arrays of these kinds are called."""
+"""Suffixes of the keys of phrases about arrays, by their kinds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Opaque:
-    """A value that was not evaluated, because that could run code or is of no use here.
+    """A value that was not evaluated, because that could run code or it is not needed.
 
     Attributes
     ----------
     what : Phrase
-        For a message: ``chumpy.ch_ops.add expression``, ``object array``.
+        Description for messages: ``chumpy.ch_ops.add expression``, ``object array``.
     """
 
     what: Phrase
@@ -57,18 +57,18 @@ class Sparse:
     Attributes
     ----------
     shape : (2,)
-        Rows and columns as the file declares them: compare before making anything dense.
+        Rows and columns as declared by the file, to be checked before a dense matrix is made.
     data, indices : (N,)
         Stored values, and the row (csc) or column (csr) of each.
     indptr : (columns + 1,) or (rows + 1,)
-        Where each column (csc) or row (csr) begins in ``data``.
+        Start of each column (csc) or row (csr) in ``data``.
     layout : str
         ``"csc"`` or ``"csr"``.
 
     Raises
     ------
     MisfitError
-        If the parts do not fit each other.
+        If the parts are inconsistent.
     """
 
     shape: tuple[int, int]
@@ -132,19 +132,19 @@ class Sparse:
 
 
 Plain: TypeAlias = str | bytes | int | float | bool | None
-"""What needs no further look; numpy's scalars arrive as these."""
+"""Values that need no conversion; numpy's scalars are returned as these."""
 
 Value: TypeAlias = (
     Plain | Deferred | Sparse | Opaque | list[Any] | tuple[Any, ...] | dict[str | bytes | int, Any]
 )
-"""Anything that an archive gives; containers hold more of the same."""
+"""Any value of an archive; containers hold such values again."""
 
 Axes: TypeAlias = Sequence[int | str | None]
-"""A wanted shape: per axis a number, None for any, or a letter for any but the same."""
+"""An expected shape: for each axis a size, None for any, or a letter for equal sizes."""
 
 
 class Archive:
-    """The named values of one file, each read when it is asked for.
+    """The named values of one file, each read on demand.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ class Archive:
     kind : str
         ``"pickle"``, ``"npz"`` or ``"npy"``.
     keys : tuple of str
-        In the order of the file.
+        Keys in the order of the file.
     load : callable
-        Returns the value of a key; asked once for each.
+        Returns the value of a key; called once for each.
     """
 
     def __init__(
@@ -172,13 +172,13 @@ class Archive:
     def get(self, key: str) -> Value:
         """Return a value: an array is a ``Deferred``, a matrix may be ``Sparse``.
 
-        Containers are fresh lists, tuples and dicts. What would have to be executed, or is nested
-        without end, is ``Opaque``. Arrays are read-only, in C order and the processor's byte order.
+        Containers are new lists, tuples and dicts. Values that would run code, or are nested
+        without end, are ``Opaque``. Arrays are read-only, in C order and native byte order.
 
         Raises
         ------
         FormatError
-            If there is no such key, or its value contradicts itself.
+            If there is no such key, or its value is inconsistent.
         """
         if key not in self._values:
             if key not in self.keys:
@@ -194,9 +194,9 @@ class Archive:
         key : str
             Its name in the file. Numbers in nested lists count as an array.
         shape : sequence, optional
-            Per axis a number; or None for any; or a letter for any, equal to others of its name.
+            For each axis a size, None for any, or a letter: axes with the same letter are equal.
         kinds : str
-            Letters of ``numpy.dtype.kind`` that are welcome.
+            Accepted letters of ``numpy.dtype.kind``.
 
         Raises
         ------
@@ -212,19 +212,19 @@ class Archive:
         return widened(value)
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
-        """Return a matrix as its entries, no matter whether the file holds it sparse or dense.
+        """Return a matrix in sparse form, whether the file has it sparse or dense.
 
         Parameters
         ----------
         key : str
             Its name in the file.
         shape : sequence of two, optional
-            As for ``array``; checked before anything grows to that size.
+            As for ``array``; checked before memory of that size is allocated.
 
         Raises
         ------
         FormatError
-            If it is no matrix of numbers of this shape, or holds contradictions.
+            If it is not a matrix of numbers of this shape, or is inconsistent.
         """
         value = self.get(key)
         if isinstance(value, Sparse):
@@ -239,7 +239,7 @@ class Archive:
         return Sparse(dense.shape, dense[rows, columns], columns, starts, "csr")
 
     def text(self, key: str) -> str:
-        """Return a single text, however it was written: as text, bytes, or an array of one.
+        """Return a single text, which may be stored as text, bytes, or an array of one.
 
         Raises
         ------
@@ -274,7 +274,7 @@ class Archive:
 
 
 def describe(value: Value) -> Phrase:
-    """Return what a value is, for a message.
+    """Return a description of a value for messages.
 
     >>> str(describe(Deferred((800, 3), "f4", lambda: np.zeros((800, 3)))))
     '800 x 3 float32'
@@ -322,8 +322,8 @@ def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
 
 
 def _from_lists(value: Value) -> Deferred | None:
-    """Return numbers in nested lists as an array, or None if they are none or ragged."""
-    # Nothing else is given to numpy: one long text makes all others of an array as long.
+    """Return numbers in nested lists as an array, None if they are not numbers or ragged."""
+    # Only numbers are given to numpy: one long text would make all elements as long.
     if not _is_numbers(value):
         return None
     try:

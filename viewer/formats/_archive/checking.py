@@ -1,4 +1,4 @@
-"""A source's archive, opened once, and the numbers in it, checked alike."""
+"""Checks of the arrays in an archive: finite numbers and valid indices."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
-from viewer.formats._archive import Archive
-from viewer.formats._archive_opening import open_archive
+from viewer.formats._archive.opening import open_archive
+from viewer.formats._archive.values import Archive
+from viewer.formats._neutral import held_rows, neutral_corners
 from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
-from viewer.formats._tolerant import held_rows, mended_corners
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["archive_of", "are_indices", "corners_of", "finite"]
@@ -26,11 +26,11 @@ _ROWS = {
     "joints": "row-joint",
     "frames": "row-frame",
 }
-"""What a row is, by what of a figure or motion it is."""
+"""Phrase for a row of each part of a figure or motion."""
 
 
 def archive_of(source: Source) -> Archive:
-    """Return the archive that a source is; see ``open_archive`` for what it raises."""
+    """Return the archive of a source, opened once; raises as ``open_archive`` does."""
     if source.archive is None:
         source.archive = open_archive(source, source.max_size)
     return source.archive
@@ -43,33 +43,33 @@ def finite(
     part: Part = "",
     places: NDArray[np.integer] | None = None,
 ) -> Floats:
-    """Return numbers as float64, all of them finite, on the GPU too.
+    """Return numbers as float64, all finite in double and single precision.
 
     Parameters
     ----------
     archive : Archive
-        Where they are from.
+        Archive that contains the numbers.
     key : str
-        What they are called there.
+        Their key in the archive.
     values : (N, ...)
         Any numbers.
     part : str
-        What of a figure or motion they are, see ``Diagnostic``.
+        Part of the figure or motion, see ``Diagnostic``.
     places : (N,), optional
-        Which vertex, joint or frame each row is of; its index if omitted.
+        Vertex, joint or frame of each row; the index of the row if omitted.
 
     Returns
     -------
     (N, ...)
-        Neutral values in place of what is not finite, where the file is not refused for it: NaN
-        for positions, the identity for matrices of bindings, the row before for frames, else 0.
+        Neutral values in place of invalid ones, unless the file is refused: NaN for positions, the
+        identity for matrices of bindings, the previous row for frames, otherwise 0.
 
     Raises
     ------
     FormatError
-        With the key, and the first that is not.
+        If a number is not finite; gives the key and the number.
     """
-    # Views of a pickle may begin at any address: whoever computes with one should copy it.
+    # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
     numbers = values if is_ready else values.astype(np.float64)
     # Two reductions need no memory, and NaN passes through both.
@@ -90,7 +90,7 @@ def _refuse_numbers(
     part: Part,
     places: NDArray[np.integer] | None,
 ) -> None:
-    """Record the numbers that are not finite, or beyond single precision."""
+    """Record a fault for numbers that are not finite, or beyond single precision."""
     first = np.argwhere(bad)[0].tolist()
     found = float(numbers[tuple(first)])
     rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1)) if first else np.zeros(1, np.int64)
@@ -114,30 +114,30 @@ def _with_neutral(numbers: Floats, bad: Bools, part: Part) -> Floats:
         lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
         if part == "frames":
             return held_rows(numbers, lost)
-        # Of a matrix with such a number nothing can be used: a 0 would make it another one.
+        # The whole matrix is replaced: a single 0 in it would make a different transform.
         return np.where(lost[:, None, None], np.eye(4), numbers)
     return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
 
 
 def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int) -> Ints:
-    """Return triangles whose corners are vertices: (T, 3) int32.
+    """Return triangles with valid vertex indices: (T, 3) int32.
 
     Parameters
     ----------
     archive : Archive
-        Where they are from.
+        Archive that contains the numbers.
     key : str
-        What they are called there.
+        Their key in the archive.
     values : (T, 3)
         Vertex indices.
     n_vertices : int
-        V.
+        Number of vertices, V.
 
     Raises
     ------
     FormatError
-        If an index is not from 0 to V - 1; if the file is not refused for it, it becomes another
-        corner.
+        If an index is not from 0 to V - 1; if the file is not refused, another corner of the
+        triangle replaces it.
     """
     if are_indices(values, n_vertices):
         return values.astype(np.int32)
@@ -151,11 +151,11 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
         last=n_vertices - 1,
         found=values[~fits][0],
     )
-    return mended_corners(np.where(fits, values, 0).astype(np.int64), fits)
+    return neutral_corners(np.where(fits, values, 0).astype(np.int64), fits)
 
 
 def are_indices(values: NDArray[Any], end: int) -> bool:
-    """Return whether all numbers are whole and from 0 to ``end - 1``.
+    """Return whether all numbers are integers from 0 to ``end - 1``.
 
     >>> are_indices(np.array([0.0, 2.0]), 3), are_indices(np.array([np.nan]), 3)
     (True, False)

@@ -1,0 +1,1 @@
+"""Archives of named arrays (pickles, ``.npz``, ``.npy``): opening, values and checks."""

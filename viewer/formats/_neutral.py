@@ -1,0 +1,74 @@
+"""Neutral values in place of invalid ones, so that a figure with faults can be shown."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = ["held_rows", "neutral_corners", "neutral_positions"]
+
+
+def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
+    """Return positions with each NaN vertex moved to the mean of its valid neighbours.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        NaN where a position is invalid.
+    triangles : (T, 3)
+        Triangles, whose edges connect neighbours. A vertex without valid neighbours is moved to
+        the mean of all valid vertices.
+    """
+    if not np.isnan(positions.sum()):
+        # The common case, so it must be cheap.
+        return positions
+    bad: Bools = np.isnan(positions.sum(axis=1))
+    known = positions[~bad]
+    result = positions.copy()
+    result[bad] = known.mean(axis=0) if len(known) else 0.0
+    # Each triangle edge in both directions: (ends[i], others[i]) are neighbours.
+    ends = np.concatenate([triangles, triangles[:, [1, 2, 0]]]).ravel()
+    others = np.concatenate([triangles[:, [1, 2, 0]], triangles]).ravel()
+    counts = ~bad[others] & bad[ends]
+    ends, others = ends[counts], others[counts]
+    number = np.bincount(ends, minlength=len(positions))
+    sums = [np.bincount(ends, result[others, k], minlength=len(positions)) for k in range(3)]
+    found = bad & (number > 0)
+    result[found] = np.stack(sums, axis=1)[found] / number[found, None]
+    return result
+
+
+def held_rows(rows: Floats, bad: Bools) -> Floats:
+    """Return rows with each invalid one replaced by the last valid row before it.
+
+    Parameters
+    ----------
+    rows : (N, ...)
+        Rows of a motion, in time order.
+    bad : (N,)
+        True for invalid rows. Those before the first valid row become a copy of it; if all are
+        invalid, all become 0.
+    """
+    if not bad.any():
+        return rows
+    if bad.all():
+        return np.zeros_like(rows)
+    held = np.maximum.accumulate(np.where(bad, -1, np.arange(len(rows))))
+    return rows[np.where(held < 0, int((~bad).argmax()), held)]
+
+
+def neutral_corners(corners: NDArray[np.integer], fits: Bools) -> Ints:
+    """Return triangles with each invalid corner replaced by a valid one, which leaves no area.
+
+    Parameters
+    ----------
+    corners : (T, 3)
+        Vertex indices.
+    fits : (T, 3)
+        True for indices of existing vertices. If a triangle has none, its corners become vertex 0.
+    """
+    first = corners[np.arange(len(corners)), fits.argmax(axis=1)]
+    usable = np.where(fits.any(axis=1), first, 0)
+    return np.where(fits, corners, usable[:, None]).astype(np.int32)
