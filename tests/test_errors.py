@@ -30,7 +30,9 @@ def test_format_error_begins_with_file_and_line():
 
 
 def test_format_error_shows_an_odd_path_on_one_line():
-    assert str(wrong("a\nb\udcff\x1b[0m{}%s")).startswith("a\\nb\\udcff\\x1b[0m{}%s: positions: expected")
+    assert str(wrong("a\nb\udcff\x1b[0m{}%s")).startswith(
+        "a\\nb\\udcff\\x1b[0m{}%s: positions: expected"
+    )
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from viewer.app.shown_panels import ShownPanels
 from viewer.app.window import _awaits_tooltip
 from viewer.rig.scene import Scene
 
-NOTHING_MOVES = "nothing moves: open a clip, a capture or a BVH"
+NOTHING_MOVES = "no motion: open a clip, a capture or a BVH"
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_controls_of_a_motion_act(drive, rig, tooltips):
 
 def test_gaps_can_be_filled_where_there_are_some(drive, rig):
     hand = drive(scene=people(rig, [True, False, True]), size=(1280, 800), samples=1)
-    hand.click("Fill gaps")
+    hand.click("Interpolate gaps")
     assert hand.state.clock.fill_gaps
 
 
@@ -79,20 +79,20 @@ def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
     # Nobody is missing before the first and after the last frame either.
     scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
-    hand.click("Fill gaps")
+    hand.click("Interpolate gaps")
     assert not hand.state.clock.fill_gaps
-    rest(hand, "Fill gaps")
-    assert tooltips[-1].endswith("no frame of any motion is missing")
+    rest(hand, "Interpolate gaps")
+    assert tooltips[-1].endswith("no motion has missing frames")
 
 
 def test_undo_with_nothing_to_undo_is_greyed(hand, tooltips):
     hand.click("menu Edit")
     rest(hand, "Undo")
-    assert tooltips[-1] == "nothing was changed"
+    assert tooltips[-1] == "nothing to undo"
     hand.key("escape")
     hand.drag("arm.x", 0.9)
     assert reasons.no_undo(hand.state) == ""
-    assert reasons.no_redo(hand.state) == "nothing was undone"
+    assert reasons.no_redo(hand.state) == "nothing to redo"
 
 
 def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
@@ -104,7 +104,7 @@ def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
     hand.key("escape")
     hand.click("menu File")
     rest(hand, "Export motion…")
-    assert tooltips[-1] == "captured points alone move, and no joints"
+    assert tooltips[-1] == "only captured points move, no joints"
 
 
 def test_ways_to_draw_what_is_not_there_are_greyed(drive, tooltips):
@@ -126,7 +126,7 @@ def test_texture_is_greyed_where_there_is_none(hand, tooltips):
     hand.click("Texture")
     rest(hand, "Texture")
     assert hand.state.options.texture
-    assert tooltips[-1] == "no figure here has a texture: drop a picture on the window"
+    assert tooltips[-1] == "no figure in the scene has a texture: drop a picture on the window"
 
 
 def test_texture_can_be_switched_where_there_is_one(drive):

@@ -99,7 +99,7 @@ def test_menu_without_models_says_so(hand, texts, settings):
         path.write_text(settings)
     texts.clear()
     _open_models(hand)
-    assert "none found; choose the folder where they are" in texts
+    assert "none found: choose the folder that contains them" in texts
     assert not _listed(hand) and not hand.state.error
 
 

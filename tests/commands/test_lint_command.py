@@ -31,7 +31,9 @@ def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
         f"{rig[1]}:13: warning W001: weights of 1 vertex do not sum to 1: 1.25 at vertex 1, "
         "an error of 0.25"
     )
-    assert lines[at + 1] == ("    weights do not sum to 1: normalise them (--normalize shows the effect)")
+    assert lines[at + 1] == (
+        "    weights do not sum to 1: normalise them (--normalize shows the effect)"
+    )
     assert lines[-1].endswith("in 2 files")
 
 

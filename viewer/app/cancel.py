@@ -1,4 +1,4 @@
-"""The key Esc: close or cancel what lies on top."""
+"""Action of the Esc key: close or cancel the topmost item."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["cancel"]
 
 
 def cancel(state: AppState) -> None:
-    """Close what lies on top: message, dialog, key list; else drop the selection."""
+    """Close the topmost message, dialog or key list; otherwise clear the selection."""
     files = state.of(Files)
     recording = state.of(Recording)
     keyboard = state.of(Keyboard)
@@ -35,7 +35,7 @@ def cancel(state: AppState) -> None:
         manual.topic = ""
     elif files.loader is not None:
         files.loader = None
-        state.say_status("Opening was cancelled")
+        state.say_status("Opening cancelled")
     elif state.job is not None and state.job.can_cancel:
         state.job.cancel()
         state.say_status("Cancelled")
@@ -44,15 +44,15 @@ def cancel(state: AppState) -> None:
     elif files.stream is not None:
         files.stream.cancel()
         files.stream = None
-        state.say_status("Reading was cancelled; what was read stays")
+        state.say_status("Reading cancelled; the frames read so far are kept")
     elif keyboard.is_listed:
         keyboard.is_listed = False
     elif drop_rig_tool(state):
-        state.say_status("The template is left where it is")
+        state.say_status("Template tool off")
     elif linting.chosen >= 0:
         linting.chosen = -1
     elif state.of(Weights).pinned is not None:
         unpin(state)
-        state.say_status("The vertex was unpinned")
+        state.say_status("Vertex unpinned")
     else:
         state.selected_joint = -1

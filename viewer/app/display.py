@@ -16,13 +16,13 @@ __all__ = ["NoDisplay", "find_display", "import_glfw", "window_error"]
 
 
 class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
-    """There is no display to open a window on."""
+    """Raised if there is no display to open a window on."""
 
 
 def import_glfw() -> Any:
-    """Return the module glfw, bound to the library that imgui-bundle carries.
+    """Return the module glfw, bound to the library shipped with imgui-bundle.
 
-    Two copies of GLFW in one process do not know each other's windows. imgui-bundle tells glfw
+    Two copies of GLFW in one process do not share windows. imgui-bundle tells glfw
     which one to load, so it has to be imported first.
     """
     import imgui_bundle  # noqa: F401, I001
@@ -35,17 +35,17 @@ def import_glfw() -> Any:
 
 
 def window_error(words: str) -> RenderError:
-    """Return an error that says what OpenGL this display offers, where a window was refused.
+    """Return an error with the OpenGL version of a display that refused a window.
 
     Parameters
     ----------
     words : str
-        Those of GLFW; told if the display offers nothing at all.
+        GLFW's message, used if the display offers no OpenGL at all.
     """
     glfw = import_glfw()
     glfw.default_window_hints()
     glfw.window_hint(glfw.VISIBLE, False)
-    # Any version: the newest compatibility profile, or what there is.
+    # Any version: the newest compatibility profile that there is.
     handle = glfw.create_window(64, 64, "viewer", None, None)
     if not handle:
         return RenderError(explain(words))
@@ -63,7 +63,7 @@ def find_display() -> None:
     Raises
     ------
     NoDisplay
-        In one line, with the reason.
+        With the reason in one line.
     """
     if sys.platform.startswith("linux"):
         names = ("DISPLAY", "WAYLAND_DISPLAY")

@@ -1,8 +1,8 @@
 """Orderly end of the program when the X server goes away.
 
-Xlib then leaves the process from within whatever called it, with a line of its own and exit code 1.
-It lets a program have a handler instead, which must not return: OpenGL's drivers go on with what an
-X server without a connection never answered, and crash. So the handler does all that is left to do.
+Xlib then exits the process from within whatever called it, with its own message and exit code 1.
+A program can install a handler instead, which must not return: OpenGL drivers would use replies
+that the X server never sent, and crash. So the handler does all of the clean-up.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from viewer.media.unfinished import remove_unfinished
 
 __all__ = ["stop_watching", "watch_display"]
 
-_LIBRARY = "libX11.so.6"  # the one that GLFW opens: both share its handlers
+_LIBRARY = "libX11.so.6"  # the one that GLFW loads, which shares its handlers
 _Handler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 def watch_display() -> None:
-    """End the process in the program's own way if the X server goes away, from now on.
+    """Install the handler that ends the process in order if the X server goes away.
 
-    To be called before GLFW starts: the server may go while a window is being made. It may be
-    called again.
+    Called before GLFW starts: the server may go away while a window is created. It may be
+    called repeatedly.
     """
     global _library
     if _library is None:
@@ -35,7 +35,7 @@ def watch_display() -> None:
 
 
 def stop_watching() -> None:
-    """Give Xlib back the handler that it had."""
+    """Restore Xlib's previous handler."""
     global _library
     if _library is not None:
         _library.XSetIOErrorHandler(_before.pop())
@@ -43,7 +43,7 @@ def stop_watching() -> None:
 
 
 def _leave(_: Any) -> int:
-    """Remove what is half written, say what has happened, and end."""
+    """Remove partial files, print the reason, and exit."""
     try:
         remove_unfinished()
         display = os.environ.get("DISPLAY", "")
@@ -58,14 +58,14 @@ def _leave(_: Any) -> int:
 def _open_library() -> ctypes.CDLL | None:
     try:
         library = ctypes.CDLL(_LIBRARY)
-    except OSError:  # GLFW was linked in another way
+    except OSError:  # GLFW is linked without Xlib
         return None
     library.XSetIOErrorHandler.argtypes = [_Handler]
     library.XSetIOErrorHandler.restype = _Handler
     return library
 
 
-# Xlib has one handler for the process, and calls it as long as it has it.
+# Xlib has one handler per process and may call it at any time, so it must stay alive.
 _handler = _Handler(_leave)
 _library: ctypes.CDLL | None = None
 _before: list[Any] = []

@@ -1,4 +1,4 @@
-"""The table of what features add to the window: panels and keys.
+"""Table of the panels and keys that features add to the window.
 
 A panel is a module ``<name>_panel.py`` of its feature's folder with ``draw(state)``; a key runs a
 function of the state. Both are imported when they are first used.
@@ -26,23 +26,23 @@ _STEP = "playback.actions.step"
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """What the layout must know of a panel.
+    """Entry of a panel, with what the layout needs.
 
     Attributes
     ----------
     feature : str
-        The folder with the panel's module, ``<name>_panel.py``.
+        Folder of the panel's module, ``<name>_panel.py``.
     title : str
-        Of its tab.
+        Title of its tab.
     place : str
-        At first: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
+        Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
-        A part of ``Figure`` without which the panel is left out; ``"motion"`` or ``"actors"``:
-        something that moves, or that or several actors; empty for nothing.
+        Part of ``Figure`` without which the panel is hidden; ``"motion"`` or ``"actors"``:
+        a motion, or a motion or several actors; empty for none.
     leads : bool
-        Whether it comes to the front of its tabs when a scene brings it.
+        Whether it comes to the front of its tabs when a scene makes it available.
     on_demand : bool
-        Whether it is closed until somebody asks for it.
+        Whether it is closed until the user opens it.
     """
 
     feature: str
@@ -55,20 +55,20 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Shortcut:
-    """A key and what it does.
+    """A key and its action.
 
     Attributes
     ----------
     chords : tuple of int
-        ImGui's codes of the keys, with their modifiers.
+        ImGui's key codes with their modifiers.
     label : str
-        What the key is called.
+        Name of the key.
     text : str
-        What it does, as lists of keys say it.
+        Its effect, as shown in lists of keys.
     action : str
         Module and function within ``viewer.app``; called with the state.
     arguments : tuple
-        What else it is called with.
+        Further arguments of the action.
     """
 
     chords: tuple[int, ...]
@@ -78,7 +78,7 @@ class Shortcut:
     arguments: tuple[object, ...] = ()
 
     def run(self, state: AppState) -> None:
-        """Do what the key does."""
+        """Run the action."""
         module, _, name = self.action.rpartition(".")
         getattr(import_module(f"viewer.app.{module}"), name)(state, *self.arguments)
 
@@ -100,11 +100,11 @@ PANELS = {
     "timeline": Panel("playback", "Timeline", "bottom", needs="motion", leads=True),
     "curves": Panel("curves", "Curves", "bottom", needs="motion"),
 }
-"""In the order in which they are docked and listed in the menu."""
+"""Panels in the order in which they are docked and listed in the menu."""
 
 KEYS = (
     Shortcut((_K.r,), "R", "reset every DOF to the file's pose", "posing.pose_actions.reset_pose"),
-    Shortcut((_K.s,), "S", "skeleton on or off", "view.display_actions.toggle_skeleton"),
+    Shortcut((_K.s,), "S", "show or hide the skeleton", "view.display_actions.toggle_skeleton"),
     Shortcut(
         (_K.k,),
         "K",
@@ -115,10 +115,10 @@ KEYS = (
     Shortcut((_K.n,), "N", "vertex normals", _OPTION, ("normals", "Vertex normals")),
     Shortcut((_K.t,), "T", "texture", _OPTION, ("texture", "Texture")),
     Shortcut((_K.g,), "G", "ground grid", _OPTION, ("grid", "Grid")),
-    Shortcut((_K.a,), "A", "rigged mesh or as it was (A/B)", "rigging.results.switch_version"),
-    Shortcut((_K.b,), "B", "x-ray: bones through the skin", _OPTION, ("xray", "X-ray")),
-    Shortcut((_K.j,), "J", "names of joints", _OPTION, ("joint_names", "Joint names")),
-    Shortcut((_SHIFT | _K.j,), "Shift+J", "axes of joints", _OPTION, ("joint_axes", "Joint axes")),
+    Shortcut((_K.a,), "A", "rigged or original mesh (A/B)", "rigging.results.switch_version"),
+    Shortcut((_K.b,), "B", "x-ray: skeleton through the skin", _OPTION, ("xray", "X-ray")),
+    Shortcut((_K.j,), "J", "joint names", _OPTION, ("joint_names", "Joint names")),
+    Shortcut((_SHIFT | _K.j,), "Shift+J", "joint axes", _OPTION, ("joint_axes", "Joint axes")),
     Shortcut((_K.v,), "V", "weights of the selected joint", "weights.actions.toggle_weights"),
     Shortcut((_K.f,), "F", "fit the view", "view.camera_actions.fit_view"),
     Shortcut((_K._1, _K.keypad1), "1", "front view", _LOOK, ("front",)),
@@ -132,14 +132,14 @@ KEYS = (
     ),
     Shortcut((_K.tab,), "Tab", "hide or show the panels", "window_actions.toggle_panels"),
     Shortcut((_K.h, _SHIFT | _K.slash, _K.f1), "H or ?", "this list", "window_actions.toggle_keys"),
-    Shortcut((_CTRL | _K.m,), "Ctrl+M", "all messages so far", "window_actions.toggle_messages"),
+    Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", "window_actions.toggle_messages"),
     Shortcut((_K.f12,), "F12", "save a screenshot", "window_actions.want", ("screenshot",)),
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", "window_actions.want", ("open dialog",)),
     Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", "core.undo.undo"),
     Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo.redo"),
-    Shortcut((_K.q,), "Q", "tool Select: click chooses", _TOOL, ("select",)),
-    Shortcut((_K.e,), "E", "tool Rotate: turn the selected joint", _TOOL, ("rotate",)),
-    Shortcut((_K.d,), "D", "tool Move: drag a joint (IK)", _TOOL, ("move",)),
+    Shortcut((_K.q,), "Q", "Select tool: click selects", _TOOL, ("select",)),
+    Shortcut((_K.e,), "E", "Rotate tool: rotate the selected joint", _TOOL, ("rotate",)),
+    Shortcut((_K.d,), "D", "Move tool: drag a joint (IK)", _TOOL, ("move",)),
     Shortcut((_K.x,), "X", "local, parent or world axes", "posing.tool_actions.next_orientation"),
     Shortcut((_K.m,), "M", "mirror the pose left to right", "posing.pose_actions.mirror"),
     Shortcut((_CTRL | _K.c,), "Ctrl+C", "copy the pose", "posing.pose_actions.copy_pose"),
@@ -152,28 +152,28 @@ KEYS = (
     Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", "posing.pose_actions.paste_pose"),
     Shortcut((_K.space,), "Space", "play or pause", "playback.actions.play"),
     Shortcut((_K.left_arrow,), "Left", "one frame back", _STEP, (-1,)),
-    Shortcut((_K.right_arrow,), "Right", "one frame on", _STEP, (1,)),
+    Shortcut((_K.right_arrow,), "Right", "one frame forward", _STEP, (1,)),
     Shortcut((_SHIFT | _K.left_arrow,), "Shift+Left", "ten frames back", _STEP, (-10,)),
-    Shortcut((_SHIFT | _K.right_arrow,), "Shift+Right", "ten frames on", _STEP, (10,)),
+    Shortcut((_SHIFT | _K.right_arrow,), "Shift+Right", "ten frames forward", _STEP, (10,)),
     Shortcut(
         (_K.home,), "Home", "first frame of the range", "playback.actions.go_to_end", (False,)
     ),
     Shortcut((_K.end,), "End", "last frame of the range", "playback.actions.go_to_end", (True,)),
-    Shortcut((_K.i,), "I", "the range starts here", "playback.actions.range_in"),
-    Shortcut((_K.o,), "O", "the range ends here", "playback.actions.range_out"),
-    Shortcut((_K.escape,), "Esc", "close what is on top", "cancel.cancel"),
+    Shortcut((_K.i,), "I", "start the range here", "playback.actions.range_in"),
+    Shortcut((_K.o,), "O", "end the range here", "playback.actions.range_out"),
+    Shortcut((_K.escape,), "Esc", "close the topmost dialog", "cancel.cancel"),
     Shortcut((_CTRL | _K.q,), "Ctrl+Q", "quit", "window_actions.want", ("quit",)),
 )
-"""In the order in which they are listed."""
+"""Keys in the order in which they are listed."""
 
 MOUSE = (
-    ("Click", "choose an actor or joint"),
+    ("Click", "select an actor or joint"),
     ("Double click", "aim the camera there"),
-    ("Alt click", "why is this vertex here"),
+    ("Alt click", "explain this vertex"),
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),
-    ("Alt drag of the time", "between whole frames"),
+    ("Alt drag of the time line", "go between whole frames"),
     ("Drop files", "open them"),
 )
 """Actions of the mouse, listed with the keys."""

@@ -1,4 +1,4 @@
-"""One frame, whatever shows it: interface, input, scene, and both drawn into a framebuffer."""
+"""One frame of the window or of a headless run: interface, input and scene, drawn together."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ from viewer.rig.scene import Actor, Scene
 __all__ = ["Frame"]
 
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
-"""Suffixes of poses and pictures, which are applied to the figure that is open."""
+"""Suffixes of poses and pictures, which are applied to the open figure."""
 
 
 class Frame:
-    """Draws frames of one state with one context; ImGui's frame is begun by the caller.
+    """Draws frames of one state with one context; the caller begins ImGui's frame.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Frame:
     context : moderngl.Context
         Current in this thread.
     wake : callable
-        Called from other threads when there is something to draw.
+        Called from other threads when a frame must be drawn.
     keeps_recent : bool
         Whether opened files are remembered for the next run.
     """
@@ -86,7 +86,7 @@ class Frame:
         Parameters
         ----------
         framebuffer : moderngl.Framebuffer
-            The window's, or one that stands for it.
+            The window's or the headless one.
         size : (int, int)
             Its width and height in pixels.
         scale : float
@@ -98,7 +98,7 @@ class Frame:
         self.state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
 
     def run(self, scale: float) -> None:
-        """Do all of a frame but the painting of its panels, which only a screen needs."""
+        """Run a frame without painting its panels, which only a screen needs."""
         state = self.state
         drop_motion_before_press()
         if not stops_time(state):
@@ -116,7 +116,7 @@ class Frame:
         self._do_wanted()
         self._take_loaded()
         self._work()
-        # Edits are kept before the clock poses the scene, which is no edit.
+        # Edits are recorded before the clock poses the scene, which is not an edit.
         state.history.observe(state.scene, state.options, is_held(state))
         self._take_streamed()
         if state.clock.pose(state.actor):
@@ -130,14 +130,14 @@ class Frame:
         imgui.render()
 
     def paint(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> None:
-        """Paint the panels of the frame that was run last, and the scene behind them."""
+        """Paint the panels of the last frame, and the scene behind them."""
         framebuffer.use()
         self.context.viewport = (0, 0, *size)
         framebuffer.clear(0.10, 0.11, 0.12, 1.0)
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
     def _work(self) -> None:
-        """Go on with what takes longer than a frame, and say how it ended."""
+        """Advance jobs that take longer than a frame, and report how they ended."""
         state, job = self.state, self.state.job
         if job is None:
             return
@@ -148,7 +148,7 @@ class Frame:
             state.error = job.error or state.error
 
     def _take_streamed(self) -> None:
-        """Add what was read of captures since the last frame."""
+        """Add the parts of captures read since the last frame."""
         state, files = self.state, self.state.of(Files)
         stream = files.stream
         if stream is None:
@@ -168,7 +168,7 @@ class Frame:
                 state.error = stream.error
 
     def _add_actors(self, actors: Sequence[Actor]) -> None:
-        """Take in actors, and clips that grew, as captures are read."""
+        """Add actors and longer clips as captures are read."""
         state = self.state
         state.scene.actors += actors
         state.clock.pose(state.actor, again=True)
@@ -176,7 +176,7 @@ class Frame:
         state.history.follow(state.clock.time)
 
     def _draw_scene(self, scale: float) -> None:
-        """Draw the scene if anything about it changed, and put it behind the panels."""
+        """Draw the scene if anything about it changed, and show it behind the panels."""
         state = self.state
         x, y, width, height = state.view_rect
         size = (round(width * scale), round(height * scale))
@@ -186,7 +186,7 @@ class Frame:
         renderer.annotations = pinned_annotations(state, size)
         key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         if key != self._drawn:
-            self._drawn = key  # also if it fails: not again before something has changed
+            self._drawn = key  # even if it fails: no retry until something changes
             self._draw_target(size)
         if self.target is not None:
             picture = imgui.ImTextureRef(self.target.texture.glo)
@@ -201,7 +201,7 @@ class Frame:
                 draw_hints(state)
 
     def _draw_target(self, size: tuple[int, int]) -> None:
-        """Draw the scene; what the driver refuses becomes a message, and the window stays."""
+        """Draw the scene; if the driver fails, show a message and keep the window open."""
         state = self.state
         try:
             target = self._target(size)
@@ -230,9 +230,9 @@ class Frame:
         return target
 
     def open(self, paths: Sequence[Path]) -> None:
-        """Begin to read files; the present scene stays until they have been read.
+        """Begin to read files; the current scene stays until they have been read.
 
-        A skin dropped on a lone skeleton, or the other way round, joins it if they fit.
+        A skin dropped on a lone skeleton, or the reverse, is attached to it if they fit.
         """
         if not paths:
             return
@@ -249,7 +249,7 @@ class Frame:
         state.of(Files).loader = Loader(paths, attempts, self.wake, opened=opened)
 
     def _take_loaded(self) -> None:
-        """Show what was read, or say why it was not."""
+        """Show the files that were read, or the error."""
         state, loader = self.state, self.state.of(Files).loader
         if loader is None or not loader.is_done:
             return
@@ -282,7 +282,7 @@ class Frame:
                 state.say(problem_text)
 
     def stream(self, builders: Sequence[Builder]) -> None:
-        """Read on what is left of captures."""
+        """Begin to read the rest of captures."""
         left = [builder for builder in builders if not builder.is_done]
         self.state.of(Files).stream = Stream(left, self.wake) if left else None
 
@@ -314,7 +314,7 @@ class Frame:
         state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
 
     def _start_recording(self) -> None:
-        """Begin to record if that is wanted and nothing else goes on."""
+        """Begin to record if asked for and no other job runs."""
         state, recording = self.state, self.state.of(Recording)
         path, settings, recording.wanted = recording.wanted, recording.settings, None
         if path is None or settings is None or state.job is not None:
@@ -332,9 +332,9 @@ class Frame:
             path = free_path(Path.cwd(), self.state.scene.title, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
-            if "##legend" in self.state.item_rects:  # over the picture, not in it
+            if "##legend" in self.state.item_rects:  # drawn over the picture, not in it
                 self.state.say(
-                    "The legend is not in it: Legend in pictures (panel Weights) does that"
+                    "Saved without the legend: turn on Legend in pictures in the Weights panel"
                 )
         except ViewerError as problem:
             self.state.error = str(problem)
@@ -342,13 +342,13 @@ class Frame:
             self.state.error = f"the current folder: {problem.strerror}"
 
     def scene_picture(self) -> Bytes:
-        """Return the scene as it was drawn last, without panels: (H, W, 4) uint8."""
+        """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
         return self.target.read()
 
     def release(self) -> None:
-        """Free everything that was made for drawing; what goes on beside ends."""
+        """Release all GL objects, and end background work."""
         for work in (self.state.job, self.state.of(Files).stream):
             if work is not None:
                 work.cancel()

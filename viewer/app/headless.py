@@ -1,4 +1,4 @@
-"""The whole interface without a window: pictures with panels, and tests with synthetic input."""
+"""Interface without a window, for pictures with panels and for tests with synthetic input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["HeadlessApp"]
 
-_SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to come to rest
+_SETTLE_FRAMES = 3  # docking and automatic sizes take two frames to settle
 
 
 class HeadlessApp:
@@ -27,13 +27,13 @@ class HeadlessApp:
     state : AppState
         What is shown and changed.
     size : (int, int)
-        Of the window that there is not, in window coordinates.
+        Size of the imaginary window, in window coordinates.
     device : int, optional
         Index of the EGL device.
     scale : float
         Size of the interface.
     pixels_per_point : float
-        As on a HiDPI screen: the framebuffer is this much larger than the window.
+        Framebuffer pixels per window coordinate, as on a HiDPI screen.
     """
 
     def __init__(
@@ -60,32 +60,32 @@ class HeadlessApp:
         self.frame = Frame(state, self.context)
 
     def step(self, frames: int = 1) -> None:
-        """Run frames, a sixtieth of a second each; input is what was queued in ImGui's io.
+        """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io.
 
-        Panels are painted when ``pixels`` asks for them: in software that takes longer than all
-        else of a frame.
+        Panels are painted only for ``pixels``: in software that takes longer than the
+        rest of a frame.
         """
         self._make_current()
         for _ in range(frames):
             imgui.get_io().delta_time = 1.0 / 60.0
             imgui.backends.opengl3_new_frame()
             imgui.new_frame()
-            self.screen.framebuffer.use()  # without one, drawing and picking are errors
+            self.screen.framebuffer.use()  # drawing and picking need a bound framebuffer
             self.frame.run(self.pixels_per_point)
             _upload_textures()
 
     def _make_current(self) -> None:
-        """Take this thread's OpenGL: another context may have been used since."""
+        """Make this context current: another one may have been used since."""
         self.context.__enter__()  # type: ignore[no-untyped-call]
 
     def pixels(self) -> Bytes:
-        """Return the interface as the last frame left it, (H, W, 4) uint8."""
+        """Return the interface as of the last frame, (H, W, 4) uint8."""
         self._make_current()
         self.frame.paint(self.screen.framebuffer, self.screen.size)
         return self.screen.read()
 
     def picture(self, fits: bool = True) -> Bytes:
-        """Return the whole interface as pixels, (H, W, 4) uint8, the view fitted to its room.
+        """Return the whole interface as pixels, (H, W, 4) uint8, with the camera fitted.
 
         Messages do not time out, however long drawing takes.
         """
@@ -101,7 +101,7 @@ class HeadlessApp:
         return pixels
 
     def release(self) -> None:
-        """Free everything, the context too."""
+        """Release everything, including the context."""
         self._make_current()
         imgui.backends.opengl3_shutdown()
         implot.destroy_context(self._implot)
@@ -118,7 +118,7 @@ class HeadlessApp:
 
 
 def _upload_textures() -> None:
-    """Do what painting does first: give ImGui the textures of letters that it has asked for."""
+    """Upload the glyph textures that ImGui has requested, as painting would do first."""
     for texture in imgui.get_platform_io().textures:
         if texture.status != imgui.ImTextureStatus.ok:
             # Not in the stubs of imgui-bundle.

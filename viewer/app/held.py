@@ -1,4 +1,4 @@
-"""Widgets and handles that are held with the mouse: edits and drags that go on."""
+"""State of widgets and handles held with the mouse: edits and drags in progress."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["is_held", "stops_time"]
 
 
 def is_held(state: AppState) -> bool:
-    """Return whether an edit is going on: a widget or a handle is held."""
+    """Return whether an edit is in progress: a widget or a handle is held."""
     drag = state.of(Posing).drag
     is_dragged = drag is not None and not drag.is_over
     moves_template = state.of(Rigging).holds_mouse and imgui.is_mouse_down(imgui.MouseButton_.left)
@@ -20,9 +20,9 @@ def is_held(state: AppState) -> bool:
 
 
 def stops_time(state: AppState) -> bool:
-    """Return whether time waits: a handle is held that has not been dragged yet.
+    """Return whether time must wait: a handle is held but not dragged yet.
 
-    A click must not pause, and the pose in which a drag began must stay.
+    A click must not pause playback, and a drag must keep its initial pose.
     """
     drag = state.of(Posing).drag
     return drag is not None and not drag.has_moved

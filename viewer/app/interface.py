@@ -1,4 +1,4 @@
-"""One frame of the interface: menu, docked panels, what lies over them. Changes AppState only."""
+"""One frame of the interface: menu, docked panels and overlays. Changes AppState only."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ __all__ = ["draw_interface"]
 
 _DOCK = "viewer dock"
 _LEFT, _RIGHT = (0.235, 0.30, 14.0), (0.27, 0.36, 17.0)
-"""Usual and largest share of the window's width, and the letters' heights wanted across."""
+"""Usual and largest fraction of the window's width, and the minimum width in font sizes."""
 _BOTTOM, _LOWEST = 0.2, 10.0
-"""Share of the window's height for what lies at the bottom, and the letters' heights it wants."""
+"""Fraction of the window's height for bottom panels, and the minimum height in font sizes."""
 
 
 def draw_interface(state: AppState) -> list[Path]:
-    """Draw everything but the scene; return files that a menu asked to open."""
+    """Draw everything but the scene; return files to open from a menu."""
     state.item_rects.clear()
     if state.panels_visible:
         chosen = draw_menus(state)
@@ -36,7 +36,7 @@ def draw_interface(state: AppState) -> list[Path]:
                 appears = _draw_panel(state, name, panel)
                 leading = panel.title if appears and panel.leads else leading
         if leading:
-            # Behind the panels drawn later, a menu that closes would bring one of those forward.
+            # Drawn before the panels, a closing menu would bring one of them to the front.
             imgui.set_window_focus(leading)
         node = imgui.internal.dock_builder_get_central_node(dock)
         state.view_rect = (node.pos.x, node.pos.y, node.size.x, node.size.y)
@@ -52,7 +52,7 @@ def draw_interface(state: AppState) -> list[Path]:
 
 
 def _draw_dock(state: AppState) -> int:
-    """Draw the dock space, with the first layout if none was remembered."""
+    """Draw the dock space, with the default layout if none was stored."""
     shown = state.of(ShownPanels)
     dock = imgui.get_id(_DOCK)
     is_new = imgui.internal.dock_builder_get_node(dock) is None
@@ -95,7 +95,7 @@ def _build_layout(dock: int) -> None:
 
 
 def _share(side: tuple[float, float, float]) -> float:
-    """Return a side's share of the width: the usual one, or more if the window is narrow."""
+    """Return a side's fraction of the width: the usual one, or more if the window is narrow."""
     usual, largest, wanted = side
     width = max(imgui.get_main_viewport().size.x, 1.0)
     return max(usual, min(largest, wanted * imgui.get_font_size() / width))
@@ -113,18 +113,18 @@ def _dock_of_neighbour(panel: Panel) -> int:
 
 
 def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
-    """Draw one panel; return whether it was not there before."""
-    # A panel that comes with a figure does not push itself in front of the others.
+    """Draw one panel; return whether it is new."""
+    # A panel that appears with a figure must not cover the others.
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
     neighbour = _dock_of_neighbour(panel)
     if neighbour:
-        # A panel that is newer than the layout that was remembered would float over the others.
+        # A panel newer than the stored layout would float over the others.
         imgui.set_next_window_dock_id(neighbour, imgui.Cond_.first_use_ever)
     shown, stays = imgui.begin(panel.title, True, flags)
     appears = imgui.is_window_appearing()
     if shown:
-        # Labels stand right of their widgets and must not be cut off.
+        # Labels are to the right of their widgets and must not be clipped.
         imgui.push_item_width(-7.5 * imgui.get_font_size())
         panel_module(name).draw(state)
         imgui.pop_item_width()

@@ -1,4 +1,4 @@
-"""The keyboard: keys that were pressed run what the table of features says."""
+"""Keyboard input: pressed keys run the actions of the table of features."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from viewer.app.files.state import Files
 
 __all__ = ["Keyboard", "handle_keys"]
 
-_REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # go on while they are held
-_ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog lies over everything
+_REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # repeat while held
+_ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog is open
 
 
 @dataclass(slots=True)
 class Keyboard:
-    """What is kept of the keyboard.
+    """State of the keyboard.
 
     Attributes
     ----------
     is_listed : bool
         Whether the list of keys is shown.
     modifiers : int
-        Ctrl, Shift and so on in the frame before, as ImGui's bits.
+        Modifiers in the previous frame, as ImGui's bits.
     """
 
     is_listed: bool = False
@@ -33,12 +33,12 @@ class Keyboard:
 
 
 def handle_keys(state: AppState) -> None:
-    """Run what was pressed in this frame; letters typed into a text box do nothing here."""
-    # ImGui would move the focus with Tab: the key belongs to us.
+    """Run the actions of keys pressed in this frame; letters typed into a text box are ignored."""
+    # Otherwise ImGui would move the focus with Tab.
     keyboard = state.of(Keyboard)
     imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
-    # A quick hand lets go of Ctrl within the frame in which the letter goes down: what was held
-    # in the frame before still counts, or Ctrl+S would be S.
+    # Ctrl may be released within the frame in which the letter goes down: modifiers held
+    # in the previous frame still count, or Ctrl+S would be S.
     now = imgui.get_io().key_mods
     held, keyboard.modifiers = now | keyboard.modifiers, now
     if imgui.get_io().want_text_input:
@@ -54,7 +54,7 @@ def handle_keys(state: AppState) -> None:
 
 
 def _close_menus() -> bool:
-    """Close an open menu or list; return whether there was one. Messages close by themselves."""
+    """Close an open menu or list; return whether there was one. Messages handle Esc themselves."""
     any_popup = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
     has_modal = imgui.internal.get_top_most_popup_modal() is not None
     if has_modal or not imgui.is_popup_open("", any_popup):
@@ -64,7 +64,7 @@ def _close_menus() -> bool:
 
 
 def _is_pressed(chord: int, held: int) -> bool:
-    """Return whether a key went down with exactly the modifiers of the chord."""
+    """Return whether a key was pressed with exactly the modifiers of the chord."""
     modifiers = chord & imgui.Key.mod_mask_
     key = imgui.Key(chord & ~modifiers)
     return held == modifiers and imgui.is_key_pressed(key, key in _REPEATED)

@@ -1,4 +1,4 @@
-"""The list of keys over the window: in columns where it is low, scrolled where it is small."""
+"""List of keys over the window: in columns if it is low, scrolled if it is small."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from viewer.app.keys import Keyboard
 
 __all__ = ["draw_keys"]
 
-_COLOR = (1.0, 0.78, 0.45, 1.0)  # of keys
-_OPACITY = 0.97  # of the list: what lies behind must not be read with it
-_GAP, _BETWEEN = 1.5, 3.0  # heights of letters: from a key to its words, from column to column
+_COLOR = (1.0, 0.78, 0.45, 1.0)  # columns of keys
+_OPACITY = 0.97  # opacity of the list: text behind it must not show through
+_GAP, _BETWEEN = 1.5, 3.0  # in font sizes: from a key to its text, from column to column
 
 
 class _Columns(NamedTuple):
-    """How many columns the list has, how many lines each, and whether all can be seen."""
+    """Number of columns, rows of each, and whether all of the list fits."""
 
     number: int
     rows: int
@@ -28,7 +28,7 @@ class _Columns(NamedTuple):
 
 
 def draw_keys(state: AppState) -> None:
-    """Draw the list if it is wanted; the wheel moves what a small window has no room for."""
+    """Draw the list if it is open; the wheel scrolls it in a small window."""
     if not state.of(Keyboard).is_listed:
         return
     lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
@@ -53,7 +53,7 @@ def draw_keys(state: AppState) -> None:
 
 
 def _flags(fits: bool) -> int:
-    """Return the flags of a window that takes input only if it has to be scrolled."""
+    """Return the flags of a window that takes input only if it scrolls."""
     flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
     flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.always_auto_resize
     flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
@@ -64,7 +64,7 @@ def _flags(fits: bool) -> int:
 
 
 def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
-    """Return as few columns as there is height for, and no more than there is width for.
+    """Return the fewest columns that fit the height, at most as many as fit the width.
 
     >>> _columns(50, (1000, 600), (400, 20)), _columns(50, (1000, 400), (400, 20))
     (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))
@@ -78,7 +78,7 @@ def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -
 def _draw_lines(
     lines: Sequence[tuple[str, str]], columns: _Columns, first: float, column: float
 ) -> None:
-    """Write the lines column by column; a key and its words are one line."""
+    """Write the lines column by column; a key and its text are one line."""
     left, top = imgui.get_cursor_pos()
     step = imgui.get_text_line_height_with_spacing()
     for index, (label, text) in enumerate(lines):

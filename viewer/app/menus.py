@@ -1,4 +1,4 @@
-"""The menus: files, edits, panels, help."""
+"""Menu bar: File, Edit, View, Window and Help."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ __all__ = ["draw_menus"]
 
 
 def draw_menus(state: AppState) -> list[Path]:
-    """Draw the menu bar; return files that were asked for."""
+    """Draw the menu bar; return files to open."""
     keyboard = state.of(Keyboard)
     chosen: list[Path] = []
     if not imgui.begin_main_menu_bar():
@@ -119,7 +119,7 @@ def _draw_file_menu(state: AppState) -> list[Path]:
 
 
 def _draw_models(state: AppState) -> list[Path]:
-    """Draw the models of the model folder, looked for when the menu opens."""
+    """Draw the models of the model folder, searched when the menu opens."""
     files = state.of(Files)
     if imgui.is_window_appearing():
         folder = load_model_folder()
@@ -131,7 +131,7 @@ def _draw_models(state: AppState) -> list[Path]:
         if imgui.is_item_hovered():
             imgui.set_tooltip(printable(path, 200))
     if not files.models:
-        imgui.text_disabled("none found; choose the folder where they are")
+        imgui.text_disabled("none found: choose the folder that contains them")
     imgui.separator()
     if menu_item(state, "Choose model folder…"):
         start = load_model_folder() or folder_of(state.paths)

@@ -1,4 +1,4 @@
-"""The window "Messages", with everything that was said, and the message that something failed."""
+"""The window "Messages" with the message log, and the dialog for errors."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from viewer.errors import printable
 
 __all__ = ["draw_error", "draw_message_window"]
 
-_ERROR_TITLE = "This did not work"
+_ERROR_TITLE = "Error"
 _TITLE = "Messages"
 _SIZE = (42.0, 22.0)  # letters' heights
 _ERROR_COLOR = (1.0, 0.5, 0.42, 1.0)
-_LONGEST = 1000  # characters shown of one message
+_LONGEST = 1000  # longest message shown, characters
 
 
 def draw_message_window(state: AppState) -> None:
@@ -40,17 +40,17 @@ def draw_message_window(state: AppState) -> None:
 
 def _draw_content(state: AppState) -> None:
     listed = state.messages.log.listed(state.messages.lists_status)
-    if button(state, "Copy all", "" if listed else "nothing was said yet"):
+    if button(state, "Copy all", "" if listed else "no messages yet"):
         imgui.set_clipboard_text("\n".join(map(message_line, listed)))
-    explain("to the clipboard, a line each")
-    text = "What keys and buttons did"
+    explain("to the clipboard, one per line")
+    text = "Results of keys and buttons"
     same_line_if_room(text)
     state.messages.lists_status = checkbox(state, text, state.messages.lists_status)
     if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
-        # New messages come at the end, which stays in view unless one has scrolled away from it.
+        # New messages come at the end, which stays in view unless the user scrolls away.
         follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
         if not listed:
-            imgui.text_disabled("nothing was said yet")
+            imgui.text_disabled("no messages yet")
         for message in listed:
             _draw_message(message)
         if follows:
@@ -68,7 +68,7 @@ def _draw_message(message: Message) -> None:
 
 
 def draw_error(state: AppState) -> None:
-    """Draw the message that something did not work, over everything, if there is one."""
+    """Draw the error dialog over everything, if there is an error."""
     state.messages.log_error(state.error)
     if not state.error:
         return

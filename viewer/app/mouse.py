@@ -1,4 +1,4 @@
-"""The mouse in the view: orbit, pan, zoom; a click chooses, a double click aims."""
+"""Mouse input in the view: orbit, pan, zoom; a click selects, a double click aims."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ _BUTTONS = (_LEFT, imgui.MouseButton_.right, imgui.MouseButton_.middle)
 
 
 def drop_motion_before_press() -> None:
-    """Take the way that the pointer came to the place of a press out of this frame's motion.
+    """Remove the pointer's motion before a press from this frame's motion.
 
-    ImGui hands a motion and the press after it over in one frame. Whatever drags by the frame's
-    motion, as plots do, would begin with a leap. To be called before anything is drawn.
+    ImGui reports a motion and the press after it in one frame. Whatever drags by the frame's
+    motion, as plots do, would begin with a jump. Called before anything is drawn.
     """
     io = imgui.get_io()
     clicked = [button for button in _BUTTONS if imgui.is_mouse_clicked(button)]
     held = [button for button in _BUTTONS if imgui.is_mouse_down(button)]
-    if clicked and clicked == held:  # what an earlier press drags goes on
+    if clicked and clicked == held:  # a drag of an earlier press continues
         io.mouse_delta = imgui.ImVec2(0.0, 0.0)
 
 
 def handle_mouse(state: AppState) -> None:
-    """Move the camera by what the mouse did in this frame outside all panels."""
+    """Move the camera by the mouse input of this frame outside all panels."""
     picking = state.of(Picking)
     io = imgui.get_io()
     x, y, width, height = state.view_rect
@@ -44,7 +44,7 @@ def handle_mouse(state: AppState) -> None:
     dragging = [button for button in _BUTTONS if _drags(button)]
     delta = io.mouse_delta
     if (dragging and (delta.x or delta.y)) or io.mouse_wheel:
-        state.camera.fixed = None  # go on from where the calibrated camera stands
+        state.camera.fixed = None  # continue from the calibrated camera's place
     if dragging and (dragging != [_LEFT] or io.key_shift):
         pan(state.camera, -delta.x / height, delta.y / height)
     elif dragging:
@@ -65,15 +65,15 @@ def handle_mouse(state: AppState) -> None:
 
 
 def _drags(button: imgui.MouseButton_) -> bool:
-    """Return whether the way that the pointer came since the last frame belongs to a drag."""
+    """Return whether the pointer's motion since the last frame belongs to a drag."""
     if imgui.is_mouse_clicked(button):
-        return False  # it came that way before the button went down
-    # A quick hand moves and lets go within one frame: that way belongs to the drag as well.
+        return False  # it moved before the button went down
+    # A move and a release within one frame belong to the drag as well.
     return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)
 
 
 def _is_click() -> bool:
-    """Return whether the button that went up had not been dragged, nor clicked twice."""
+    """Return whether a button was released without a drag or a double click."""
     io, left = imgui.get_io(), _LEFT
     is_still = io.mouse_drag_max_distance_sqr[left] < io.mouse_drag_threshold**2
     return is_still and io.mouse_clicked_last_count[left] < 2 and not io.key_shift

@@ -1,6 +1,6 @@
-"""Overlays of the view: progress, messages, the list of keys, and the hints in its corner.
+"""Overlays of the view: progress, messages, the list of keys, and hints in a corner.
 
-None covers another: the legend of colours is at the top left, progress at the top beside it or
+They do not overlap: the legend of colours is at the top left, progress at the top beside it or
 below it, and messages grow from the bottom up to whatever is above them.
 """
 
@@ -33,7 +33,7 @@ _LONGEST_NOTE = 400  # characters
 
 
 def draw_overlays(state: AppState) -> None:
-    """Draw all of them but the hints, which lie behind the panels."""
+    """Draw all overlays but the hints, which lie behind the panels."""
     legend = draw_legend(state)
     tools = draw_toolbar(state, legend)
     progress = _draw_progress(state, legend, tools)
@@ -43,9 +43,9 @@ def draw_overlays(state: AppState) -> None:
 
 
 def draw_hints(state: AppState) -> None:
-    """Say what the grid measures and where the keys are listed, in the corner of the view.
+    """Draw the hints about the grid's spacing and the list of keys, in a corner of the view.
 
-    Drawn behind the panels like the picture of the scene, so it has to come after that.
+    Drawn behind the panels like the picture of the scene, so it must come after that.
     """
     x, y, width, height = state.view_rect
     grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
@@ -59,7 +59,7 @@ def draw_hints(state: AppState) -> None:
 
 
 class _Progress(NamedTuple):
-    """What is said of work that goes on; a negative share is a bar that moves."""
+    """Progress of a job; a negative fraction means an indeterminate bar."""
 
     title: str
     share: float
@@ -69,7 +69,7 @@ class _Progress(NamedTuple):
 
 
 def _progress(state: AppState) -> _Progress | None:
-    """Return what is going on, if anything is."""
+    """Return the progress of the current job, if there is one."""
     files, job = state.of(Files), state.job
     loader, stream = files.loader, files.stream
     if loader is not None and loader.seconds >= _SHOW_PROGRESS_AFTER:
@@ -85,7 +85,7 @@ def _progress(state: AppState) -> _Progress | None:
         done, total = job.progress
         label = "Cancel" if job.can_cancel else ""
         if total:
-            # Work that counts nothing tells its share in hundredths.
+            # Jobs without steps report percent.
             text = f"{done} %" if total == 100 else f"{done:,} of {total:,}"
             return _Progress(job.title, done / total, text, label)
         return _Progress(job.title, -imgui.get_time(), "", label)
@@ -93,7 +93,7 @@ def _progress(state: AppState) -> _Progress | None:
 
 
 def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> Rect | None:
-    """Draw a bar for what is going on; return where."""
+    """Draw the progress bar; return its rectangle."""
     shown = _progress(state)
     if shown is None:
         return None
@@ -123,7 +123,7 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
 
 
 def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
-    """Draw the newest messages for which there is room, and say how many more there are."""
+    """Draw the newest messages that fit, and the number of further ones."""
     state.messages.drop_old()
     x, y, width, height = state.view_rect
     if not state.messages.notes or width <= 40:
@@ -137,7 +137,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     room = y + height - _GAP - top - 2.0 * style.window_padding.y + style.item_spacing.y
     count = _newest(heights, line, room)
     if not count and not above:
-        count = 1  # better cut off than not seen
+        count = 1  # better clipped than hidden
     if not count and room < line:
         return
     if begin_overlay("##notes", x + _GAP, y + height - _GAP, (0.0, 1.0)):
@@ -154,7 +154,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
 
 
 def _newest(heights: Sequence[float], line: float, room: float) -> int:
-    """Return how many texts at the end fit, with a line that tells how many are left out.
+    """Return how many texts at the end fit, with a line about the number left out.
 
     >>> _newest([10, 10, 10], 10, 30), _newest([10, 10, 10], 10, 29), _newest([10] * 20, 10, 500)
     (3, 1, 8)

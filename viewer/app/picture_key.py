@@ -1,4 +1,4 @@
-"""The key of the picture in the view: it is drawn anew when the key changes."""
+"""Key that identifies the picture in the view, which is redrawn when it changes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = ["PictureKeys"]
 
 
 class PictureKeys:
-    """Makes a key a frame; what is large is copied only when it has changed.
+    """Makes one key per frame; large parts are copied only when they have changed.
 
     The keys of poses are kept by the poses themselves, those of options and of the actors' places
-    here. Figures and clips are told apart by identity: they are replaced and never changed.
+    here. Figures and clips are compared by identity: they are replaced and never mutated.
     """
 
     def __init__(self) -> None:
@@ -45,14 +45,14 @@ class PictureKeys:
         size : (int, int)
             Width and height in pixels.
         marks, ghost, annotations : Marks or None, Ghost or None, sequence of Annotation
-            What is drawn over the scene in this frame; told apart by identity.
+            Drawn over the scene in this frame; compared by identity.
         """
         camera, options = state.camera, state.options
         if options != self._options:
             self._options = copy.deepcopy(options)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        # Motion paths show a part of the motion that goes along with time.
+        # Motion paths show a part of the motion that moves with time.
         time = state.scene.time if options.path_joints else None
         actors = self._actors(state.scene.actors)
         selected = (state.chosen_actor, state.selected_joint)
@@ -61,7 +61,7 @@ class PictureKeys:
         return (size, place, lens, ground, self._options, time, actors, selected, drawn_over)
 
     def _actors(self, actors: Sequence[Actor]) -> tuple[object, ...]:
-        """Return the key of what is seen of all actors."""
+        """Return a key of the visible state of all actors."""
         del self._places[len(actors) :]
         found = []
         for row, actor in enumerate(actors):

@@ -181,7 +181,7 @@ class _Window:
             io.set_ini_filename(str(folder / "layout.ini"))
         except OSError as problem:
             io.set_ini_filename(None)
-            self.state.say(f"the layout cannot be remembered: {problem.strerror}")
+            self.state.say(f"the layout cannot be saved: {problem.strerror}")
         self._given_scale = scale
         self._scale = scale or self._screen_scale()
         apply_theme(self._scale)

@@ -256,7 +256,7 @@ def test_insert_on_a_key_chooses_it_and_makes_no_second_one(curves):
     curves.step(2)
     assert_array_equal(_arm(curves).times, [0.0, 1.0, 2.0])
     assert _chosen(curves) == [(ARM_X, 1)]
-    assert curves.says("There is a key at 1 s already") and curves.undo_steps == 0
+    assert curves.says("There is already a key at 1 s") and curves.undo_steps == 0
 
 
 def test_delete_does_nothing_while_a_key_is_dragged(curves):

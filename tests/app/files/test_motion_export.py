@@ -134,12 +134,10 @@ def test_nobody_there_in_the_range_is_said(drive, rig, tmp_path):
     finish(hand)
     assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk-0.bvh"]
     assert frames_of(tmp_path / "walk-0.bvh") == 11
-    assert hand.says("tiny 1: not there in the range, and not written")
+    assert hand.says("tiny 1: absent throughout the range, not written")
     hand.state.clock.set_range(5.0, 6.0)
     save_motion(hand.state, tmp_path / "none.bvh", everyone=True)
-    assert hand.state.error == (
-        "nobody is there in the range that is played: there is nothing to write"
-    )
+    assert hand.state.error == ("everybody is absent in the playback range: nothing to write")
 
 
 def test_all_files_appear_or_none(crowd, tmp_path):
@@ -232,7 +230,7 @@ def test_dialog_exports_all_actors_unless_told_otherwise(crowd, tmp_path):
     finish(crowd)
     assert len(list(tmp_path.glob("*.bvh"))) == 3
     _ask(crowd, tmp_path / ".")
-    crowd.pick("Whose", 1)
+    crowd.pick("Actors##exported", 1)
     crowd.click("Save###Save")
     finish(crowd)
     assert (tmp_path / "tiny.bvh").exists()
@@ -242,7 +240,7 @@ def test_dialog_warns_of_any_file_that_would_be_replaced(crowd, tmp_path):
     (tmp_path / "tiny-2.bvh").write_text("before")
     _ask(crowd, tmp_path)
     assert "Replace###Save" in crowd.state.item_rects
-    crowd.pick("Whose", 1)
+    crowd.pick("Actors##exported", 1)
     assert "Save###Save" in crowd.state.item_rects
 
 
@@ -250,19 +248,19 @@ def test_dialog_changes_the_suffix_with_the_kind(crowd, tmp_path):
     _ask(crowd, tmp_path)
     dialog = crowd.state.of(Files).dialog
     kinds = [*motion_suffixes(), FOLDER]
-    crowd.pick("As", kinds.index(".glb"))
+    crowd.pick("Format", kinds.index(".glb"))
     assert (dialog.name, dialog.target()) == ("tiny.glb", tmp_path / "tiny.glb")
-    crowd.pick("As", kinds.index(FOLDER))
+    crowd.pick("Format", kinds.index(FOLDER))
     assert (dialog.name, dialog.target()) == ("tiny", tmp_path / "tiny")
     dialog.name = "hand.made.npz"  # a suffix that is typed counts
     crowd.step(2)
-    crowd.pick("As", 0)
+    crowd.pick("Format", 0)
     assert dialog.name == "hand.made.bvh"
 
 
 def test_dialog_for_one_actor_does_not_ask_whose(moving, tmp_path):
     _ask(moving, tmp_path)
-    assert "Whose" not in moving.state.item_rects and "As" in moving.state.item_rects
+    assert "Actors##exported" not in moving.state.item_rects and "Format" in moving.state.item_rects
     moving.click("Save###Save")
     finish(moving)
     assert (tmp_path / "tiny.bvh").exists()

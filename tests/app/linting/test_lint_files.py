@@ -114,7 +114,7 @@ def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, t
     texts.clear()
     hand.move(row)
     hand.step(60)
-    words = "it is in the file, not in the figure that is shown: a click copies its path and line"
+    words = "it is in the file, not in the figure shown: click to copy its path and line"
     assert words in texts and f"{files[1]}:3" in texts
     target = hand.state.camera.target.copy()
     hand.click(row)
@@ -127,12 +127,12 @@ def test_rows_say_what_a_click_does(lint, files, texts):
     row = row_of(hand, "M007")
     hand.move(row)
     hand.step(60)
-    assert "a click shows it in the view; another one, or Esc, ends that" in texts
+    assert "click to show it in the view; click again or press Esc to stop" in texts
     actor = hand.state.actor
     hand.state.scene.actors[0] = replace(actor, figure=replace(actor.figure))
     texts.clear()
     hand.step(2)
-    assert "a click chooses the actor: its figure is another than when it was checked" in texts
+    assert "click to select the actor: its figure has changed since the check" in texts
 
 
 def gappy() -> Scene:
@@ -158,7 +158,7 @@ def test_a_gap_leads_to_the_frame_before_it(lint):
     # Its root is marked, and all of it is seen.
     assert view.marks.points.tolist() == [[7.0, 0.0, 0.0]]
     assert hand.state.camera.target == pytest.approx([7.0, 2.0, 0.0])
-    assert hand.says("The last frame before the gap: in it nobody is there")
+    assert hand.says("The last frame before the gap: the person is absent in the next one")
 
 
 def test_a_gap_of_captured_points_marks_their_middle(lint):

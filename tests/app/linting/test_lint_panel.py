@@ -140,12 +140,12 @@ def test_filter_without_a_match_says_so(lint, texts):
     hand = lint(LIGHT)
     hand.state.of(Linting).text = "zebra"
     hand.step(2)
-    assert "no finding is like this" in texts
+    assert "no finding matches" in texts
 
 
 def test_sound_figure_has_nothing(lint, texts):
     hand = lint(column())
-    assert codes(hand) == [] and "nothing was found" in texts
+    assert codes(hand) == [] and "no findings" in texts
     hand.click("Copy text")
     assert not hand.says("copied")
 
@@ -273,7 +273,7 @@ def test_camera_turns_to_the_side_that_faces_it(lint):
 def stale(hand, texts):
     texts.clear()
     hand.step(2)
-    return any(text.startswith("Figure, pose or limits are others") for text in texts)
+    return any(text.startswith("The figure, pose or limits have changed") for text in texts)
 
 
 def test_findings_are_stale_while_the_pose_is_another(lint, texts):
@@ -316,7 +316,7 @@ def test_limits_are_set_in_their_window(lint):
     hand = lint(column())
     hand.click("Limits…")
     hand.step(2)
-    hand.enter_value("Largest turn", "180")
+    hand.enter_value("Largest rotation", "180")
     assert hand.state.of(Linting).options.max_turn == pytest.approx(np.pi)
     hand.enter_value("Low confidence", "0.5")
     assert hand.state.of(Linting).options.confidence == pytest.approx(0.5)
@@ -325,9 +325,9 @@ def test_limits_are_set_in_their_window(lint):
     hand.enter_value("Largest speed", "0")
     assert hand.state.of(Linting).options.max_speed is None
     for text in ("nan", "-5", "1e39"):
-        hand.enter_value("Largest turn", text)
+        hand.enter_value("Largest rotation", text)
         assert 0.0 <= hand.state.of(Linting).options.max_turn < np.inf
-    hand.click("Usual limits")
+    hand.click("Default limits")
     assert hand.state.of(Linting).options == type(hand.state.of(Linting).options)()
 
 

@@ -1,4 +1,4 @@
-"""The timeline's field "Frames a second": of captures, undoably, and what keys are counted by."""
+"""The timeline's field "Frames per second": of captures, undoably, and what keys are counted by."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_capture_gets_the_rate_for_all_of_its_people(pair):
     assert rates(pair) == [20.0, 20.0]
     assert pair.state.clock.whole == (0.0, 1.5)  # 30 frames of a twentieth of a second
     assert pair.state.clock.n_frames == 31
-    assert pair.says("20 frames a second for 2 actors of this capture")
+    assert pair.says("20 frames per second for 2 actors of this capture")
     pair.state.clock.seek(1.0)  # frame 20
     pair.step(2)
     assert [actor.is_present for actor in pair.state.scene.actors] == [True, True]
@@ -118,14 +118,14 @@ def test_rate_out_of_limits_is_refused_with_a_message(pair, text):
     pair.enter_value("Frame rate", text)
     assert rates(pair) == [10.0, 10.0] and pair.undo_steps == 0
     if text not in ("nan", "inf"):  # which the field itself does not take
-        assert pair.says(f"frames a second: expected 0.01 to 1000, found {text}")
+        assert pair.says(f"frames per second: expected 0.01 to 1000, found {text}")
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, -1.0])
 def test_numbers_that_are_no_rates_are_refused(pair, rate):
     set_rate(pair.state, rate)
     assert rates(pair) == [10.0, 10.0]
-    assert pair.says(f"frames a second: expected 0.01 to 1000, found {rate:g}")
+    assert pair.says(f"frames per second: expected 0.01 to 1000, found {rate:g}")
 
 
 def test_other_captures_keep_their_rate(drive, rig):
@@ -152,7 +152,7 @@ def test_rate_is_greyed_where_another_actor_gives_the_frames(drive, rig):
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.state.choose_actor(1)
     hand.step(2)
-    assert foreign_rate(hand.state) == "another motion gives the frames: choose its actor"
+    assert foreign_rate(hand.state) == "the frames come from another motion: select its actor"
     assert rate_of(hand.state) == 10.0
     hand.enter_value("Frame rate", "20")
     assert hand.state.scene.actors[0].clip.timing.frame_rate == 10.0

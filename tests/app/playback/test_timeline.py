@@ -292,7 +292,7 @@ def test_camera_follows_an_actor_as_far_as_before(streaming):
     streaming.state.clock.seek(3.0)
     streaming.step(2)
     assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)
-    streaming.click("Nobody")
+    streaming.click("None")
     streaming.state.clock.seek(5.0)
     streaming.step(2)
     assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)

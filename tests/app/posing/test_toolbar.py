@@ -91,19 +91,19 @@ def test_chain_goes_from_one_to_the_depth(arm):
 
 def test_reasons_of_what_is_greyed(arm):
     state = arm.state
-    assert no_keys(state) == "there is no clip: New clip (menu Edit) makes one"
-    assert no_chain(state) == "the tool Move (D) has chains"
+    assert no_keys(state) == "there is no clip: create one with Edit > New clip"
+    assert no_chain(state) == "only the Move tool (D) has chains"
     arm.key("d")
     assert no_chain(state) == "select a joint"
     state.selected_joint = 0
-    assert no_chain(state) == "no joint above shoulder can turn"
+    assert no_chain(state) == "no joint above shoulder can rotate"
     state.selected_joint = 2
     assert no_chain(state) == ""
-    assert no_orientation(state) == "it is dragged in the plane of the picture"
+    assert no_orientation(state) == "it is dragged in the image plane"
     arm.key("e")
     assert no_orientation(state) == ""
     state.selected_joint = 1
-    assert no_orientation(state) == "this joint turns about the axes of its DOFs alone"
+    assert no_orientation(state) == "this joint turns about the axes of its DOFs only"
     state.actor.visible = False
     assert no_tool(state) == "this actor is not shown"
 

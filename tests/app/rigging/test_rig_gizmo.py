@@ -226,15 +226,15 @@ def test_view_beside_the_gizmo_still_orbits(hand):
 
 def test_numbers_place_the_template(hand):
     hand.click("rig tool move")
-    x0, y0, x1, y1 = hand.state.item_rects["Shift"]
-    hand.enter_value("Scale by", "30")
+    x0, y0, x1, y1 = hand.state.item_rects["Translation"]
+    hand.enter_value("Scale factor", "30")
     assert similarity(hand).scale == pytest.approx(30.0)
     hand.click((x0 + 5, (y0 + y1) / 2), held="ctrl")
     hand.type("12")
     hand.key("enter")
     hand.step(2)
     assert similarity(hand).shift[0] == pytest.approx(12.0)
-    hand.enter_value("Scale by", "-3")
+    hand.enter_value("Scale factor", "-3")
     assert similarity(hand).scale == pytest.approx(30.0)
     finish(hand)
     assert hand.state.of(Rigging).placing.alignment is not None and hand.state.error == ""
@@ -316,7 +316,7 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
         click_pair(hand, triangle)
         assert len(state.of(Rigging).landmarks) == number and state.of(Rigging).pending is None
     assert state.camera.azimuth == orbit and state.chosen_actor == 0
-    hand.click("Closest points refine it")
+    hand.click("Refine by closest points")
     hand.click("Align by landmarks")
     finish(hand)
     assert state.error == "" and state.of(Rigging).placing.alignment.how == "landmarks"

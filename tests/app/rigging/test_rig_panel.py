@@ -70,7 +70,7 @@ def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
     hand.menu("menu Window", "Rig")
     texts.clear()
     hand.step(2)
-    assert "Every mesh here has a rig: add one without, an .obj or .ply." in texts
+    assert "Every mesh in the scene has a rig: add one without, an .obj or .ply." in texts
     for label in ("Align", "Run", "Compare methods", "rig tool move"):
         hand.click(label)
     assert hand.state.job is None and hand.state.of(Rigging).tool == "" and not hand.state.error
@@ -122,10 +122,10 @@ def test_align_says_what_it_does(rigging, monkeypatch, fits):
     hand = rigging()
     finish(hand)
     hand.state.of(Rigging).choices.fits = fits
-    also = "; joints are turned and limbs resized{} where that fits much better" if fits else ""
+    also = "; joints are rotated and limbs resized{} where that fits much better" if fits else ""
     for label, words in (
-        ("Align", "found by closest points" + also.format(", or all of it stretched,")),
-        ("Refine", "from where it lies, by closest points" + also.format("")),
+        ("Align", "searched for by closest points" + also.format(", or all of it stretched,")),
+        ("Refine", "from its current placement, by closest points" + also.format("")),
     ):
         hand.move(label)
         hand.step(60)
@@ -137,7 +137,7 @@ def test_template_posed_after_aligning_says_so(rigging, texts):
     hand.state.scene.actors[1].pose.dofs[8] = 0.0
     texts.clear()
     hand.step(2)
-    assert "the template was posed otherwise since: align again" in texts
+    assert "the template has been posed since: align again" in texts
 
 
 def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
@@ -186,7 +186,7 @@ def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
     move_by_hand(hand.state, current_template(hand.state), stretched)
     hand.click("rig tool scale")
     hand.step(2)
-    hand.enter_value("Scale by", f"{stretched.scale * 1.01}")
+    hand.enter_value("Scale factor", f"{stretched.scale * 1.01}")
     now = placing_now(hand.state).similarity
     assert now.scale == pytest.approx(1.01 * stretched.scale)
     assert_allclose(now.own_factors, stretch)
@@ -252,7 +252,7 @@ def test_stats_count_the_rigged_mesh(rigging, texts):
 def test_a_goes_between_the_mesh_and_its_rig_without_steps(rigging):
     hand = rigging()
     hand.key("a")
-    assert hand.says("A/B: nothing was rigged yet, see Window > Rig")
+    assert hand.says("A/B: nothing is rigged yet, see Window > Rig")
     hand.click("Run")
     finish(hand)
     steps = hand.undo_steps
@@ -331,7 +331,7 @@ def test_result_moves_as_the_template_where_the_target_stands(rigging):
     finish(hand)
     assert hand.state.error == ""
     still = seen(hand, 0)
-    hand.click("Move as the template")
+    hand.click("Move like the template")
     hand.step(2)
     hand.state.clock.seek(1.0)
     hand.step(3)
@@ -340,7 +340,7 @@ def test_result_moves_as_the_template_where_the_target_stands(rigging):
     pose.dofs[0], pose.dofs[8] = 1.0, 1.0  # as the template moves, carried by the alignment
     wanted = apply_transform(TRUE, deform(figure, pose)[0])
     assert_allclose(seen(hand, 0), wanted, atol=1e-5)
-    hand.click("Move as the template")
+    hand.click("Move like the template")
     hand.step(2)
     assert hand.state.actor.clip is None
     assert_allclose(seen(hand, 0), still, atol=1e-9)
@@ -351,7 +351,7 @@ def test_template_without_motion_says_why_nothing_moves(rigging):
     hand = rigging()
     hand.click("Run")
     finish(hand)
-    hand.click("Move as the template")
+    hand.click("Move like the template")
     assert hand.state.actor.clip is None
 
 
@@ -375,7 +375,7 @@ def test_result_of_a_mesh_that_is_gone_is_dropped(rigging):
     del hand.state.scene.actors[0]
     hand.state.chosen_actor = 0
     hand.step(3)
-    assert hand.says("The mesh that was rigged is there no more")
+    assert hand.says("The mesh that was rigged no longer exists")
     assert names(hand) == ["arm"]
 
 

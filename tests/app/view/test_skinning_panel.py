@@ -51,13 +51,13 @@ def test_radio_buttons_choose_the_method(skinning):
 def test_share_slider_mixes_from_either_method(skinning):
     for label in ("LBS", "DQS"):
         skinning.click(label)
-        skinning.drag("DQS share", 0.25, "DQS share")
+        skinning.drag("DQS fraction", 0.25, "DQS fraction")
         assert _chosen(skinning).method == "mix"
         assert _chosen(skinning).blend_factor == pytest.approx(0.25, abs=0.02)
 
 
 def test_share_drag_is_one_step(skinning):
-    skinning.drag("DQS share", 0.75, "DQS share")
+    skinning.drag("DQS fraction", 0.75, "DQS fraction")
     assert skinning.undo_steps == 1
     skinning.key("z", "ctrl")
     assert _chosen(skinning) == Skinning()
@@ -69,7 +69,7 @@ def test_share_drag_is_one_step(skinning):
 def test_typed_share_stays_between_the_methods(skinning):
     for text in ("7", "-3", "nan", "1e39", ""):
         skinning.click("Mixed")
-        skinning.enter_value("DQS share", text)
+        skinning.enter_value("DQS fraction", text)
         assert 0.0 <= _chosen(skinning).blend_factor <= 1.0
     assert skinning.scene_picture().any()
 

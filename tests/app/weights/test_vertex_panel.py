@@ -90,11 +90,11 @@ def test_numbers_follow_the_pose(pinned, texts):
 
 @pytest.mark.parametrize("method", ["dqs", "mix"])
 def test_dual_quaternions_are_shown_where_they_are_used(pinned, texts, method):
-    assert not any(text.startswith("q1: share") for text in said(pinned, texts))
+    assert not any(text.startswith("q1: weight") for text in said(pinned, texts))
     pinned.state.options.skinning.method = method
     pinned.step()
     listed = said(pinned, texts)
-    assert "q1: share 0.5000" in listed and "q2: share 0.5000" in listed
+    assert "q1: weight 0.5000" in listed and "q2: weight 0.5000" in listed
     actor = pinned.state.actor
     position = deform(actor.figure, actor.pose, pinned.state.options.skinning)[0][4]
     assert holds(listed, ["position", *rows_of(position)])
@@ -114,7 +114,7 @@ def test_text_is_copied_in_full(pinned, clipboard):
     actor = pinned.state.actor
     wanted = explanation_text(explain(actor.figure, actor.pose, Skinning(), 4), 6)
     assert clipboard == ["\n".join(wanted)]
-    assert pinned.says("The explanation was copied")
+    assert pinned.says("Explanation copied")
 
 
 def test_matrix_is_copied_with_all_digits(pinned, clipboard):
@@ -218,7 +218,7 @@ def test_vertex_is_let_go_of(pinned, way):
     pinned.state.selected_joint = 1
     if way == "Esc":
         pinned.key("escape")
-        assert pinned.says("The vertex was unpinned")
+        assert pinned.says("Vertex unpinned")
         assert pinned.state.selected_joint == 1  # the next one drops the selection
     elif way == "Unpin":
         pinned.click("Unpin")
@@ -240,7 +240,7 @@ def test_vertex_goes_with_its_figure(pinned, rig):
 def test_panel_without_a_vertex_says_how_to_pick_one(hand, texts):
     hand.menu("menu Window", "Vertex")
     hand.step(2)
-    assert "Alt+click a vertex: here is said why it is where it is." in said(hand, texts)
+    assert "Alt+click a vertex to explain its position here." in said(hand, texts)
     hand.click("Click without Alt")
     assert hand.state.of(Weights).picks_vertices
 
@@ -249,7 +249,7 @@ def test_figure_without_a_skin_has_nothing_to_explain(drive, rig):
     hand = drive(rig[1])
     pin_vertex(hand.state, 0, 3)
     assert hand.state.of(Weights).pinned is None
-    assert hand.says("nothing moves a vertex")
+    assert hand.says("no influences to explain")
 
 
 def test_vertex_without_influence_says_so(drive, rig, texts):
@@ -258,7 +258,7 @@ def test_vertex_without_influence_says_so(drive, rig, texts):
     hand = drive(*rig, samples=1)
     pin_vertex(hand.state, 0, 8)
     hand.step(4)
-    assert "No influence: the vertex stays where it was bound." in said(hand, texts)
+    assert "No influence: the vertex stays at its bind position." in said(hand, texts)
 
 
 def test_pinning_is_no_undo_step(pinned):

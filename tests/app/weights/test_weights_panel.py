@@ -152,7 +152,7 @@ def test_view_is_chosen_from_the_list(wide, name):
                "class": "classes"}  # fmt: skip
     choose(wide, name)
     if name in lacking:
-        assert no_view(wide.state, name) == f"no figure here has {lacking[name]}"
+        assert no_view(wide.state, name) == f"no figure in the scene has {lacking[name]}"
         assert wide.state.options.scalar == first and wide.state.options.shading == "phong"
         return
     assert no_view(wide.state, name) == ""
@@ -172,7 +172,7 @@ def test_greyed_view_says_why(wide, tooltips):
     wide.step(2)
     wide.move("view parts")
     wide.step(60)
-    assert "no figure here has body parts" in tooltips
+    assert "no figure in the scene has body parts" in tooltips
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Actors: who is in the scene, seen or not, in which colour, when and where."""
+"""Actors panel: visibility, colour, start time and position of each actor."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["draw"]
 
-_PLAIN = (0.75, 0.72, 0.68)  # what the colour button shows of actors without one of their own
+_PLAIN = (0.75, 0.72, 0.68)  # shown by the colour button of actors without a colour of their own
 _LOOK = (
     imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.float
 )
@@ -59,7 +59,7 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
     actor.visible = imgui.checkbox("##visible", actor.visible)[1]
     note_item(state, f"visible {index}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("drawn or not")
+        imgui.set_tooltip("show or hide this actor")
     imgui.same_line()
     shown = actor.color or _PLAIN
     changed, color = imgui.color_edit3("##color", list(shown), _LOOK)
@@ -69,9 +69,9 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
     elif changed:
         actor.color = (color[0], color[1], color[2])
     if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("colour; a right click takes the usual one")
+        imgui.set_tooltip("colour; right-click restores the default")
     imgui.same_line()
-    absent = "" if actor.is_present else "  (not there now)"
+    absent = "" if actor.is_present else "  (absent)"
     text = f"{printable(actor.name, 60)}{absent}"
     if imgui.selectable(text, index == state.chosen_actor)[0]:
         state.choose_actor(index)
@@ -79,14 +79,14 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
 
 
 def _draw_place(state: AppState, actor: Actor) -> None:
-    """Draw when and where the chosen actor is."""
+    """Draw the start time and position of the chosen actor."""
     if actor.clip is not None:
         shown = plain_zero(actor.offset, "%.3f s")
         changed, value = imgui.drag_float("Starts at", shown, 0.01, 0.0, 0.0, "%.3f s")
         note_item(state, "Starts at")
         if changed and abs(value) < 1e6:
             actor.offset = value
-        explain("seconds by which its motion starts later than the scene's clock")
+        explain("when its motion starts on the scene's clock, seconds")
     size = box_size(state.box) or 1.0
     place = [plain_zero(part, "%.3f") for part in actor.placement[:3, 3].tolist()]
     changed, moved = imgui.drag_float3("Stands at", place, 0.002 * size, 0.0, 0.0, "%.3f")
@@ -99,7 +99,7 @@ def _draw_place(state: AppState, actor: Actor) -> None:
 
 
 def _draw_following(state: AppState) -> None:
-    """Let the camera go with the chosen actor or joint."""
+    """Draw the choice of what the camera follows: the chosen actor, a joint or none."""
     imgui.text_unformatted("Camera follows")
     same_line_if_room("Actor")
     target = state.of(Following).target
@@ -112,34 +112,34 @@ def _draw_following(state: AppState) -> None:
             chosen = target == (index, joint)
             stop_following(state) if chosen else start_following(state, index, joint)
     if target is not None:
-        same_line_if_room("Nobody")
-        if button(state, "Nobody"):
+        same_line_if_room("None")
+        if button(state, "None"):
             stop_following(state)
 
 
 def _draw_motion_paths(state: AppState, actor: Actor) -> None:
-    """Choose the joint whose path is drawn."""
+    """Draw the choice of joints whose motion paths are shown."""
     options, joint = state.options, state.selected_joint
     key = (state.chosen_actor, joint)
     if actor.clip is not None and joint >= 0:
         shown = key in options.path_joints
-        if checkbox(state, "Path of the selected joint", shown) != shown:
+        if checkbox(state, "Motion path of the selected joint", shown) != shown:
             others = tuple(one for one in options.path_joints if one != key)
             options.path_joints = others if shown else (*others, key)
     if options.path_joints:
-        if button(state, "Clear paths"):
+        if button(state, "Clear motion paths"):
             options.path_joints = ()
         changed, value = imgui.drag_float(
-            "Seconds around now", options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
+            "Time window", options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
         )
-        note_item(state, "Seconds around now")
-        explain("how far paths go back and forth; 0 shows all of the motion")
+        note_item(state, "Time window")
+        explain("seconds of the path before and after the current time; 0 shows all of the motion")
         if changed:
             options.path_seconds = max(value, 0.0)
 
 
 def _draw_fit(state: AppState, actor: Actor) -> None:
-    """Say how far a person's captured keypoints are from the joints of the body fitted to them."""
+    """Draw the distances of a person's captured keypoints from the joints of the fitted body."""
     same = [a for a in state.scene.actors if a.points is not None and a.person == actor.person]
     points = actor if actor.points is not None else next(iter(same), None)
     body = None if points is None else fitted_body(points, state.scene.actors)
@@ -151,7 +151,7 @@ def _draw_fit(state: AppState, actor: Actor) -> None:
     factor, unit = length_unit(body.figure)
     mean = sum(distances.values()) / len(distances)
     imgui.separator()
-    text = f"Keypoints to joints: {factor * mean:.1f} {unit} on average###fit"
+    text = f"Mean distance of keypoints from joints: {factor * mean:.1f} {unit}###fit"
     if imgui.tree_node(text):
         for name, distance in sorted(distances.items(), key=lambda item: -item[1]):
             imgui.text_unformatted(f"{factor * distance:8.1f} {unit}  {printable(name, 40)}")

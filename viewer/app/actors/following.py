@@ -1,4 +1,4 @@
-"""A camera that follows an actor or one of its joints."""
+"""Camera that follows an actor or one of its joints."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ __all__ = ["Following", "follow_actor", "start_following", "stop_following"]
 
 @dataclass(slots=True)
 class Following:
-    """Whom the camera follows.
+    """Target that the camera follows.
 
     Attributes
     ----------
     target : (int, int) or None
         The actor, and the joint of it (-1 for its middle).
     place : (3,) or None
-        Where that was when the camera was moved last.
+        Its position when the camera was last moved.
     n_posed : int
-        How often the clock had posed the scene then.
+        Value of the clock's ``n_posed`` then.
     """
 
     target: tuple[int, int] | None = None
@@ -32,9 +32,9 @@ class Following:
 
 
 def follow_actor(state: AppState) -> None:
-    """Keep the camera's target on the followed actor or joint, as far from it as before.
+    """Keep the camera's target on the followed actor or joint at the same distance.
 
-    Only the clock moves the camera along: whoever poses by hand sees the pose from one place.
+    Only the clock moves the camera: while a pose is edited by hand, the camera stands still.
     """
     following, n_posed = state.of(Following), state.clock.n_posed
     if following.target is None or following.n_posed == n_posed:
@@ -51,7 +51,7 @@ def follow_actor(state: AppState) -> None:
 
 
 def start_following(state: AppState, actor: int, joint: int) -> None:
-    """Let the camera follow an actor's joint, or its middle (-1), from where it is now."""
+    """Let the camera follow an actor's joint, or its middle (-1), from its current position."""
     following = state.of(Following)
     state.framing.is_fitting = False
     following.target = actor, joint
@@ -62,6 +62,6 @@ def start_following(state: AppState, actor: int, joint: int) -> None:
 
 
 def stop_following(state: AppState) -> None:
-    """Leave the camera where it is."""
+    """Stop following; the camera stays where it is."""
     following = state.of(Following)
     following.target = following.place = None

@@ -1,4 +1,4 @@
-"""The clock: which time of the scene is shown, how it moves on, and the poses at that time."""
+"""Clock of the window: the time shown, playback, and the poses at that time."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ MODES = {
     "ping-pong": "Ping-pong",
     "run on": "Run on",
 }
-"""What happens at the end of the range, with the name that menus show."""
+"""Playback modes at the end of the range, with their labels."""
 
 FASTEST = 4.0
-"""Largest speed, forwards and backwards."""
+"""Largest playback speed, forwards and backwards."""
 
 
 class PosedFor(NamedTuple):
-    """Key of the poses: actors are posed again only for another one.
+    """Key that identifies the poses: actors are posed again only if it changes.
 
     Attributes
     ----------
     time : float
         Seconds.
     fill_gaps : bool
-        Whether captures are shown in their gaps.
+        Whether captures are interpolated in their gaps.
     clips : tuple
         Clip and offset of each actor; clips are replaced, never changed.
     """
@@ -45,41 +45,41 @@ class PosedFor(NamedTuple):
 
 @dataclass(slots=True)
 class Clock:
-    """Moves the time of a scene, ``Scene.time``, and poses the actors for it.
+    """Advances the time of a scene, ``Scene.time``, and poses the actors for it.
 
-    It keeps to the wall clock: a slow machine drops frames, never time.
+    It follows the wall clock: a slow machine drops frames but stays in time.
 
     Attributes
     ----------
     scene : Scene
-        Whose time it is.
+        Scene that the clock drives.
     playing : bool
-        Whether time moves on.
+        Whether time advances.
     speed : float
-        Seconds of motion a second, -4 to 4.
+        Seconds of motion per second, -4 to 4.
     mode : str
         A key of ``MODES``.
     start, end : float
-        The range that is played, seconds.
+        Playback range, seconds.
     whole : (float, float)
-        The range of all clips.
+        Time range of all clips, seconds.
     frame_rate : float
-        Frames a second by which one steps and counts: those of the chosen actor's capture, so
-        that each of its frames can be reached, else of the longest one.
+        Frames per second for stepping and frame numbers: those of the chosen actor's capture, so
+        that each of its frames can be reached, otherwise of the longest one.
     origin : float
         Seconds of that capture's first frame.
     first_frame : int
-        What that frame is called.
+        Number of that frame in its file.
     keyed_rate : float
-        The same where nothing consists of frames: keyed clips have no rate of their own.
+        The same for scenes without sampled motion: keyed clips have no rate of their own.
     has_frames : bool
-        Whether some motion consists of frames: each is then shown for its whole duration.
+        Whether some motion is sampled: each frame is then shown for its whole duration.
     fill_gaps : bool
-        Show captures in their gaps too, in between the frames around them.
+        Whether captures are interpolated in their gaps.
     posed_for : PosedFor or None
-        What the actors were posed for last: time may have moved on since.
+        Key of the current poses; time may have advanced since.
     n_posed : int
-        How often they were.
+        Number of times the actors were posed.
     """
 
     scene: Scene = field(default_factory=lambda: Scene([]))
@@ -96,15 +96,15 @@ class Clock:
     has_frames: bool = False
     fill_gaps: bool = False
     has_motion: bool = False
-    _over: float = 0.0  # seconds since the last frame of the range became due
-    _turned: bool = False  # on the way back of ping-pong
+    _over: float = 0.0  # seconds since the last frame of the range began
+    _turned: bool = False  # in the backward half of ping-pong
     posed_for: PosedFor | None = None
     n_posed: int = 0
-    _grid: tuple[object, ...] = ()  # whose frames count
+    _grid: tuple[object, ...] = ()  # actor whose frames are counted
 
     @property
     def time(self) -> float:
-        """Seconds of the scene that are shown."""
+        """Time of the scene that is shown, seconds."""
         return 0.0 if self.scene.time is None else self.scene.time
 
     @time.setter
@@ -112,7 +112,7 @@ class Clock:
         self.scene.time = time
 
     def show(self, scene: Scene) -> None:
-        """Take over a scene and the range of its clips, and go to its start, or where it is."""
+        """Attach a scene with the range of its clips; go to its start or keep its time."""
         self.scene, self.posed_for = scene, None
         self.playing, self.mode, self.speed = False, "loop", 1.0
         self.keyed_rate, self.has_frames = DEFAULT_RATE, False
@@ -122,14 +122,14 @@ class Clock:
         self.seek(self.start if scene.time is None else scene.time)
 
     def follow(self, chosen: Actor | None = None) -> None:
-        """Keep up with clips that changed or grew; a range that was all of them stays all.
+        """Update the range for clips that changed or grew; a full range stays full.
 
-        Where the same frames come faster or slower, time and range stay on their frames.
+        If only the frame rate changes, time and range stay on their frames.
 
         Parameters
         ----------
         chosen : Actor, optional
-            Whose capture gives the frames, if it has one.
+            Actor whose capture gives the frames, if it has one.
         """
         was_whole = (self.start, self.end) == self.whole
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
@@ -144,7 +144,7 @@ class Clock:
             self.set_range(self.start, self.end)
 
     def _count(self, actor: Actor | None) -> None:
-        """Count by the frames of an actor's capture, None for those of keyed clips."""
+        """Count frames of an actor's capture; None for the rate of keyed clips."""
         clip = None if actor is None else actor.clip
         old_rate, old_origin, old_grid = self.frame_rate, self.origin, self._grid
         if actor is None or clip is None or isinstance(clip, Clip):
@@ -162,7 +162,7 @@ class Clock:
             )
 
     def count_by(self, rate: float) -> None:
-        """Say how many frames a second motions have that consist of none."""
+        """Set the frame rate used to count keyed clips."""
         self.keyed_rate = rate
         if not self.has_frames:
             self.frame_rate = rate
@@ -175,39 +175,39 @@ class Clock:
 
     @property
     def frame_range(self) -> tuple[int, int]:
-        """The first and the last frame of the whole range, counted as ``frame`` is."""
+        """First and last frame of the whole range, in the numbering of ``frame``."""
         low, high = self.whole
         first = math.ceil((low - self.origin) * self.frame_rate - 1e-6)
         return first, math.floor((high - self.origin) * self.frame_rate + 1e-6)
 
     @property
     def frame(self) -> int:
-        """The frame that is shown, counted from 0 at the origin."""
+        """Index of the shown frame, 0 at the origin."""
         return math.floor((self.time - self.origin) * self.frame_rate + 1e-6)
 
     def frame_time(self, frame: int) -> float:
-        """Return the seconds of a frame."""
+        """Return the time of a frame, seconds."""
         return self.origin + frame / self.frame_rate
 
     def nearest_frame_time(self, time: float) -> float:
-        """Return the seconds of the frame of the whole range that is nearest to a time."""
+        """Return the time of the frame nearest to a time, within the whole range, seconds."""
         low, high = self.frame_range
-        if low > high:  # too short for a frame
+        if low > high:  # shorter than a frame
             return time
         return self.frame_time(min(max(round((time - self.origin) * self.frame_rate), low), high))
 
     def scrub(self, time: float, between: bool = False) -> None:
-        """Go to the frame that is nearest to a time; to the time itself if asked to."""
+        """Go to the frame nearest to a time, or to the exact time if asked to."""
         self.seek(time if between else self.nearest_frame_time(time))
 
     def seek(self, time: float) -> None:
-        """Go to a time; within the range unless playing runs on."""
+        """Go to a time, clamped to the range unless the mode runs on."""
         is_free = self.mode == "run on"
         self.time = time if is_free else min(max(time, self.whole[0]), self.whole[1])
         self._over, self._turned = 0.0, False
 
     def step(self, frames: int) -> None:
-        """Stop, and go to another frame: a whole one, however time stood before."""
+        """Stop and step by whole frames, snapping to a frame first."""
         self.playing = False
         place = (self.time - self.origin) * self.frame_rate
         nearest = round(place)
@@ -219,7 +219,7 @@ class Clock:
         self.seek(self.frame_time(target))
 
     def toggle(self) -> None:
-        """Play or pause; at the end of a range that is played once, from its start."""
+        """Play or pause; at the end of a range played once, restart from its start."""
         self.playing = not self.playing
         if self.playing and self.mode == "once":
             if self.speed >= 0.0 and self.time >= self.end - 1e-9:
@@ -228,18 +228,18 @@ class Clock:
                 self.seek(self.end)
 
     def set_range(self, start: float, end: float) -> None:
-        """Play only a part; start and end are put in order and into the whole range."""
+        """Set the playback range; start and end are ordered and clamped to the whole range."""
         low, high = self.whole
         start, end = sorted((min(max(start, low), high), min(max(end, low), high)))
         self.start, self.end = start, end
 
     def advance(self, seconds: float) -> None:
-        """Move on by so much wall clock time, if playing.
+        """Advance by some wall clock time, if playing.
 
         Parameters
         ----------
         seconds : float
-            Since the last call.
+            Seconds since the last call.
         """
         if not self.playing or not self.has_motion:
             return
@@ -252,8 +252,8 @@ class Clock:
             self._run(step)
 
     def _run(self, step: float) -> None:
-        """Move within the range; at its end start over, or stop."""
-        # The last frame is due for as long as every other one.
+        """Move within the range; at its end wrap around or stop."""
+        # The last frame is shown for as long as every other one.
         hold = 1.0 / self.frame_rate if self.has_frames and self.end > self.start else 0.0
         period = self.end - self.start + hold
         if period <= 0.0:
@@ -280,14 +280,14 @@ class Clock:
         self.time = self.start + (2.0 * length - place if self._turned else place)
 
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
-        """Pose all actors for the time shown, if it or their clips changed; return whether it did.
+        """Pose all actors for the time shown if it or their clips changed; return whether they did.
 
         Parameters
         ----------
         chosen : Actor, optional
-            As for ``follow``, which is done first if clips changed.
+            As for ``follow``, which runs first if clips changed.
         again : bool
-            Also if nothing changed.
+            Pose them even if nothing changed.
         """
         actors, before = self.scene.actors, self.posed_for
         clips = tuple((actor.clip, actor.offset) for actor in actors)
@@ -302,7 +302,7 @@ class Clock:
         return True
 
     def go_back(self, time: float, chosen: Actor | None = None) -> None:
-        """Go to a time with actors and clips that were restored, and pose them for it.
+        """Go to a time with restored actors and clips, and pose them for it.
 
         Parameters
         ----------
@@ -317,5 +317,5 @@ class Clock:
 
 
 def _length(actor: Actor) -> float:
-    assert actor.clip is not None  # only what moves is compared
+    assert actor.clip is not None  # only moving actors are compared
     return actor.clip.end - actor.clip.start

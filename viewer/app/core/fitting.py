@@ -11,22 +11,22 @@ from viewer.rig.scene import scene_points
 
 __all__ = ["fit_again", "fit_points", "fit_shown", "keep_fitting"]
 
-_GAP = 6.0  # points between the tools and what is seen
-_LEAST = 0.6  # of the view's height, however much lies over it
-_NARROWEST = 40.0  # points: in a smaller view nothing can be seen
+_GAP = 6.0  # points between the tools and the scene
+_LEAST = 0.6  # of the view's height, whatever the overlays cover
+_NARROWEST = 40.0  # points: a smaller view is unusable
 
 
 def keep_fitting(state: AppState, grows: bool) -> None:
-    """Go on with finding how far the scene reaches, and fit the camera to it if nobody moved it.
+    """Continue to find the scene's extent, and fit the camera to it unless the user moved it.
 
-    To be called in each frame, when it is known how much room the panels leave.
+    Called in each frame once the free part of the view is known.
 
     Parameters
     ----------
     state : AppState
         With the camera.
     grows : bool
-        Whether more of the motion is still to come.
+        Whether more of the motion is still being read.
     """
     framing = state.framing
     framing.watch(state.camera)
@@ -41,12 +41,12 @@ def keep_fitting(state: AppState, grows: bool) -> None:
 
 
 def fit_points(state: AppState, points: Floats) -> None:
-    """Aim the camera at some points, fill the view with them, and keep it so.
+    """Aim the camera at some points, fill the view with them, and keep it fitted.
 
     Parameters
     ----------
     state : AppState
-        Its camera leaves a calibrated one's place.
+        Its camera stops being a calibrated one.
     points : (N, 3)
         Scene space.
     """
@@ -56,7 +56,7 @@ def fit_points(state: AppState, points: Floats) -> None:
 
 
 def fit_again(state: AppState) -> None:
-    """Fit the camera from where it looks now: to what it was fitted to, if nobody moved it."""
+    """Fit the camera in its current direction: to its previous points unless the user moved it."""
     framing = state.framing
     if not framing.is_fitting:
         fit_shown(state)
@@ -65,7 +65,7 @@ def fit_again(state: AppState) -> None:
 
 
 def fit_shown(state: AppState) -> None:
-    """Aim the camera at the scene as it is posed, and keep it so."""
+    """Aim the camera at the scene as it is posed, and keep it fitted."""
     fit_points(state, scene_points(state.scene, state.options.show))
 
 
@@ -76,7 +76,7 @@ def _fit(state: AppState, points: Floats) -> None:
     state.limit_camera()
     covered = _covered_height(state, points)
     if covered:
-        # As much is left out below, so that the camera turns about the middle of what it sees.
+        # The same margin is left below, so that the camera orbits the middle of the view.
         height = max(state.view_rect[3], 1.0)
         fit(camera, points, state.aspect, max(1.0 - 2.0 * covered / height, _LEAST))
         state.limit_camera()
@@ -84,10 +84,10 @@ def _fit(state: AppState, points: Floats) -> None:
 
 
 def _covered_height(state: AppState, points: Floats) -> float:
-    """Return how far down the tools in the upper right corner reach if they cover any point.
+    """Return the lower edge of the tools in the upper right corner if they cover any point.
 
-    The settings that some tools have below their buttons do not count: whoever takes a tool in hand
-    wants to go on with what is seen.
+    The settings that some tools have below their buttons do not count: a user who selects a tool
+    wants to keep the current view.
     """
     tools = state.item_rects.get("##tools")
     if tools is None:

@@ -1,4 +1,4 @@
-"""Undo and redo: every change of pose, clip or display is a step; a slider drag is one."""
+"""Undo and redo: every change of pose, clip or display is a step, and so is a slider drag."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = ["History", "Undoable"]
 
-_MOST = 500  # steps kept
+_MOST = 500  # number of steps kept
 
 PoseAt = Callable[[float], None]
-"""Goes to a time and poses the scene for it."""
+"""Callable that goes to a time and poses the scene for it."""
 
 
 class Undoable(Protocol):
-    """A feature's state of which one value is undone with the scene."""
+    """State of a feature with one value that is undone with the scene."""
 
     def kept(self) -> object | None:
-        """Return that value, which is never changed, only replaced; None if there is none."""
+        """Return that value, which is replaced and never mutated; None if there is none."""
 
     def restore(self, kept: object | None) -> None:
-        """Bring back a value that was kept."""
+        """Restore a value."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """One edit: the state before it and the state that it made, both at the time of the edit."""
+    """One edit: the states before and after it, both at the time of the edit."""
 
     before: Snapshot
     after: Snapshot
@@ -53,11 +53,11 @@ class _Step:
 
 @dataclass(slots=True)
 class History:
-    """Notices changes instead of being told of them, so no panel or key can forget to.
+    """Undo history that detects changes itself, so that no panel or key can forget to report one.
 
     ``observe`` compares the state of each frame with that of the frame before. While a widget is
-    held an edit goes on: the whole drag becomes one step. What the scene's clock does to poses is
-    no edit: see ``follow``.
+    held an edit goes on: the whole drag becomes one step. Poses set by the scene's clock are
+    not edits: see ``follow``.
 
     Undo and redo of an edit of actors, poses or clips go to the time of the edit. There the clock
     poses all actors by their restored clips, but a pose that was edited by hand comes back as it
@@ -66,19 +66,19 @@ class History:
     Attributes
     ----------
     feature : Undoable or None
-        Has a value that is undone with the scene.
+        State with a value that is undone with the scene.
     """
 
     feature: Undoable | None = None
-    _seen: Snapshot | None = None  # the state of the last frame
-    _before: Snapshot | None = None  # the state before an edit that still goes on
+    _seen: Snapshot | None = None  # state of the last frame
+    _before: Snapshot | None = None  # state before an edit in progress
     _clocked: dict[Actor, tuple[Motion, float, Pose | None]] = field(default_factory=dict)
     _undo: list[_Step] = field(default_factory=list)
     _redo: list[_Step] = field(default_factory=list)
 
     def start(self, scene: Scene, options: DisplayOptions) -> None:
-        """Forget everything; the scene as it is becomes the first state."""
-        self.feature = None  # it was about another scene
+        """Clear the history; the current scene becomes the first state."""
+        self.feature = None  # it belonged to another scene
         self._clocked.clear()
         self._seen = self._before = None
         self._seen = self._take(scene, options)
@@ -86,7 +86,7 @@ class History:
         self._redo.clear()
 
     def observe(self, scene: Scene, options: DisplayOptions, busy: bool) -> bool:
-        """Keep a step if something changed and no widget is held; return whether it did."""
+        """Record a step if something changed and no widget is held; return whether it did."""
         if self._seen is None:
             return False
         if not is_current(self._seen, scene, options) or self._has_another_value():
@@ -95,7 +95,7 @@ class History:
         if busy or self._before is None:
             return False
         before, self._before = self._before, None
-        if is_same(before, self._seen):  # dragged there and back
+        if is_same(before, self._seen):  # dragged there and back: no change
             return False
         self._undo.append(_Step(before, self._seen))
         del self._undo[:-_MOST]
@@ -103,12 +103,12 @@ class History:
         return True
 
     def accept(self, scene: Scene, options: DisplayOptions) -> None:
-        """Take over what only looks at the scene otherwise, without a step of its own."""
+        """Adopt a change of the display without a step of its own."""
         if self._seen is not None:
             self._seen = self._take(scene, options)
 
     def exchange(self, old: object, new: object) -> None:
-        """Put a feature's value about which more is known in the place of an older one."""
+        """Replace a feature's value by one with more information, without a step."""
 
         def exchanged(one: Snapshot) -> Snapshot:
             return replace(one, kept=new) if one.kept is old else one
@@ -116,13 +116,13 @@ class History:
         self._replace(exchanged)
 
     def follow(self, time: float) -> None:
-        """Take over poses that the clock has set, without a step; edits keep their steps.
+        """Adopt poses set by the clock, without a step; edits keep their steps.
 
-        Edits of the same frame must have been observed before the clock has posed the scene.
+        Edits of the same frame must be observed before the clock poses the scene.
         """
         if self._seen is None:
             return
-        actors = self._seen.actors  # others may have come to the scene since
+        actors = self._seen.actors  # other actors may have been added since
         poses = copied_poses(actors)
         self._seen = replace(self._seen, poses=poses, by_hand=(False,) * len(poses), time=time)
         self._clocked = {
@@ -132,7 +132,7 @@ class History:
         }
 
     def add_actors(self, scene: Scene, options: DisplayOptions) -> None:
-        """Go on with a scene to which actors were added at its end, as captures are read."""
+        """Extend all states by actors that were appended to the scene while captures are read."""
         whole = self._take(scene, options)
         known = {
             id(actor)
@@ -161,23 +161,23 @@ class History:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a step to go back to."""
+        """Whether there is a step to undo."""
         return bool(self._undo)
 
     @property
     def can_redo(self) -> bool:
-        """Whether a step was undone and can come back."""
+        """Whether there is a step to redo."""
         return bool(self._redo)
 
     def undo(self, scene: Scene, options: DisplayOptions, pose_at: PoseAt) -> bool:
-        """Go back one step; return whether there was one.
+        """Undo one step; return whether there was one.
 
         Parameters
         ----------
         scene, options : Scene, DisplayOptions
-            Changed to what they were.
+            Restored to their previous state.
         pose_at : callable
-            Goes to a time, with clips that were restored, and poses the actors for it.
+            Goes to a time and poses the actors for it by their restored clips.
         """
         self.observe(scene, options, busy=False)
         if not self._undo:
@@ -188,7 +188,7 @@ class History:
         return True
 
     def redo(self, scene: Scene, options: DisplayOptions, pose_at: PoseAt) -> bool:
-        """Go forward one step; return whether there was one. Parameters are those of ``undo``."""
+        """Redo one step; return whether there was one. Parameters are those of ``undo``."""
         self.observe(scene, options, busy=False)
         if not self._redo:
             return False
@@ -205,7 +205,7 @@ class History:
         options: DisplayOptions,
         pose_at: PoseAt,
     ) -> None:
-        """Go from one state of a step to the other."""
+        """Switch from one state of a step to the other."""
         restore_display(there, options)
         if self.feature is not None:
             self.feature.restore(there.kept)
@@ -219,7 +219,7 @@ class History:
             self._seen = replace(self._seen, looks=looks, options=shown, kept=self._kept())
 
     def _settle(self, restored: Snapshot, time: float) -> None:
-        """Put restored poses that were made by hand over those that the clock has set."""
+        """Restore the poses that were edited by hand over those that the clock has set."""
         self._seen = restored
         self.follow(time)
         rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
@@ -229,7 +229,7 @@ class History:
         self._seen = replace(restored, poses=copied_poses(restored.actors), time=time)
 
     def _replace(self, change: Callable[[Snapshot], Snapshot]) -> None:
-        """Replace every state that is kept."""
+        """Replace every stored state."""
         for steps in (self._undo, self._redo):
             steps[:] = [_Step(change(step.before), change(step.after)) for step in steps]
         self._seen, self._before = (
@@ -240,14 +240,14 @@ class History:
         actors = tuple(scene.actors)
         poses, by_hand = copied_poses(actors), tuple(map(self._is_by_hand, actors))
         looks, shown = tuple(map(look_of, actors)), copy.deepcopy(options)
-        # What was edited belongs to the time of the poses: the clock may have moved on already.
+        # An edit belongs to the time of the poses: the clock may have advanced already.
         time = (scene.time or 0.0) if self._seen is None else self._seen.time
         return Snapshot(actors, poses, by_hand, looks, shown, time, self._kept())
 
     def _is_by_hand(self, actor: Actor) -> bool:
-        """Return whether an actor's pose is another than the clock gave it by its present clip.
+        """Return whether an actor's pose differs from that which the clock set by its clip.
 
-        A clip that is new poses the actor in the same frame, whatever its pose was.
+        A new clip poses the actor in the same frame, whatever its pose was.
         """
         clip, offset, pose = self._clocked.get(actor, (None, 0.0, None))
         if clip is None or clip is not actor.clip or offset != actor.offset:
@@ -258,13 +258,13 @@ class History:
         return None if self.feature is None else self.feature.kept()
 
     def _has_another_value(self) -> bool:
-        """Return whether a feature's value is another; that it has none any more is no edit."""
+        """Return whether a feature's value has changed; losing its value is not an edit."""
         kept = self._kept()
         return kept is not None and (self._seen is None or kept is not self._seen.kept)
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
-    """Return what a clip of an earlier step is now that more of its capture has been read."""
+    """Return the extended version of an earlier step's clip, of which more has been read."""
     if isinstance(old, SampledClip) and isinstance(new, SampledClip):
         return with_rate(new, old.timing.frame_rate)
     if isinstance(old, PointClip) and isinstance(new, PointClip):

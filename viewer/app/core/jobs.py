@@ -1,4 +1,4 @@
-"""Work that takes longer than a frame: shown with its progress, and cancelled by a key."""
+"""Jobs that take longer than a frame, with their progress and cancellation."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from viewer.errors import ViewerError
 __all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
 
 Report = Callable[[int, int, str], None]
-"""Told the steps done, all steps, and what comes next; raises to end the work."""
+"""Called with the steps done, the number of steps and the next one; raises to cancel."""
 
 
 class Job(Protocol):
-    """What the interface must know of work that goes on.
+    """Interface of a running job.
 
     Attributes
     ----------
     title : str
-        What is being done.
+        Description of the job.
     error : str
-        Why it ended early; empty if nothing is wrong.
+        Why it failed; empty if it did not.
     lines : list of str
-        What it says when it is done.
+        Messages at the end.
     can_cancel : bool
         Whether it can be ended early.
     """
@@ -36,30 +36,30 @@ class Job(Protocol):
 
     @property
     def is_done(self) -> bool:
-        """Whether it has ended, well or not."""
+        """Whether it has ended, successfully or not."""
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Steps done and steps in all; (0, 0) if nobody knows."""
+        """Steps done and number of steps; (0, 0) if unknown."""
 
     def step(self) -> None:
-        """Do a little of it, if it is done between frames."""
+        """Do the next step if the job runs between frames."""
 
     def cancel(self) -> None:
-        """End it; nothing half-written stays."""
+        """Cancel it; no partial file stays."""
 
 
 class ThreadJob:
-    """Work that needs no OpenGL, in a thread of its own.
+    """Job without OpenGL in its own thread.
 
     Parameters
     ----------
     title : str
-        What is being done.
+        Description of the job.
     act : callable
-        Returns lines that say what was done; raises ViewerError.
+        Returns messages about the result; raises ViewerError.
     wake : callable
-        Called from the thread at the end.
+        Called from the thread when it ends.
     """
 
     def __init__(
@@ -87,33 +87,33 @@ class ThreadJob:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Nobody knows."""
+        """Unknown: (0, 0)."""
         return 0, 0
 
     def step(self) -> None:
-        """Nothing: the thread works."""
+        """Do nothing: the thread does the work."""
 
     def cancel(self) -> None:
-        """Nothing: one file is finished sooner than it is taken back."""
+        """Do nothing: one file is finished sooner than removed."""
 
     def wait(self) -> None:
-        """Return when it has ended."""
+        """Wait until it has ended."""
         self._thread.join()
 
 
 class _EndedError(ViewerError):
-    """Unwinds work that was cancelled."""
+    """Raised to unwind a cancelled job."""
 
 
 class CountedJob:
-    """Work in a thread of its own that tells how far it is, and can be ended between two steps.
+    """Job in its own thread that reports its progress and can be cancelled between steps.
 
     Parameters
     ----------
     title : str
-        What is being done, until the work itself says more.
+        Description of the job until it reports its first step.
     act : callable
-        Given a ``Report``; returns lines that say what was done; raises ViewerError.
+        Gets a ``Report``; returns messages about the result; raises ViewerError.
     """
 
     def __init__(self, title: str, act: Callable[[Report], list[str]]) -> None:
@@ -142,35 +142,35 @@ class CountedJob:
 
     @property
     def is_done(self) -> bool:
-        """Whether it has ended, or nobody wants it any more."""
+        """Whether it has ended or was cancelled."""
         return self._is_cancelled or not self._thread.is_alive()
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Steps done and steps in all; (0, 0) before the first."""
+        """Steps done and number of steps; (0, 0) before the first."""
         return self._progress
 
     def step(self) -> None:
-        """Nothing: the thread works."""
+        """Do nothing: the thread does the work."""
 
     def cancel(self) -> None:
-        """Let it end before its next step; what it makes until then is for nobody."""
+        """Let it end before its next step; its result is discarded."""
         self._is_cancelled = True
 
     def wait(self) -> None:
-        """Return when the thread has ended."""
+        """Wait until the thread has ended."""
         self._thread.join()
 
 
 class FrameJob:
-    """Work that draws, a step after each frame of the window.
+    """Job that draws, one step after each frame of the window.
 
     Parameters
     ----------
     title : str
-        What is being done.
+        Description of the job.
     steps : generator
-        Yields (done, total) after each step and returns lines; closing it cleans up.
+        Yields (done, total) after each step and returns messages; closing it cleans up.
     """
 
     def __init__(self, title: str, steps: Generator[tuple[int, int], None, list[str]]) -> None:
@@ -187,7 +187,7 @@ class FrameJob:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Steps done and steps in all."""
+        """Steps done and number of steps."""
         return self._progress
 
     def step(self) -> None:
@@ -202,6 +202,6 @@ class FrameJob:
             self.error, self._is_done = str(problem), True
 
     def cancel(self) -> None:
-        """End it; what was begun is taken away by the generator."""
+        """Cancel it; the generator removes partial output."""
         self._steps.close()
         self._is_done = True

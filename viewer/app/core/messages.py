@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 __all__ = ["KINDS", "Message", "MessageLog", "Messages", "Note", "message_line"]
 
 KINDS = ("note", "status", "error")
-"""What is said by itself; in answer to a key or button; because something did not work."""
+"""Kinds: unsolicited notes, status after a key or button, and errors."""
 
-_MOST = 1000  # messages kept
+_MOST = 1000  # number of messages kept
 _NOTE_SECONDS = 4.0  # for which a short message is shown
 
 
 @dataclass(slots=True)
 class Message:
-    """A text that was said once or more.
+    """A text that was shown once or more.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Message:
     kind : str
         One of ``KINDS``.
     count : int
-        How often it was said.
+        How often it was shown.
     """
 
     text: str
@@ -36,12 +36,12 @@ class Message:
 
 @dataclass(slots=True)
 class MessageLog:
-    """The latest messages in the order in which they were said last, none of them twice."""
+    """The latest messages without duplicates, in the order in which they were last shown."""
 
     _messages: dict[tuple[str, str], Message] = field(default_factory=dict)
 
     def add(self, text: str, kind: str = "note") -> None:
-        """Keep a message; one that is known is counted and moves to the end.
+        """Add a message; a repeated one is counted and moves to the end.
 
         Parameters
         ----------
@@ -65,13 +65,13 @@ class MessageLog:
         return iter(self._messages.values())
 
     def listed(self, with_status: bool) -> list[Message]:
-        """Return the messages, the oldest first, with or without what keys and buttons did."""
+        """Return the messages, the oldest first, with or without those of kind ``status``."""
         return [message for message in self if with_status or message.kind != "status"]
 
 
 @dataclass(slots=True)
 class Note:
-    """A message that goes away by itself, or when the next one of its kind comes."""
+    """A message that times out or is replaced by the next one of its kind."""
 
     text: str
     until: float
@@ -80,38 +80,38 @@ class Note:
 
 @dataclass(slots=True)
 class Messages:
-    """Everything that was said, and what of it is shown now.
+    """All messages, and those shown now.
 
     Attributes
     ----------
     notes : list of Note
-        What is shown over the view.
+        Messages shown over the view.
     log : MessageLog
-        Everything that was said.
+        All messages.
     is_open : bool
         Whether the window "Messages" is open.
     lists_status : bool
-        Whether it lists what keys and buttons did as well.
+        Whether it lists messages of kind ``status`` too.
     """
 
     notes: list[Note] = field(default_factory=list)
     log: MessageLog = field(default_factory=MessageLog)
     is_open: bool = False
     lists_status: bool = False
-    _logged_error: str = ""  # the one that the log has already, while it is shown
+    _logged_error: str = ""  # the one already in the log, while it is shown
 
     def show(self, text: str, is_status: bool = False) -> None:
-        """Show a message for some seconds, and keep it in the log.
+        """Show a message for some seconds, and add it to the log.
 
         Parameters
         ----------
         text : str
             One line.
         is_status : bool
-            Whether it says what a key did, in place of what the key before did.
+            Whether it reports the result of a key or button and replaces the previous such message.
         """
         until = time.monotonic() + _NOTE_SECONDS + len(text) / 30.0
-        # What is said again stays longer, and does not push others out of the view.
+        # A repeated message stays longer and does not push others out of the view.
         self.notes[:] = [
             note for note in self.notes if note.text != text and not (is_status and note.is_status)
         ]
@@ -119,19 +119,19 @@ class Messages:
         self.log.add(text, "status" if is_status else "note")
 
     def log_error(self, error: str) -> None:
-        """Keep the error that is shown in the log, once while it is shown; empty if none is."""
+        """Log the error that is shown, once while it is shown; empty if there is none."""
         if error and error != self._logged_error:
             self.log.add(error, "error")
         self._logged_error = error
 
     def drop_old(self) -> None:
-        """Forget notes whose time is over."""
+        """Remove notes that have timed out."""
         now = time.monotonic()
         self.notes[:] = [note for note in self.notes if note.until > now]
 
 
 def message_line(message: Message) -> str:
-    """Return a message as one line, with how often it was said.
+    """Return a message as one line, with its number of repetitions.
 
     >>> message_line(Message("no uvs", "note", 3)), message_line(Message("no uvs", "error"))
     ('no uvs (3 times)', 'error: no uvs')

@@ -20,75 +20,75 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = ["MotionExtent"]
 
-_POINTS_A_TIME = 30_000  # posed in one frame of the interface: a motion takes some of those
-_MOST_POINTS = 2_000_000  # posed in all
+_POINTS_A_TIME = 30_000  # frames posed per frame of the interface
+_MOST_POINTS = 2_000_000  # frames posed in all
 _MOST_FRAMES = 32
-_MOST_PRODUCTS = 100_000_000  # of points and directions, where there are very many points
+_MOST_PRODUCTS = 100_000_000  # of points and directions, for very many points
 _N_DIRECTIONS = (100, 1000)
 
 
 @dataclass(slots=True)
 class MotionExtent:
-    """Outermost points of a scene in some frames of its motion; of a still scene, as it was opened.
+    """Outermost points of a scene in some frames of its motion; of a static scene as it was opened.
 
-    A capture that is being read is looked at as it comes: frames are taken at a step that doubles
-    whenever there are too many. When all is there they are those that a recording is fitted to.
+    A capture is sampled while it is being read: frames are taken at a step that doubles
+    whenever there are too many. In the end they are the frames that a recording is fitted to.
 
     Attributes
     ----------
     is_done : bool
-        Whether all frames have been looked at.
+        Whether all frames have been sampled.
     was_edited : bool
-        Whether somebody has changed a shape or a motion since the scene was opened.
+        Whether a shape or a motion has been edited since the scene was opened.
     """
 
     is_done: bool = False
     was_edited: bool = False
-    _clouds: dict[float, Floats] = field(default_factory=dict)  # by the seconds they are seen at
-    _kept: dict[float, Floats] = field(default_factory=dict)  # of before an edit
+    _clouds: dict[float, Floats] = field(default_factory=dict)  # by time, seconds
+    _kept: dict[float, Floats] = field(default_factory=dict)  # from before an edit
     _shapes: tuple[bytes, ...] = ()
     _motions: tuple[object, ...] = ()
     _opened: dict[int, tuple[Actor, Figure, Pose]] = field(default_factory=dict)
     _grew: bool = False
 
     def restart(self) -> None:
-        """Forget everything: other figures are shown, or these in other poses."""
+        """Start over, for other figures or other poses."""
         self.is_done = self.was_edited = self._grew = False
         self._clouds, self._kept, self._opened = {}, {}, {}
         self._shapes, self._motions = (), ()
 
     @property
     def points(self) -> Floats:
-        """What was found: (N, 3), scene space; the origin if nobody was seen."""
+        """Points found: (N, 3), scene space; the origin if everybody was absent."""
         clouds = [cloud for cloud in {**self._kept, **self._clouds}.values() if len(cloud)]
         return np.concatenate(clouds) if clouds else np.zeros((1, 3))
 
     @property
     def box(self) -> Floats:
-        """The box around all of them: (2, 3)."""
+        """Bounding box of all of them: (2, 3)."""
         return bounding_box(self.points)
 
     def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
-        """Look at some more frames; return whether there was one.
+        """Sample some more frames; return whether there was one.
 
         Parameters
         ----------
         scene : Scene
-            As it is shown; nothing of it changes.
+            As it is shown; left unchanged.
         clock : Clock
             Gives the frames.
         show : str
-            What is drawn of the figures, a key of ``SHOWN``.
+            Visible parts of the figures, a key of ``SHOWN``.
         grows : bool
             Whether more of the motion is still to come.
         """
         shapes = tuple(map(_own_shape, scene.actors))
         motions = tuple(map(_own_motion, scene.actors))
         is_edited = shapes[: len(self._shapes)] != self._shapes
-        if not grows and not self._grew:  # motions that grow are no edits
+        if not grows and not self._grew:  # growing motions are not edits
             is_edited |= motions[: len(self._motions)] != self._motions
         if is_edited or (self._grew and not grows):
-            # Frames are looked at again: after an edit, or as another capture had not come so far.
+            # Frames are sampled again after an edit, or when another capture has caught up.
             self._kept, self._clouds = {**self._kept, **self._clouds}, {}
         self.was_edited |= is_edited
         self._shapes, self._motions, self._grew = shapes, motions, grows
@@ -102,16 +102,16 @@ class MotionExtent:
         return bool(left)
 
     def _keep_poses(self, scene: Scene) -> None:
-        """Remember the pose that each actor has at first: edits do not move the ground."""
+        """Remember the initial pose of each actor: edits do not move the ground."""
         for actor in scene.actors:
             known = self._opened.get(id(actor))
             if actor.pose is not None and (known is None or known[1] is not actor.figure):
                 self._opened[id(actor)] = actor, actor.figure, actor.pose.copy()
 
     def _left(self, scene: Scene, clock: Clock, grows: bool) -> list[float]:
-        """Return the times to look at next, and drop those that no longer count."""
+        """Return the times to sample next, and drop those that no longer count."""
         first, last = clock.frame_range if clock.has_motion else (0, 0)
-        last = max(first, last)  # a motion may lie between two frames
+        last = max(first, last)  # a motion may lie entirely between two frames
         if grows:
             wanted = set(map(clock.frame_time, _growing(first, last)))
         else:
@@ -121,14 +121,14 @@ class MotionExtent:
             for known in (self._clouds, self._kept):
                 for time in known.keys() - wanted:
                     del known[time]
-        # What was lowest comes first: the ground must not lag behind a shape's slider.
+        # The lowest frame comes first: the ground must not lag behind a shape's slider.
         up = "xyz".index(scene.up)
         lowest = {time: cloud[:, up].min() for time, cloud in self._kept.items() if len(cloud)}
         left = wanted - self._clouds.keys()
         return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
 
     def _cloud(self, scene: Scene, clock: Clock, time: float, show: str) -> Floats:
-        """Return the outermost points at one time; none if nobody is there."""
+        """Return the outermost points at one time; none if everybody is absent."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
             if actor.pose is not None:
@@ -141,13 +141,13 @@ class MotionExtent:
                 return np.zeros((0, 3))
         points = scene_points(seen, show)
         if not clock.has_motion:
-            return points  # one frame: to keep all takes less time than to choose
+            return points  # one frame: keeping all points is faster than choosing
         low, high = _N_DIRECTIONS
         return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))
 
 
 def _growing(first: int, last: int) -> list[int]:
-    """Return at most 33 frames of a motion that grows: what was looked at once still counts.
+    """Return at most 33 frames of a growing motion, so that frames sampled earlier still count.
 
     >>> _growing(0, 3), _growing(0, 70)[:4]
     ([0, 1, 2, 3], [0, 4, 8, 12])
@@ -159,13 +159,13 @@ def _growing(first: int, last: int) -> list[int]:
 
 
 def _own_shape(actor: Actor) -> bytes:
-    """Return the key of a shape that no motion changes."""
+    """Return a key that identifies the shape, which no motion changes."""
     is_driven = isinstance(actor.clip, SampledClip) and actor.clip.shape_weights is not None
     return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
 
 
 def _own_motion(actor: Actor) -> tuple[object, ...]:
-    """Return the key of what moves and places an actor; clips are replaced when they are edited."""
+    """Return a key of an actor's motion and placement; edited clips are new objects."""
     return actor.clip, actor.offset, actor.placement.tobytes()
 
 

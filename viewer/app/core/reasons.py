@@ -1,4 +1,4 @@
-"""Reasons why a control cannot act right now, for its tooltip; empty where it can."""
+"""Reasons why controls are disabled, for their tooltips; empty where they are enabled."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ __all__ = [
 
 
 def no_motion(state: AppState) -> str:
-    """Say why time cannot be moved."""
-    return "" if state.clock.has_motion else "nothing moves: open a clip, a capture or a BVH"
+    """Return why time cannot be moved."""
+    return "" if state.clock.has_motion else "no motion: open a clip, a capture or a BVH"
 
 
 def no_panel(state: AppState, needs: str) -> str:
-    """Say why a panel has nothing to show.
+    """Return why a panel has nothing to show.
 
     Parameters
     ----------
     state : AppState
         With the scene.
     needs : str
-        As the table of panels says.
+        Entry of the table of panels.
     """
     if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
         return no_motion(state)
@@ -45,65 +45,65 @@ def no_panel(state: AppState, needs: str) -> str:
 
 
 def no_pose(state: AppState) -> str:
-    """Say why the chosen actor cannot be posed."""
+    """Return why the chosen actor cannot be posed."""
     return "" if state.actor.pose is not None else f"{_what(state)} has no joints to pose"
 
 
 def no_new_clip(state: AppState) -> str:
-    """Say why the chosen actor cannot get a clip."""
-    return no_pose(state) or ("it has a motion already" if state.actor.clip is not None else "")
+    """Return why the chosen actor cannot get a clip."""
+    return no_pose(state) or ("it already has a motion" if state.actor.clip is not None else "")
 
 
 def nothing_to_export(state: AppState) -> str:
-    """Say why no motion can be written."""
+    """Return why no motion can be written."""
     if any(isinstance(actor.clip, Clip | SampledClip) for actor in state.scene.actors):
         return ""
     if state.clock.has_motion:
-        return "captured points alone move, and no joints"
+        return "only captured points move, no joints"
     return no_motion(state)
 
 
 def no_job_room(state: AppState) -> str:
-    """Say why no other long work can be begun."""
+    """Return why no other job can be started."""
     return "" if state.job is None else f"wait for: {state.job.title}"
 
 
 def no_undo(state: AppState) -> str:
-    """Say why nothing can be taken back."""
-    return "" if state.history.can_undo else "nothing was changed"
+    """Return why there is nothing to undo."""
+    return "" if state.history.can_undo else "nothing to undo"
 
 
 def no_redo(state: AppState) -> str:
-    """Say why nothing can be brought back."""
-    return "" if state.history.can_redo else "nothing was undone"
+    """Return why there is nothing to redo."""
+    return "" if state.history.can_redo else "nothing to redo"
 
 
 def no_mesh(state: AppState) -> str:
-    """Say why the ways to draw surfaces do nothing."""
+    """Return why settings of surfaces have no effect."""
     has_one = any(actor.figure.mesh is not None for actor in state.scene.actors)
     return "" if has_one else "there is no mesh"
 
 
 def no_skeleton(state: AppState) -> str:
-    """Say why no skeleton can be drawn."""
+    """Return why no skeleton can be drawn."""
     has_one = any(actor.figure.skeleton is not None for actor in state.scene.actors)
     return "" if has_one else "there is no skeleton"
 
 
 def no_skin(state: AppState) -> str:
-    """Say why there is no binding space to show."""
+    """Return why there is no binding space to show."""
     has_one = any(actor.figure.is_attached for actor in state.scene.actors)
     return "" if has_one else "there is no skin that follows a skeleton"
 
 
 def no_texture(state: AppState) -> str:
-    """Say why the texture makes no difference."""
+    """Return why the texture has no effect."""
     meshes = [actor.figure.mesh for actor in state.scene.actors]
     has_one = any(
         mesh is not None and any(material.image is not None for material in mesh.materials)
         for mesh in meshes
     )
-    return "" if has_one else "no figure here has a texture: drop a picture on the window"
+    return "" if has_one else "no figure in the scene has a texture: drop a picture on the window"
 
 
 def _what(state: AppState) -> str:

@@ -1,4 +1,4 @@
-"""One state of the scene and its display, as undo keeps and restores it."""
+"""Snapshots of the scene and its display, which undo stores and restores."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """An actor without its pose: how it moves, and how it is shown."""
+    """Motion and display settings of an actor, without its pose."""
 
     clip: Motion | None
     offset: float
@@ -39,20 +39,20 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """All that can be undone.
+    """Everything that undo covers.
 
     Attributes
     ----------
     actors : tuple of Actor
-        Who is in the scene.
+        Actors of the scene.
     poses : tuple of Pose or None
-        One for each actor.
+        One per actor.
     by_hand : tuple of bool
-        Whether an actor's pose is not the one that its clip has at ``time``.
+        Whether an actor's pose differs from that of its clip at ``time``.
     looks : tuple of Look
-        One for each actor.
+        One per actor.
     options : DisplayOptions
-        How the scene is shown.
+        Display settings of the scene.
     time : float
         Seconds of the scene's clock.
     kept : object or None
@@ -74,7 +74,7 @@ def copied_poses(actors: Sequence[Actor]) -> tuple[Pose | None, ...]:
 
 
 def look_of(actor: Actor) -> Look:
-    """Return what an actor is beside its pose."""
+    """Return an actor's motion and display settings."""
     placement = actor.placement.tobytes()
     return Look(actor.clip, actor.offset, actor.visible, actor.color, placement)
 
@@ -87,12 +87,12 @@ def same_pose(old: Pose | None, new: Pose | None) -> bool:
 
 
 def is_current(snapshot: Snapshot, scene: Scene, options: DisplayOptions) -> bool:
-    """Return whether the scene and its display are as they were; the template is left out."""
+    """Return whether the scene and its display are unchanged, ignoring the template."""
     if snapshot.options != options:
         return False
     if [*map(id, snapshot.actors)] != [*map(id, scene.actors)]:
         return False
-    # Clips are compared by identity: they are never changed, only replaced.
+    # Clips are compared by identity: they are replaced and never mutated.
     pairs = zip(scene.actors, snapshot.looks, strict=True)
     if any(look_of(actor) != look for actor, look in pairs):
         return False
@@ -101,7 +101,7 @@ def is_current(snapshot: Snapshot, scene: Scene, options: DisplayOptions) -> boo
 
 
 def is_same(one: Snapshot, other: Snapshot) -> bool:
-    """Return whether nothing would change by going from one state to the other."""
+    """Return whether two states are equal in everything that undo restores."""
     if (one.options, one.looks) != (other.options, other.looks):
         return False
     return one.kept is other.kept and have_same_motion(one, other)
@@ -118,7 +118,7 @@ def have_same_motion(one: Snapshot, other: Snapshot) -> bool:
 
 
 def restore_motion(snapshot: Snapshot, scene: Scene) -> None:
-    """Bring back the actors of a scene with their poses and clips."""
+    """Restore the actors of a scene with their poses and clips."""
     scene.actors[:] = snapshot.actors
     for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
         actor.pose = pose.copy() if pose else None
@@ -126,7 +126,7 @@ def restore_motion(snapshot: Snapshot, scene: Scene) -> None:
 
 
 def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:
-    """Bring back how the actors of a snapshot and the scene were shown, and where they stood."""
+    """Restore the display settings and placements of a snapshot's actors and scene."""
     for actor, look in zip(snapshot.actors, snapshot.looks, strict=True):
         actor.visible, actor.color = look.visible, look.color
         actor.placement = np.frombuffer(look.placement).reshape(4, 4).copy()

@@ -1,4 +1,4 @@
-"""AppState: the scene that is open, and what the core of the window keeps about it."""
+"""State shared by all features of the window: the open scene and what the core keeps about it."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = ["AppState"]
 
-_FARTHEST = 1e4  # sizes of the scene
+_FARTHEST = 1e4  # in sizes of the scene
 
 Part = TypeVar("Part")
 
 
 @dataclass(slots=True)
 class AppState:
-    """What every feature of the window reads and changes; what only one needs is its own ``of``.
+    """State that all features share; ``of`` gives the state of a single feature.
 
     Attributes
     ----------
     scene, camera, options : Scene, Camera, DisplayOptions
-        What is shown, from where, and how.
+        The scene, its point of view and its display settings.
     box : (2, 3)
-        Around the scene in its present shape, as it was opened or over its whole motion: the grid
-        lies under it.
+        Bounding box of the scene in its current shape, as opened or over its whole motion: the grid
+        lies at its bottom.
     paths : tuple of Path
         The files of the scene; empty for the bundled figure.
     opened_at : float
         When the scene was opened, seconds since the epoch.
     motion_settings : MotionSettings or None
-        How its motions were read, if that was asked for.
+        Settings with which its motions were read, if any were given.
     chosen_actor : int
         Index of the actor that panels act on.
     n_choices : int
-        How often an actor was chosen: what is kept about the one before is void.
+        Number of choices of an actor: state kept for an earlier choice is invalid.
     selected_joint : int
         Of the chosen actor; -1 for none.
     in_degrees : bool
@@ -62,23 +62,23 @@ class AppState:
     view_rect : (x, y, width, height)
         The part of the window that panels leave free, in window coordinates.
     item_rects : dict
-        Where each labelled widget was drawn last: (x0, y0, x1, y1). Tests aim by it.
+        Last rectangle of each labelled widget: (x0, y0, x1, y1). Tests use it to aim.
     wants : set of str
-        What the window has to do after the frame: "screenshot", "quit", "open dialog".
+        Requests to the window, served after the frame: "screenshot", "quit", "open dialog".
     error : str
-        What failed, shown over everything; empty for nothing.
+        Error message shown over everything; empty if there is none.
     messages : Messages
-        What was said, and what is still shown of it.
+        All messages, and those shown now.
     stats : Stats
-        What the last frame took.
+        Statistics of the last frame.
     history : History
         Steps to undo.
     framing : Framing
-        Whether the camera keeps fitting what is shown.
+        State of the camera's fitting.
     clock : Clock
-        Moves the scene's time, and poses the actors for it.
+        Advances the scene's time, and poses the actors for it.
     job : Job or None
-        Work that goes on beside the frame loop.
+        Job that runs beside the frame loop.
     """
 
     scene: Scene
@@ -109,12 +109,12 @@ class AppState:
         self._begin()
 
     def of(self, kind: type[Part]) -> Part:
-        """Return a feature's own state, made when it is first asked for.
+        """Return a feature's own state, created on first use.
 
         Parameters
         ----------
         kind : type
-            A dataclass of the feature that can be made without arguments.
+            Dataclass of the feature with a default for every field.
         """
         part = self._parts.get(kind)
         if not isinstance(part, kind):
@@ -132,10 +132,10 @@ class AppState:
         return self.scene.actors[self.chosen_actor]
 
     def choose_actor(self, index: int) -> None:
-        """Let panels act on another actor."""
+        """Choose the actor that panels act on."""
         self.chosen_actor = index
         self.n_choices += 1
-        self.clock.follow(self.actor)  # one steps by its frames
+        self.clock.follow(self.actor)  # stepping uses its frames
         self.selected_joint = -1
 
     @property
@@ -146,11 +146,11 @@ class AppState:
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """All that was read for the scene, which no result replaces."""
+        """All figures that were read for the scene, which no result replaces."""
         return (*self.paths, *self.scene.files)
 
     def show_scene(self, scene: Scene, paths: Sequence[Path]) -> None:
-        """Replace the scene; the camera sees its front from where it saw the last one's."""
+        """Replace the scene; the camera keeps its direction relative to the front."""
         points = scene_points(scene, self.options.show)
         self.scene, self.paths = scene, tuple(paths)
         self.opened_at, self.motion_settings = time.time(), None
@@ -158,32 +158,32 @@ class AppState:
         self.camera.up, self.camera.fixed = scene.up, None
         self.set_front("auto")
         self.framing.restart()
-        # Body parts and levels of detail mean something else on another model.
+        # Body parts and levels of detail differ between models.
         self.options.hidden_parts, self.options.reduced = (), False
         self.options.path_joints = ()
         self.choose_actor(0)
         self._begin()
 
     def _begin(self) -> None:
-        """Go to the start of the scene's motion; nothing of it has been changed yet."""
+        """Go to the start of the scene's motion, with an empty history."""
         self.clock.show(self.scene)
         self.history.start(self.scene, self.options)
         self.say(*self.scene.diagnostics)
 
     def set_front(self, front: Front) -> None:
-        """Say which axis the figures face, or let it be guessed; the camera turns as far.
+        """Set or estimate the axis that the figures face; the camera rotates with it.
 
         Parameters
         ----------
         front : str
-            ``"auto"``, or an axis as ``"+z"``, not the one that points up.
+            ``"auto"``, or an axis such as ``"+z"``, other than the up axis.
         """
         ahead = front_azimuth(guess_front(self.scene) if front == "auto" else front, self.scene.up)
         orbit(self.camera, ahead - self.camera.front, 0.0)
         self.camera.front = ahead
 
     def limit_camera(self) -> None:
-        """Keep the camera where float32 still draws the scene: near it, by its size."""
+        """Keep the camera close enough to the scene for float32."""
         size = box_size(self.box) or 1.0
         camera, center = self.camera, self.box.mean(axis=0)
         camera.distance = min(max(camera.distance, 1e-5 * size), _FARTHEST * size)
@@ -193,10 +193,10 @@ class AppState:
             camera.target = center + away * (_FARTHEST * size / length)
 
     def say(self, *messages: str | Diagnostic) -> None:
-        """Show messages that go away by themselves; longer ones stay longer."""
+        """Show messages that time out; longer ones stay longer."""
         for message in messages:
             self.messages.show(str(message))
 
     def say_status(self, text: str) -> None:
-        """Show what a key did, in place of what the key before did."""
+        """Show the result of a key or button in place of the previous one."""
         self.messages.show(text, is_status=True)

@@ -1,4 +1,4 @@
-"""Statistics of the last frame: what it took, who drew it, and the range of its colours."""
+"""Statistics of the last frame: duration, renderer and the range of its colours."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Stats"]
 
 @dataclass(slots=True)
 class Stats:
-    """What the last frame took and who drew it."""
+    """Duration and renderer of the last frame."""
 
     frame_ms: float = 0.0
     renderer: str = ""

@@ -1,4 +1,4 @@
-"""Undo and redo as actions of the window: the chosen actor stays chosen."""
+"""Undo and redo as actions of the window, which keep the chosen actor."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["redo", "undo"]
 
 
 def undo(state: AppState) -> None:
-    """Take back the last change of pose or display."""
+    """Undo the last change of pose or display."""
     before = state.actor
     pose_at = partial(state.clock.go_back, chosen=before)
     if not state.history.undo(state.scene, state.options, pose_at):
@@ -20,7 +20,7 @@ def undo(state: AppState) -> None:
 
 
 def redo(state: AppState) -> None:
-    """Bring back the change that was undone last."""
+    """Redo the change that was undone last."""
     before = state.actor
     pose_at = partial(state.clock.go_back, chosen=before)
     if not state.history.redo(state.scene, state.options, pose_at):
@@ -29,7 +29,7 @@ def redo(state: AppState) -> None:
 
 
 def _keep_choice(state: AppState, before: Actor) -> None:
-    """Keep the chosen actor, wherever it is now; choose anew if it is there no more."""
+    """Keep the chosen actor at its new index, or choose another if it is gone."""
     actors, row = state.scene.actors, state.chosen_actor
     if row < len(actors) and actors[row] is before:
         return

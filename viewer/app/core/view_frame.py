@@ -1,4 +1,4 @@
-"""Between the scene and the window: where points are seen, and what lies under the pointer."""
+"""Projection between the scene and the window, in both directions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["ViewFrame", "view_frame"]
 Place = tuple[float, float]
 """A point of the window, window coordinates."""
 
-_NEAREST = 1e-9  # of clip space's w: what is nearer is beside or behind the eye
+_NEAREST = 1e-9  # smallest w in clip space: nearer points are beside or behind the eye
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,7 @@ class ViewFrame:
     rect: tuple[float, float, float, float]
 
     def project(self, points: Floats) -> Floats:
-        """Return where points are seen: (..., 3) to (..., 2), NaN for those not before the eye."""
+        """Return the projections of points: (..., 3) to (..., 2), NaN for those behind the eye."""
         clip = points @ self.matrix[:, :3].T + self.matrix[:, 3]
         w = clip[..., 3:]
         ratio = clip[..., :2] / np.where(w > _NEAREST, w, np.nan)
@@ -44,24 +44,24 @@ class ViewFrame:
         )
 
     def place(self, point: Floats) -> Place | None:
-        """Return where one point is seen, None if it is not before the eye."""
+        """Return the projection of a point, None if it is behind the eye."""
         seen = self.project(point)
         return (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
 
     def at_depth_of(self, point: Floats, place: Place) -> Floats:
-        """Return the point seen at a place, as deep in the view as another point.
+        """Return the point at a place of the window, at the depth of another point.
 
         Parameters
         ----------
         point : (3,)
-            Scene space, before the eye.
+            Scene space, in front of the eye.
         place : (float, float)
             Window coordinates.
 
         Returns
         -------
         (3,)
-            On the plane through the point that is parallel to the picture.
+            On the plane through the point that is parallel to the image plane.
         """
         clip = self.matrix @ np.append(point, 1.0)
         found = np.linalg.solve(self.matrix, self._clip(place, clip[2], clip[3]))
@@ -75,7 +75,7 @@ class ViewFrame:
         return near, unit(far - near)
 
     def unit_length(self, point: Floats) -> float:
-        """Return how long a unit of the window is at a point's depth, scene units."""
+        """Return the length of a window unit at a point's depth, scene units."""
         seen = self.place(point)
         if seen is None:
             return 0.0
@@ -90,7 +90,7 @@ class ViewFrame:
 
 
 def view_frame(state: AppState) -> ViewFrame:
-    """Return how the scene is seen in the view right now."""
+    """Return the current projection of the scene in the view."""
     x, y, width, height = state.view_rect
     rect = (x, y, max(width, 1.0), max(height, 1.0))
     projection = state.camera.projection_matrix(state.aspect, state.box)

@@ -1,4 +1,4 @@
-"""Widgets that several panels use; each notes where it was drawn."""
+"""Widgets shared by several panels; each records where it was drawn."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ Rect = tuple[float, float, float, float]
 
 
 def note_item(state: AppState, label: str) -> None:
-    """Remember where the last widget is, under a label that tests can aim at."""
+    """Record the rectangle of the last widget under a label that tests can aim at."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     state.item_rects[label] = (low.x, low.y, high.x, high.y)
 
 
 @contextlib.contextmanager
 def disabled(why: str) -> Iterator[None]:
-    """Grey out what a block draws if there is a reason; ``explain`` puts it into a tooltip."""
+    """Disable the widgets of a block if there is a reason, which ``explain`` shows."""
     imgui.begin_disabled(bool(why))
     try:
         yield
@@ -52,14 +52,14 @@ def disabled(why: str) -> Iterator[None]:
 
 
 def explain(text: str, why: str = "") -> None:
-    """Give the last widget a tooltip: what it does, or why it cannot.
+    """Give the last widget a tooltip: its effect, or why it is disabled.
 
     Parameters
     ----------
     text : str
-        What it does; may be empty.
+        Its effect; may be empty.
     why : str
-        Why it is greyed out; empty if it is not.
+        Why it is disabled; empty if it is enabled.
     """
     flags = imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled
     words = "\n".join(filter(None, (text, why)))
@@ -68,16 +68,16 @@ def explain(text: str, why: str = "") -> None:
 
 
 def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
-    """Begin a small window over the view that takes no input; then ``imgui.end`` follows.
+    """Begin a small window over the view that takes no input; ``imgui.end`` must follow.
 
     Parameters
     ----------
     name : str
         Of the window.
     x, y : float
-        Where it is, in window coordinates.
+        Its position, in window coordinates.
     pivot : (float, float)
-        The part of it that is there: (0, 0) its upper left, (1, 1) its lower right corner.
+        Its corner at that position: (0, 0) for the upper left, (1, 1) for the lower right.
     """
     imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
     imgui.set_next_window_bg_alpha(0.86)
@@ -89,7 +89,7 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 
 
 def overlay_rect(state: AppState, name: str) -> Rect:
-    """Return where the window being drawn is; remembered under its name, as widgets are."""
+    """Return the rectangle of the current window, recorded under its name as for widgets."""
     place, size = imgui.get_window_pos(), imgui.get_window_size()
     rect = (place.x, place.y, place.x + size.x, place.y + size.y)
     state.item_rects[name] = rect
@@ -105,7 +105,7 @@ def slider(
     unit: str = "%.2f",
     flags: int = 0,
 ) -> float:
-    """Draw a slider and return its value; one that was not moved keeps every digit."""
+    """Draw a slider and return its value, which keeps every digit unless it was moved."""
     shown = plain_zero(value, unit)
     changed, moved = imgui.slider_float(label, shown, low, high, unit, flags)
     note_item(state, label)
@@ -114,7 +114,7 @@ def slider(
 
 
 def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
-    """Draw a check box and return its state; greyed out if there is a reason."""
+    """Draw a check box and return its state; disabled if there is a reason."""
     with disabled(why):
         result = imgui.checkbox(label, value)[1]
         note_item(state, label)
@@ -123,7 +123,7 @@ def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
 
 
 def button(state: AppState, label: str, why: str = "") -> bool:
-    """Draw a button and return whether it was pressed; greyed out if there is a reason."""
+    """Draw a button and return whether it was pressed; disabled if there is a reason."""
     with disabled(why):
         pressed = imgui.button(label)
         note_item(state, label)
@@ -132,7 +132,7 @@ def button(state: AppState, label: str, why: str = "") -> bool:
 
 
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
-    """Draw a menu's title and return whether it is open; then ``imgui.end_menu`` follows."""
+    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must follow then."""
     opened = imgui.begin_menu(text, enabled)
     if not opened:
         note_item(state, f"menu {text}")
@@ -142,7 +142,7 @@ def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
 def menu_item(
     state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
 ) -> bool:
-    """Draw an entry of a menu and return whether it was chosen; greyed if there is a reason."""
+    """Draw a menu item and return whether it was chosen; disabled if there is a reason."""
     chosen = imgui.menu_item(text, key, checked, not why)[0]
     note_item(state, text)
     explain("", why)
@@ -150,7 +150,7 @@ def menu_item(
 
 
 def same_line_if_room(text: str) -> None:
-    """Put a check box, radio button or button with this text beside the last widget if it fits."""
+    """Put the next check box or button with this text beside the last widget if it fits."""
     style = imgui.get_style()
     width = imgui.calc_text_size(text).x + imgui.get_frame_height() + style.item_inner_spacing.x
     end = imgui.get_item_rect_max().x + style.item_spacing.x + width
@@ -168,7 +168,7 @@ def choice(state: AppState, label: str, value: str, texts: dict[str, str]) -> st
 
 
 def plain_zero(value: float, text: str) -> float:
-    """Return a number for a widget: 0 in place of one that its format would show as -0.
+    """Return a number for a widget: 0 if its format would show it as -0.
 
     >>> plain_zero(-0.04, "%.1f s"), plain_zero(-0.06, "%.1f s")
     (0.0, -0.06)

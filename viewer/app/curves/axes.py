@@ -1,4 +1,4 @@
-"""Axes of the Curves panel's plot, and the places of curves on them."""
+"""Axes of the Curves panel's plot, with the scale and colours of its curves."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ __all__ = ["Color", "Plot", "curve_color", "factor_of", "measured"]
 Color = tuple[float, float, float, float]
 
 _COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
-_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # of one axis of several joints
+_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # for one axis of several joints
 
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """The plot as it is drawn in this frame.
+    """State of the plot in this frame.
 
     Attributes
     ----------
     state : AppState
-        What is shown and changed.
+        State that is shown and changed.
     curves : tuple of Curve
-        All that there are.
+        All curves of the motion.
     limits : (low, high, bottom, top)
-        Seconds of the clip's own, then values as they are shown.
+        Clip time in seconds, then values in the displayed unit.
     scale : (float, float)
-        Pixels per second, and per unit of what is shown.
+        Pixels per second and per displayed unit.
     """
 
     state: AppState
@@ -42,11 +42,11 @@ class Plot:
 
     @property
     def view(self) -> Curves:
-        """What the panel shows."""
+        """State of the Curves panel."""
         return self.state.of(Curves)
 
     def factor(self, row: int) -> float:
-        """Return what a curve's values are multiplied by to be shown."""
+        """Return the factor from a curve's values to the displayed unit."""
         return factor_of(self.state, self.curves[row])
 
     def color(self, row: int) -> Color:
@@ -54,14 +54,14 @@ class Plot:
         return curve_color(self.view, self.curves, row)
 
     def note(self, label: str, time: float, value: float, reach: float = 4.0) -> None:
-        """Remember where a point of the plot is, under a label that tests can aim at."""
+        """Record the position of a point of the plot under a label that tests can aim at."""
         place = implot.plot_to_pixels(time, value)
         rect = (place.x - reach, place.y - reach, place.x + reach, place.y + reach)
         self.state.item_rects[label] = rect
 
 
 def measured(state: AppState, curves: tuple[Curve, ...]) -> Plot:
-    """Return the plot that was begun, when its axes are set up."""
+    """Return the current plot, once its axes are set up."""
     box, place, size = implot.get_plot_limits(), implot.get_plot_pos(), implot.get_plot_size()
     limits = (box.x.min, box.x.max, box.y.min, box.y.max)
     state.item_rects["plot"] = (place.x, place.y, place.x + size.x, place.y + size.y)
@@ -70,7 +70,7 @@ def measured(state: AppState, curves: tuple[Curve, ...]) -> Plot:
 
 
 def factor_of(state: AppState, curve: Curve) -> float:
-    """Return what a curve's values are multiplied by to be shown: angles may be in degrees."""
+    """Return the factor from a curve's values to the displayed unit: angles may be in degrees."""
     return math.degrees(1.0) if curve.is_angle and state.in_degrees else 1.0
 
 

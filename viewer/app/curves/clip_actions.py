@@ -1,4 +1,4 @@
-"""Actions on a keyed clip as a whole: make one of a pose, add keys, save it."""
+"""Actions on a whole keyed clip: create one from a pose, add keys, save it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewer.rig.number_text import number_text
 
 __all__ = ["ask_for_clip", "can_have_keys", "key_present_pose", "new_clip", "save_clip"]
 
-_SECONDS = 2.0  # of a new clip
+_SECONDS = 2.0  # duration of a new clip
 
 
 def can_have_keys(state: AppState) -> bool:
@@ -29,11 +29,11 @@ def new_clip(state: AppState) -> None:
     if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
         return
     actor.clip = clip_from_pose(actor.figure.skeleton, actor.pose, actor.title, 0.0, _SECONDS)
-    state.say_status("New clip: two seconds that hold this pose")
+    state.say_status("New clip: this pose held for two seconds")
 
 
 def key_present_pose(state: AppState, only_changed: bool = False) -> None:
-    """Make the pose keys at the time that is shown."""
+    """Key the pose at the current time."""
     actor = state.actor
     if not isinstance(actor.clip, Clip) or actor.pose is None or actor.figure.skeleton is None:
         return
@@ -57,7 +57,7 @@ def ask_for_clip(state: AppState) -> None:
 
 
 def save_clip(state: AppState, path: Path) -> None:
-    """Write the chosen actor's clip, if it consists of keys."""
+    """Write the chosen actor's clip if it is keyed."""
     clip = state.actor.clip
     if isinstance(clip, Clip):
         save_files(state, lambda: write(clip, path), [path])

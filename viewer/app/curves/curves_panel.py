@@ -1,4 +1,4 @@
-"""Curves: a motion's channels over time, their keys, tangents and extrapolation, to be edited."""
+"""Curves panel: a motion's channels over time, with editable keys, tangents and extrapolation."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ _LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 20.0, 5.8  # letters' heights
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
 _TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}
 _SIDES = ("In", "Out")
-_FARTHEST = 1e9  # that can be typed
-_WIDE = "M" * 8  # about as wide as a field with its label
-_HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift takes more."
+_FARTHEST = 1e9  # largest number that can be typed
+_WIDE = "M" * 8  # about the width of a field with its label
+_HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift selects more."
 
 
 def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     curves = curves_of(state.actor)
     if not curves or state.actor.clip is None:
-        imgui.text_disabled("nothing moves this figure")
+        imgui.text_disabled("this figure has no motion")
         if can_have_keys(state) and button(state, "New clip"):
             new_clip(state)
         return
@@ -56,7 +56,7 @@ def draw(state: AppState) -> None:
         _draw_list(state, curves)
     imgui.end_child()
     imgui.same_line()
-    # Beside the plot, not above it: what appears there must not push a key from under the mouse.
+    # Beside the plot, not above it: widgets that appear must not push a key from under the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
     if clip_of(state) is not None:
         side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.45 * room)
@@ -75,7 +75,7 @@ def draw(state: AppState) -> None:
 
 
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Keep the choice to what there is, and follow the joint that is selected elsewhere."""
+    """Drop selected curves that are gone, and follow the joint that is selected elsewhere."""
     view, clip = state.of(Curves), state.actor.clip
     owner = (id(state.actor), type(clip).__name__, len(curves))
     if owner != view.owner:
@@ -108,7 +108,7 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
         return
     shown = _listed(curves, view.filter.lower())
     if not shown:
-        imgui.text_disabled("no channel is called so")
+        imgui.text_disabled("no channel has this in its name")
     if view.wants_scroll:
         view.wants_scroll = False
         above = shown.index(view.rows[0]) - 1 if view.rows and view.rows[0] in shown else 0
@@ -126,7 +126,7 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
-    """Return rows of curves, and before those of each joint its number as a text."""
+    """Return rows of curves, those of each joint preceded by its number as text."""
     listed: list[int | str] = []
     last: int | None = None
     for row, curve in enumerate(curves):
@@ -142,7 +142,7 @@ def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
 def _draw_heading(
     state: AppState, curves: tuple[Curve, ...], entry: str, shown: list[int | str]
 ) -> None:
-    """Draw a joint's name; a click chooses those of its curves that are listed."""
+    """Draw a joint's name; a click selects its listed curves."""
     rows = tuple(row for row in shown if isinstance(row, int) and curves[row].number == int(entry))
     name = curves[rows[0]].group
     is_chosen = set(rows) <= set(state.of(Curves).rows)
@@ -168,7 +168,7 @@ def _key_count(state: AppState, row: int) -> str:
 
 
 def _choose(state: AppState, rows: tuple[int, ...]) -> None:
-    """Show only these curves, or with Ctrl or Shift these too, or no more."""
+    """Show only these curves; Ctrl or Shift adds or removes them."""
     view, io = state.of(Curves), imgui.get_io()
     if io.key_ctrl or io.key_shift:
         if set(rows) <= set(view.rows):
@@ -185,16 +185,16 @@ def _draw_tools(state: AppState) -> None:
     view = state.of(Curves)
     if button(state, "Fit"):
         view.wants_fit = True
-    explain("show the chosen curves whole")
+    explain("fit the axes to the selected curves")
     if clip_of(state) is None:
         imgui.same_line()
-        imgui.text_disabled("frames, not keys: to be looked at")
+        imgui.text_disabled("sampled frames without keys: read-only")
         return
-    if _button_beside(state, "Add key", "on the shown curves, at the present time"):
+    if _button_beside(state, "Add key", "on the shown curves, at the current time"):
         add_key_at(state, view.rows, state.clock.time - state.actor.offset)
-    if _button_beside(state, "Key pose", "every DOF as it is posed, at the present time"):
+    if _button_beside(state, "Key pose", "key every DOF of the pose at the current time"):
         key_present_pose(state)
-    if _button_beside(state, "Key changes", "the same for DOFs alone that were posed anew"):
+    if _button_beside(state, "Key changes", "key only the DOFs that the pose has changed"):
         key_present_pose(state, only_changed=True)
     if _button_beside(state, "Save clip…", "as .anim"):
         ask_for_clip(state)
@@ -211,7 +211,7 @@ def _button_beside(state: AppState, text: str, words: str) -> bool:
 
 
 def _draw_modes(state: AppState) -> None:
-    """Draw what the curves in focus do before their first and after their last key."""
+    """Draw the extrapolation of the curves in focus before and after their keys."""
     rows, clip = focused_rows(state.of(Curves)), clip_of(state)
     channel = channel_of(clip, rows[0]) if rows and clip is not None else None
     if channel is None:
@@ -221,7 +221,7 @@ def _draw_modes(state: AppState) -> None:
             same_line_if_room(_WIDE)
         now = channel.extrapolation[side]
         new = choice(state, text, now, _MODES)
-        explain("of the curves with chosen keys, or else of all that are shown")
+        explain("of the curves with selected keys, otherwise of all shown curves")
         for mode in EXTRAPOLATIONS:
             if new == mode != now:
                 extrapolate(state, side, mode)
@@ -255,7 +255,7 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _field(state: AppState, label: str, value: float) -> float | None:
-    """Draw a number; return what was typed and entered."""
+    """Draw a number field; return the number that was entered."""
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
     entered, typed = imgui.input_double(label, plain_zero(value, "%.5g"), 0.0, 0.0, "%.5g", flags)
     note_item(state, label)
@@ -275,12 +275,12 @@ def _draw_numbers(state: AppState, channel: Channel, place: KeyPlace, factor: fl
 
 
 def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, text: str) -> None:
-    """Draw how the tangent on one side is found."""
+    """Draw the choice of the tangent rule on one side."""
     tangent = channel.tangents[place[1]][side]
     now = tangent if isinstance(tangent, str) else "number"
     new = choice(state, text, now, _TANGENTS)
     if new == "number" != now:
-        # The slope that the rule gave: the curve stays as it is.
+        # The slope that the rule gave keeps the curve unchanged.
         turn_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
     for rule in TANGENT_RULES:
         if new == rule != now:
@@ -288,7 +288,7 @@ def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, te
 
 
 def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
-    """Draw the slopes of tangents that are numbers, per second."""
+    """Draw the slopes of explicit tangents, per second."""
     pair = channel.tangents[place[1]]
     given = [(side, slope) for side, slope in enumerate(pair) if not isinstance(slope, str)]
     for number, (side, slope) in enumerate(given):

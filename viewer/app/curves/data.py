@@ -21,9 +21,9 @@ __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 
 _AXES = "xyz"
 _FIRST_ROTATION = 3
-_PLACE = "place"  # of the whole figure
+_PLACE = "place"  # group of the whole figure
 _MOST_POINTS = 2000
-_PAGE = 500  # frames by which the part of a long motion that is looked at moves on
+_PAGE = 500  # frames by which the visible part of a long motion advances
 
 Points = tuple[Floats, Floats]
 
@@ -37,7 +37,7 @@ class Curve:
     group : str
         The joint or keypoint, for the heading.
     number : int
-        That one's index; -1 for the whole figure.
+        Its index; -1 for the whole figure.
     name : str
         ``"x"``, ``"ty"`` …
     axis : int
@@ -54,7 +54,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Joint and axis."""
+        """Name of joint and axis."""
         return f"{self.group}.{self.name}"
 
 
@@ -64,10 +64,10 @@ _parts: Memo[Clip, Clip] = Memo(kept=2)
 
 
 def curves_of(actor: Actor) -> tuple[Curve, ...]:
-    """Return the curves of an actor's motion; a row's index is its number everywhere.
+    """Return the curves of an actor's motion; their indices are used as rows everywhere.
 
-    Of a keyed clip these are the DOFs; of frames the place of the figure and each joint's angles
-    about x, y and z (R = Rz Ry Rx); of captured points their coordinates.
+    For a keyed clip these are the DOFs; for frames the figure's position and each joint's angles
+    about x, y and z (R = Rz Ry Rx); for captured points their coordinates.
     """
     skeleton, points = actor.figure.skeleton, actor.figure.points
     if isinstance(actor.clip, PointClip) and points is not None:
@@ -108,7 +108,7 @@ def _point_curves(points: PointLayout) -> tuple[Curve, ...]:
 
 
 def channel_of(clip: Clip, row: int) -> Channel | None:
-    """Return the channel that moves a DOF, if there is one."""
+    """Return the channel that drives a DOF, None if there is none."""
     # Files list a channel for every DOF, in their order.
     if row < len(clip.channels) and clip.channels[row].target == row:
         return clip.channels[row]
@@ -139,12 +139,12 @@ def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: fl
     row : int
         See ``curves_of``.
     low, high : float
-        Seconds that are looked at; longer motions are thinned out only as far as needed there.
+        Visible range, seconds; longer motions are thinned out only as needed for it.
 
     Returns
     -------
     times, values : (P,)
-        Seconds; lengths or radians without jumps of full turns. NaN where nothing is.
+        Seconds; lengths or radians without jumps of 2 pi. NaN in gaps.
     """
     timing = clip.timing
     first, step = 0, 1
@@ -178,7 +178,7 @@ def _line(clip: SampledClip | PointClip, row: int, first: int, step: int) -> Poi
 
 
 def _places(clip: SampledClip, rows: np.ndarray) -> Floats:
-    """Return the place of the whole figure, and of its root within it: (N, 3)."""
+    """Return the position of the whole figure, including its root's: (N, 3)."""
     places = np.zeros((len(rows), 3))
     if clip.figure_translations is not None:
         places += clip.figure_translations[rows]

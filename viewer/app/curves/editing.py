@@ -1,4 +1,4 @@
-"""Edits of the chosen actor's clip in the Curves panel: each replaces it by a new one."""
+"""Edits of the chosen actor's clip in the Curves panel; each replaces it by a new clip."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
     "turn_tangent",
 ]
 
-_GAP = 1e-3  # seconds between keys that a mouse cannot close
+_GAP = 1e-3  # seconds: least distance of keys when dragging
 
 
 def clip_of(state: AppState) -> Clip | None:
@@ -55,18 +55,18 @@ def _change(state: AppState, rows: Iterable[int], change: Callable[[Channel], Ch
 
 
 def drop_missing(view: Curves, clip: Clip) -> None:
-    """Forget chosen keys that are there no more: undone, or deleted."""
+    """Deselect keys that no longer exist because they were undone or deleted."""
     counts = {channel.target: len(channel.times) for channel in clip.channels}
     view.keys = frozenset(place for place in view.keys if place[1] < counts.get(place[0], 0))
 
 
 def focused_rows(view: Curves) -> tuple[int, ...]:
-    """Return the curves that have chosen keys, or else all that are shown."""
+    """Return the curves with selected keys, otherwise all shown curves."""
     return tuple(sorted({row for row, _ in view.keys})) or view.rows
 
 
 def move_chosen(state: AppState, dt: float, dv: float) -> None:
-    """Move the chosen keys of all curves; they stop at keys that stay."""
+    """Move the selected keys of all curves; they stop at unselected keys."""
     keys: dict[int, list[int]] = {}
     for row, key in state.of(Curves).keys:
         keys.setdefault(row, []).append(key)
@@ -77,13 +77,13 @@ def move_chosen(state: AppState, dt: float, dv: float) -> None:
 def place_key(
     state: AppState, place: KeyPlace, time: float | None = None, value: float | None = None
 ) -> None:
-    """Put one key to a typed time or value."""
+    """Set the time or value of one key."""
     row, key = place
     _change(state, [row], lambda old: set_key(old, key, time, value))
 
 
 def add_key_at(state: AppState, rows: Iterable[int], time: float) -> None:
-    """Add keys on curves and choose them."""
+    """Add keys on curves and select them."""
     clip, places = clip_of(state), set[KeyPlace]()
     if clip is None:
         return
@@ -100,7 +100,7 @@ def _instead(new: Channel, _: Channel) -> Channel:
 
 
 def nearest_row(clip: Clip, view: Curves, time: float, value: float, factors: list[float]) -> int:
-    """Return the shown curve that is nearest to a value at a time, -1 if none is shown."""
+    """Return the shown curve nearest to a value at a time, -1 if none is shown."""
     if not view.rows:
         return -1
     values = keyed_values(clip, view.rows, np.array([time]))[0] * factors
@@ -108,7 +108,7 @@ def nearest_row(clip: Clip, view: Curves, time: float, value: float, factors: li
 
 
 def delete_chosen(state: AppState) -> None:
-    """Delete the chosen keys."""
+    """Delete the selected keys."""
     curves = state.of(Curves)
     for row in {row for row, _ in curves.keys}:
         keys = [key for place, key in curves.keys if place == row]
@@ -123,12 +123,12 @@ def turn_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tan
 
 
 def extrapolate(state: AppState, side: int, mode: Extrapolation) -> None:
-    """Set what the curves in focus do before (0) or after (1) their keys."""
+    """Set the extrapolation of the curves in focus before (0) or after (1) their keys."""
     _change(state, focused_rows(state.of(Curves)), lambda old: set_extrapolation(old, side, mode))
 
 
 def set_clip_range(state: AppState, start: float, end: float) -> None:
-    """Set the seconds that are meant to be played."""
+    """Set the clip's own time range, seconds."""
     clip = clip_of(state)
     if clip is not None:
         state.actor.clip = set_range(clip, start, end)

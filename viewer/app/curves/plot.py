@@ -1,6 +1,6 @@
-"""The plot of the Curves panel: lines, the range that is played, and the present time.
+"""Plot of the Curves panel: curves, the clip's range and the current time.
 
-Times are the clip's own seconds; angles are shown in the unit that the Joints panel shows.
+Times are seconds of the clip; angles have the unit of the Joints panel.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ __all__ = ["draw_plot"]
 _TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), (0.75, 0.75, 0.8, 0.55)
 _OUTSIDE = (0.0, 0.0, 0.0, 0.28)
 _MOST_SAMPLES = 900
-_DASHES = 90  # across the plot
-_MARGIN = 0.08  # around what is fitted, share of its size
+_DASHES = 90  # samples across the plot
+_MARGIN = 0.08  # margin around fitted curves, relative to their size
 _FARTHEST = 1e9
 _TIME_ID, _START_ID, _END_ID = 1, 2, 3
 
 
 def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Draw the chosen curves in the room that is left, and do what the mouse does there."""
+    """Draw the selected curves in the remaining space, and handle the mouse."""
     # A double click adds a key, so it cannot fit the axes as well.
     implot.get_input_map().fit = imgui.MouseButton_.middle
     flags = implot.Flags_.no_title | implot.Flags_.no_legend | implot.Flags_.no_menus
@@ -61,7 +61,7 @@ def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
     _draw_outside(plot)
     for row in view.rows:
         _draw_line(plot, row)
-    # Of what lies at one place, ImGui gives the mouse to what comes first.
+    # Of overlapping items, ImGui gives the mouse to the first one.
     touched = draw_keys(plot)
     _draw_time(plot)
     _draw_range(plot)
@@ -70,7 +70,7 @@ def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _draw_units(plot: Plot) -> None:
-    """Say in a corner what the values are."""
+    """Write the unit of the values in a corner."""
     kinds = {plot.curves[row].is_angle for row in plot.view.rows}
     angle = "degrees" if plot.state.in_degrees else "radians"
     text = ", ".join(["units"] * (False in kinds) + [angle] * (True in kinds))
@@ -80,7 +80,7 @@ def _draw_units(plot: Plot) -> None:
 
 
 def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, float, float]:
-    """Return axes that show the chosen curves from their first to their last key or frame."""
+    """Return axes that show the selected curves from their first to their last key or frame."""
     clip, rows = state.actor.clip, state.of(Curves).rows
     low, high = (0.0, 1.0) if clip is None else (clip.start, clip.end)
     if isinstance(clip, Clip):
@@ -104,7 +104,7 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     values = values[np.isfinite(values)]
     bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
     pad = 2.0 * _MARGIN * (top - bottom)
-    # Rounding alone is no reason to fill the height with it.
+    # Rounding errors must not fill the height.
     pad = pad if pad > 1e-6 * max(abs(top), 1e-6) else max(0.5 * abs(top), 0.5)
     return low, high, bottom - pad, top + pad
 
@@ -114,7 +114,7 @@ def _spec(color: Color, weight: float = 1.5, flags: int = 0) -> implot.Spec:
 
 
 def _draw_line(plot: Plot, row: int) -> None:
-    """Draw one curve: between its keys solid, the extrapolation dashed."""
+    """Draw one curve, solid between its keys and dashed where extrapolated."""
     clip, color, factor = plot.state.actor.clip, plot.color(row), plot.factor(row)
     low, high = plot.limits[:2]
     if isinstance(clip, SampledClip | PointClip):
@@ -138,17 +138,17 @@ def _draw_line(plot: Plot, row: int) -> None:
 
 
 def _inner_times(keys: Floats, low: float, high: float) -> Floats:
-    """Return times to draw at: evenly over what is seen, and on the keys themselves."""
+    """Return sample times: evenly over the visible range, and at the keys."""
     seen = keys[(keys >= low) & (keys <= high)][:_MOST_SAMPLES]
-    # Just before a key too: keys at one time make a jump.
+    # Just before a key too: two keys at one time make a jump.
     times = np.concatenate([np.linspace(low, high, _MOST_SAMPLES), seen, np.nextafter(seen, low)])
     return np.sort(np.clip(times, low, high))
 
 
 def _draw_dashes(plot: Plot, clip: Clip, row: int, start: float, end: float) -> None:
-    """Draw every other piece of a curve as three short lines, so that it bends."""
+    """Draw every other piece of a curve as three short lines that follow its bends."""
     step = (plot.limits[1] - plot.limits[0]) / _DASHES
-    # Whole multiples of the step, so that dashes stay where they are while panning.
+    # Multiples of the step, so that dashes stay in place while panning.
     lows = step * np.arange(math.floor(start / step), math.ceil(end / step))
     share = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
     points = np.clip((lows[:, None] + step * share).ravel(), start, end)
@@ -158,7 +158,7 @@ def _draw_dashes(plot: Plot, clip: Clip, row: int, start: float, end: float) -> 
 
 
 def _draw_outside(plot: Plot) -> None:
-    """Darken what lies outside of the range that is meant to be played."""
+    """Darken the plot outside the clip's range."""
     clip = plot.state.actor.clip
     if clip is None:
         return
@@ -173,7 +173,7 @@ def _draw_outside(plot: Plot) -> None:
 
 
 def _draw_range(plot: Plot) -> None:
-    """Draw the lines at which the range starts and ends; they can be dragged if there are keys."""
+    """Draw the ends of the range, which can be dragged if the clip has keys."""
     clip = plot.state.actor.clip
     if clip is None:
         return
@@ -192,7 +192,7 @@ def _draw_range(plot: Plot) -> None:
 
 
 def _draw_time(plot: Plot) -> None:
-    """Draw the present time; dragging it moves the clock by whole frames, with Alt freely."""
+    """Draw the current time; dragging it moves the clock by whole frames, with Alt freely."""
     state, offset = plot.state, plot.state.actor.offset
     time = state.clock.time - offset
     moved, time, *_ = implot.drag_line_x(_TIME_ID, time, _TIME, 1.5, implot.DragToolFlags_.no_fit)

@@ -1,4 +1,4 @@
-"""Keys and tangents in the plot of the Curves panel: drawn, dragged, added and deleted."""
+"""Keys and tangents in the Curves panel's plot: drawing, dragging, adding and deleting."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ __all__ = ["draw_keys", "edit"]
 
 _CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
 _FAINT = (0.75, 0.75, 0.8, 0.8)
-_MOST_KEYS = 300  # that can be taken hold of at once
-_SAME_KEY = 2.0  # points: keys nearer than this to one another could not be told apart
+_MOST_KEYS = 300  # number of keys that can be grabbed
+_SAME_KEY = 2.0  # points: keys closer than this could not be told apart
 _HANDLE_LENGTH = 4.0  # letters' heights
 _HANDLE_ID = 16
 _FIRST_KEY_ID = 32
@@ -39,7 +39,7 @@ _FIXED = implot.DragToolFlags_.no_fit
 def draw_keys(plot: Plot) -> bool:
     """Draw keys and tangents; return whether the mouse is at one of them.
 
-    Of what lies at one place, ImGui gives the mouse to what comes first: chosen keys, tangents,
+    Of overlapping items, ImGui gives the mouse to the first one: selected keys, tangents,
     other keys.
     """
     clip = clip_of(plot.state)
@@ -53,7 +53,7 @@ def draw_keys(plot: Plot) -> bool:
             values = plot.factor(row) * channel.values
             inside = (channel.times >= low) & (channel.times <= high)
             inside &= (values >= bottom) & (values <= top)
-            # A key that is dragged out of the plot is still held.
+            # A key dragged out of the plot is still held.
             inside[[key for owner, key in plot.view.keys if owner == row]] = True
             seen.append((row, channel.times, values, np.flatnonzero(inside).tolist()))
     if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
@@ -73,7 +73,7 @@ def draw_keys(plot: Plot) -> bool:
 
 
 def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
-    """Draw the chosen keys once more, over everything."""
+    """Draw the selected keys once more, over everything."""
     implot.push_plot_clip_rect()
     for place, time, value in chosen:
         middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
@@ -84,7 +84,7 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
 
 
 def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
-    """Draw more keys than a mouse could tell apart as mere dots."""
+    """Draw keys that are too many to grab as plain dots."""
     for row, times, values, keys in seen:
         if keys:
             color = plot.color(row)
@@ -124,7 +124,7 @@ def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
 
 
 def _draw_handles(plot: Plot) -> bool:
-    """Draw the tangents of a key that is chosen alone; return whether the mouse is at one."""
+    """Draw the tangents of a single selected key; return whether the mouse is at one."""
     clip, view = clip_of(plot.state), plot.view
     if clip is None or len(view.keys) != 1:
         return False
@@ -137,7 +137,7 @@ def _draw_handles(plot: Plot) -> bool:
 
 
 def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bool:
-    """Draw one tangent as a line of fixed length with a knob; dragging makes it a slope."""
+    """Draw one tangent as a line of fixed length with a knob; dragging makes it explicit."""
     row, key = place
     factor, sign = plot.factor(row), (-1.0, 1.0)[side]
     time, value = float(channel.times[key]), factor * float(channel.values[key])
@@ -154,7 +154,7 @@ def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bo
     )
     plot.note(f"tangent {side}", end, height)
     if moved:
-        # A pixel at least on its own side of the key: no tangent is vertical.
+        # At least a pixel away on its own side of the key: no tangent is vertical.
         run = sign * max(sign * (x - time), 1.0 / across)
         for each in (0, 1) if imgui.get_io().key_shift else (side,):
             turn_tangent(plot.state, [place], each, (y - value) / run / factor)
@@ -162,20 +162,20 @@ def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bo
 
 
 def edit(plot: Plot, touched: bool) -> None:
-    """Do what clicks and keys ask for.
+    """Handle clicks and keys in the plot.
 
     Parameters
     ----------
     plot : Plot
-        Being drawn.
+        Current plot.
     touched : bool
-        Whether the mouse is at a key or tangent, so that a click is not meant for the plot.
+        Whether the mouse is at a key or tangent, so that a click is not for the plot.
     """
     state, view, clip = plot.state, plot.view, clip_of(plot.state)
     if clip is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
         return
     left, io = imgui.MouseButton_.left, imgui.get_io()
-    # Keys and lines that can be dragged hide the plot from the mouse, but not from the keyboard.
+    # Draggable keys and lines hide the plot from the mouse, but not from the keyboard.
     is_free = implot.is_plot_hovered()
     is_second = io.mouse_clicked_last_count[left] > 1
     was_dragged = io.mouse_drag_max_distance_sqr[left] >= io.mouse_drag_threshold**2
@@ -193,21 +193,21 @@ def edit(plot: Plot, touched: bool) -> None:
 
 
 def _add_key(plot: Plot, clip: Clip, row: int, time: float) -> None:
-    """Add a key where the mouse is; one that is drawn there already is chosen instead."""
+    """Add a key at the mouse; an existing one there is selected instead."""
     channel = channel_of(clip, row)
     times = np.zeros(0) if channel is None else channel.times
     near = np.flatnonzero(np.abs(times - time) * plot.scale[0] <= _SAME_KEY)
     if len(near):
         plot.view.keys = frozenset({(row, int(near[0]))})
         plot.state.say_status(
-            f"There is a key at {number_text(float(times[near[0]]), '.4g')} s already"
+            f"There is already a key at {number_text(float(times[near[0]]), '.4g')} s"
         )
     else:
         add_key_at(plot.state, [row], time)
 
 
 def _is_mouse_inside() -> bool:
-    """Return whether the mouse is over the plot, whatever of it, and no window lies between."""
+    """Return whether the mouse is over any part of the plot, with no window in between."""
     flags = imgui.HoveredFlags_.allow_when_blocked_by_active_item
     place, size = implot.get_plot_pos(), implot.get_plot_size()
     corner = (place.x + size.x, place.y + size.y)
@@ -215,7 +215,7 @@ def _is_mouse_inside() -> bool:
 
 
 def _is_pressed(key: imgui.Key) -> bool:
-    """Return whether a key went down while nothing is typed or dragged."""
+    """Return whether a key was pressed while nothing is typed or dragged."""
     is_dragging = imgui.is_mouse_down(imgui.MouseButton_.left)
     is_free = not (is_dragging or imgui.get_io().want_text_input)
     return is_free and imgui.is_key_pressed(key, False)

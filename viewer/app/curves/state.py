@@ -1,4 +1,4 @@
-"""State of the Curves panel: chosen curves and keys, and whether to fit them."""
+"""State of the Curves panel: selected curves and keys, and requests to fit the axes."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from dataclasses import dataclass
 __all__ = ["Curves", "KeyPlace"]
 
 KeyPlace = tuple[int, int]
-"""A curve's row and the index of one of its keys."""
+"""Row of a curve and index of one of its keys."""
 
 
 @dataclass(slots=True)
 class Curves:
-    """The Curves panel's own state; what it edits is the actor's clip.
+    """State of the Curves panel; the edited clip belongs to the actor.
 
     Attributes
     ----------
     rows : tuple of int
-        Chosen curves, as ``curves_of`` numbers them, in the order in which they were chosen.
+        Selected curves as rows of ``curves_of``, in the order of selection.
     keys : frozenset of (row, key)
-        Chosen keys.
+        Selected keys.
     filter : str
-        Only curves with this in their name are listed.
+        Text that the names of listed curves contain.
     wants_fit : bool
-        Fit the axes in the next frame.
+        Whether the axes are fitted in the next frame.
     wants_scroll : bool
-        Scroll the list to the first chosen curve in the next frame.
+        Whether the list scrolls to the first selected curve in the next frame.
     owner : (int, str, int)
         The actor, and the kind and number of curves that ``rows`` belong to.
     joint : int
-        The selected joint that the rows followed last.
+        The selected joint when the rows last followed it.
     """
 
     rows: tuple[int, ...] = ()
@@ -41,5 +41,5 @@ class Curves:
     joint: int = -1
 
     def choose(self, rows: tuple[int, ...]) -> None:
-        """Show other curves, and all of them."""
+        """Show other curves and fit the axes to them."""
         self.rows, self.keys, self.wants_fit = rows, frozenset(), True

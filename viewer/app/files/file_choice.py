@@ -1,4 +1,4 @@
-"""Files being chosen in a dialog: its folder, what is listed and chosen there, and what follows."""
+"""State of a file dialog: its folder, the listed and chosen files, and the action that follows."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ PICTURES = (".png", ".jpg", ".jpeg")
 
 
 class FileDialog:
-    """A folder being looked at and the files chosen in it.
+    """An open folder and the files chosen in it.
 
     Parameters
     ----------
     folder : Path
-        Where to start.
+        Initial folder.
     done : callable
-        Called with the state and what was chosen: files, one folder, or one file to write.
+        Called with the state and the choice: files, one folder, or one file to write.
         Opens them if omitted.
     purpose : str
         ``"open"``, ``"folder"`` or ``"save"``.
     title : str
-        Of the dialog.
+        Title of the dialog.
     suffixes : tuple of str
-        Files that are listed; all that can be opened if empty.
+        Suffixes of the listed files; if empty, of all that can be opened.
     name : str
-        Suggested name of the file to write; its suffix is added to names that have none.
+        Suggested name of the file to write; its suffix is added to names without one.
     more : callable, optional
-        Draws what else is asked for, given the state and the dialog.
+        Draws further options, given the state and the dialog.
     written : callable, optional
-        Returns all files that are written for a name; that file alone if omitted.
+        Returns all files that are written for a name; only that file if omitted.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class FileDialog:
         self.enter(folder)
 
     def enter(self, folder: Path) -> None:
-        """Look into a folder; one that cannot be read leaves the dialog where it was."""
+        """Open a folder; if it cannot be read, the dialog stays where it was."""
         try:
             found = sorted(
                 folder.iterdir(), key=lambda path: (not path.is_dir(), path.name.lower())
@@ -75,19 +75,19 @@ class FileDialog:
         self.chosen.clear()
 
     def typed(self, text: str) -> Path | None:
-        """Return the file that a text names, or look into the folder that it names."""
+        """Return the file that a text names, or open the folder that it names."""
         try:
             path = Path(text).expanduser()
             if path.is_file():
                 return path
-        except (OSError, RuntimeError) as problem:  # too long; no such user
+        except (OSError, RuntimeError) as problem:  # the name is too long, or there is no such user
             self.problem = f"{printable(text)}: {getattr(problem, 'strerror', None) or problem}"
             return None
         self.enter(path)
         return None
 
     def target(self) -> Path | None:
-        """Return the file to write, by its name with a suffix; None if it has no name."""
+        """Return the file to write, with a suffix; None if it has no name."""
         name = Path(self.name.strip())
         if not name.name.strip("."):
             return None
@@ -95,7 +95,7 @@ class FileDialog:
         return path if path.suffix else path.with_name(path.name + self.suffix)
 
     def listed(self) -> list[Path]:
-        """Return folders, and the files that can be opened or all files."""
+        """Return the folders, and the files that can be opened or all files."""
         return [
             path
             for path in self.entries
@@ -105,15 +105,15 @@ class FileDialog:
 
 
 def opened_suffixes() -> set[str]:
-    """Return the suffixes of files that can be opened, textures among them."""
+    """Return the suffixes of files that can be opened, including textures."""
     suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
-    # Most .txt files are no poses; the check box lists them too.
+    # Most .txt files are not poses; the check box lists them too.
     return suffixes - {".txt"} | set(PICTURES)
 
 
 def folder_of(paths: Sequence[Path]) -> Path:
-    """Return where a dialog begins: beside the first file, else the current folder, else home."""
+    """Return a dialog's initial folder: that of the first file, the current one, or home."""
     try:
         return paths[0].resolve().parent if paths else Path.cwd()
-    except (OSError, RuntimeError):  # the folder is gone
+    except (OSError, RuntimeError):  # the current folder is gone
         return Path.home()

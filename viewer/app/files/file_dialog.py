@@ -1,6 +1,6 @@
-"""A dialog to choose files, drawn in the window: the same on every system, and testable.
+"""File dialog drawn in the window: the same on every system, and testable.
 
-It opens files, chooses a folder, or asks where to save; what follows is up to who asked.
+It opens files, chooses a folder, or asks where to save; the caller decides what follows.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from viewer.formats import FORMATS
 __all__ = ["draw_file_dialog"]
 
 _HINTS = {
-    "open": "Ctrl+click chooses several: a .skel and its .skin",
+    "open": "Ctrl+click selects several: a .skel and its .skin",
     "folder": "",
     "save": "",
 }
 
 
 def draw_file_dialog(state: AppState) -> None:
-    """Draw the dialog if there is one; when the user has chosen, do what was asked for."""
+    """Draw the dialog if there is one, and run its action once the user has chosen."""
     files = state.of(Files)
     dialog = files.dialog
     if dialog is None:
@@ -77,7 +77,7 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
 
 
 def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
-    """Draw what confirms and cancels; return what was confirmed."""
+    """Draw the buttons; return the confirmed choice."""
     result: list[Path] = []
     if dialog.more is not None:
         dialog.more(state, dialog)
@@ -87,7 +87,7 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
         note_item(state, "Name")
         imgui.same_line()
     count, label = _confirmation(dialog)
-    missing = "give it a name" if dialog.purpose == "save" else "choose a file"
+    missing = "enter a name" if dialog.purpose == "save" else "choose a file"
     pressed = button(state, label, "" if count else missing)
     by_key = count and dialog.purpose == "open" and imgui.is_key_pressed(imgui.Key.enter, False)
     if pressed or by_key:
@@ -101,7 +101,7 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
 
 
 def _confirmation(dialog: FileDialog) -> tuple[int, str]:
-    """Return how many files would be confirmed, and the label of the button that does."""
+    """Return the number of files to confirm, and the label of the confirming button."""
     if dialog.purpose == "folder":
         return 1, "Use this folder"
     if dialog.purpose == "save":
@@ -131,7 +131,7 @@ def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
             name = printable(path.name, 90) + ("/" if is_folder else "")
             flags = imgui.SelectableFlags_.allow_double_click
             flags |= imgui.SelectableFlags_.no_auto_close_popups
-            # The name is drawn as text: "##" in a label would hide what follows.
+            # The name is drawn as text: "##" in a label would hide the rest.
             pressed, _ = imgui.selectable(f"##file{number}", path in dialog.chosen, flags)
             note_item(state, f"file {path.name}")
             imgui.same_line(0.0, 0.0)
@@ -158,13 +158,13 @@ def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
 
 
 def _foot_height(dialog: FileDialog) -> float:
-    """Return the height of what lies below the list."""
+    """Return the height of the widgets below the list."""
     more = 0.0 if dialog.more is None else imgui.get_frame_height_with_spacing()
     return 1.5 * imgui.get_frame_height() + more
 
 
 def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
-    """Return whether a folder is itself what can be opened; a double click looks into it."""
+    """Return whether a folder can itself be opened as a file; a double click lists it."""
     if dialog.purpose != "open" or imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
         return False
     names = {name for kind in FORMATS.values() for name in kind.files}

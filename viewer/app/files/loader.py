@@ -1,4 +1,4 @@
-"""Open files beside the frame loop, so that the window answers and opening can be cancelled."""
+"""Loading of files beside the frame loop: the window responds, and loading can be cancelled."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ __all__ = ["Loader"]
 
 
 class Loader:
-    """Files being read in a thread of their own.
+    """Thread that reads files.
 
-    Dropping a loader cancels it: what it reads is thrown away when it is done.
+    Dropping a loader cancels it: its result is discarded.
 
     Parameters
     ----------
     paths : sequence of Path
-        What to open.
+        Files to open.
     attempts : sequence of sequences of Path
-        Tried in order; the first that loads counts, the last one's error does.
+        Tried in order; the first that loads is used, or the error of the last one.
     wake : callable
         Called from the thread when it is done.
     settings : MotionSettings, optional
-        How motions are taken.
+        Settings for reading motions.
     opened : sequence of Path
-        The files of the scene that is shown: motions are given to its figures.
+        Files of the current scene, whose figures get the motions.
 
     Attributes
     ----------
     scene : Scene or None
-        What was read.
+        The scene that was read.
     builders : list of Builder
-        Captures whose first frames are in the scene.
+        Builders of captures whose first frames are in the scene.
     addition : Contents or None
-        Poses and pictures for the figure that is open, if there was nothing else.
+        Poses and pictures for the open figure, if there was nothing else.
     error : str
-        Why nothing was read; empty if nothing is wrong.
+        Why nothing was read; empty if there is no error.
     """
 
     def __init__(
@@ -91,19 +91,19 @@ class Loader:
             self.scene, self.builders = begin(contents, self._settings)
 
     def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
-        """Give motions to the figures that are open; what they do not fit stands alone."""
+        """Apply motions to the open figures; motions that fit none are shown alone."""
         from viewer.loading.driving import is_body
 
         opened = read_files(self._opened, settings=self._settings)
         figures = opened.figures
         if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
-            figures = []  # people are drawn with the bundled body, and nobody else stays
+            figures = []  # people are drawn with the bundled body, and replace the scene
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         joined = replace(contents, figures=figures, morphs=[*opened.morphs, *contents.morphs])
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
         if contents.skeleton_motions and len(self.scene.actors) > count:
-            # A BVH that drives nothing here is shown on its own.
+            # A BVH that drives no open figure is shown on its own.
             kept = set()
             self.scene, self.builders = begin(contents, self._settings)
         self.paths = (*(path for path in self._opened if path in kept), *paths)
@@ -115,9 +115,9 @@ class Loader:
 
     @property
     def seconds(self) -> float:
-        """How long it has been reading."""
+        """Seconds since it began."""
         return time.monotonic() - self._started
 
     def wait(self) -> None:
-        """Return when it is done."""
+        """Wait until it is done."""
         self._thread.join()

@@ -1,4 +1,4 @@
-"""Ask which motions to export, as what, and where to."""
+"""Dialog to export motions: which ones, in which format, and where."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ __all__ = ["ask_for_motion"]
 
 @dataclass(slots=True)
 class _Wish:
-    """What is asked for: everybody's motions, or the chosen actor's."""
+    """Choice between all actors' motions and the chosen one's."""
 
     everyone: bool
 
 
 def ask_for_motion(state: AppState) -> None:
-    """Ask where motions go; all actors' if there are several, unless the user says otherwise."""
+    """Open the dialog; all actors are preselected if there are several."""
     moving = moving_actors(state)
     wish = _Wish(len(moving) > 1 or state.actor not in moving)
     first = moving[0] if wish.everyone else state.actor
-    # People's numbers are put behind the name when there are several files.
+    # The number of each person is appended to the name if there are several files.
     stem = file_stem(first.title if len(moving) > 1 else first.name)
     suffixes = motion_suffixes()
     state.of(Files).dialog = FileDialog(
@@ -53,22 +53,24 @@ def ask_for_motion(state: AppState) -> None:
 
 
 def _draw_more(state: AppState, dialog: FileDialog, wish: _Wish) -> None:
-    """Draw what is exported, and as what."""
+    """Draw the choice of actors and format."""
     moving = moving_actors(state)
     imgui.set_next_item_width(16.0 * imgui.get_font_size())
     if len(moving) > 1 or state.actor not in moving:
         whose = {"all": f"all {len(moving)} actors"}
         if state.actor in moving:
-            whose["one"] = f"{printable(state.actor.name, 60)} alone"
-        wish.everyone = choice(state, "Whose", "all" if wish.everyone else "one", whose) == "all"
-        explain("" if dialog.suffix == "" else "a file each: people by their number")
+            whose["one"] = f"only {printable(state.actor.name, 60)}"
+        wish.everyone = (
+            choice(state, "Actors##exported", "all" if wish.everyone else "one", whose) == "all"
+        )
+        explain("" if dialog.suffix == "" else "one file per actor, named by its number")
         imgui.same_line()
         imgui.set_next_item_width(16.0 * imgui.get_font_size())
     kinds = {suffix: _title(suffix) for suffix in motion_suffixes()}
     kinds[FOLDER] = _title(FOLDER)
     typed = Path(dialog.name.strip()).suffix.lower()
     now = typed if typed in kinds else dialog.suffix or FOLDER
-    kind = choice(state, "As", now, kinds)
+    kind = choice(state, "Format", now, kinds)
     if kind != now:
         stem = dialog.name.strip()[: -len(typed)] if typed in kinds else dialog.name.strip()
         dialog.suffix = "" if kind == FOLDER else kind
@@ -76,7 +78,7 @@ def _draw_more(state: AppState, dialog: FileDialog, wish: _Wish) -> None:
 
 
 def _title(suffix: str) -> str:
-    """Return what a file of this suffix is, in the words of its exporters."""
+    """Return the description of a suffix by its exporters."""
     titles = [
         kind.title for kind in EXPORTERS.values() if kind.writes_motion and suffix in kind.suffixes
     ]

@@ -1,4 +1,4 @@
-"""Export of whole motions for other programs, one actor's or those of all."""
+"""Export of whole motions for other programs, of one actor or all."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 
-_MANY = (".obj",)  # a file for each frame: the command line writes them
-_FRAMES = "smpl"  # the folder of frames within a capture's folder
+_MANY = (".obj",)  # one file per frame: left to the command line
+_FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = ["FOLDER", "motion_files", "motion_suffixes", "moving_actors", "save_motion"]
 
 FOLDER = "/"
-"""Stands for a folder where suffixes are listed: everybody of a capture is in it."""
+"""Stands for a folder where suffixes are listed: it holds all people of a capture."""
 
 
 def moving_actors(state: AppState) -> list[Actor]:
-    """Return the actors whose joints a motion moves."""
+    """Return the actors whose joints are moved by a motion."""
     return [a for a in state.scene.actors if isinstance(a.clip, Clip | SampledClip)]
 
 
 def motion_suffixes() -> tuple[str, ...]:
-    """Return the suffixes of files that hold one actor's motion, the usual one first."""
+    """Return the suffixes of files that hold one actor's motion, the default first."""
     kinds = [kind for kind in EXPORTERS.values() if kind.writes_motion]
     found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
     others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
@@ -46,21 +46,21 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
-    """Return all that is written for one name.
+    """Return all files that are written for one name.
 
     Parameters
     ----------
     state : AppState
-        Gives the actors.
+        Holds the actors.
     path : Path
         A file, or a folder: a name without suffix.
     everyone : bool
-        Whether all actors are written, or the chosen one alone.
+        Whether all actors are written, or only the chosen one.
 
     Returns
     -------
     list of Path
-        One for each actor; a ``.gltf`` has a ``.bin`` beside it. Of a folder the one with frames.
+        One per actor; a ``.gltf`` has a ``.bin`` beside it. For a folder, the one with frames.
     """
     if not path.suffix:
         return [path / _FRAMES]
@@ -72,7 +72,7 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """An actor as it was when the export began, where it goes, and which of its frames."""
+    """One actor to export: its state at the start of the export, target file and frames."""
 
     actor: Actor
     path: Path
@@ -82,24 +82,24 @@ class _Part:
 
 
 def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
-    """Write motions, in the range that is played, beside the frame loop.
+    """Write motions within the playback range, beside the frame loop.
 
     Parameters
     ----------
     state : AppState
-        Says afterwards what was written, and what of it the format cannot hold.
+        Gets messages about what was written and what the format cannot hold.
     path : Path
-        Its suffix chooses the format; without one it is an EasyMocap folder. All of the files
-        appear, or none.
+        Its suffix selects the format; without one it is an EasyMocap folder. Either all files
+        are written or none.
     everyone : bool
-        Whether all actors are written, a file each (in one folder all of them), or the chosen
-        one alone.
+        Whether all actors are written, one file each (or one folder for all), or only the chosen
+        one.
     """
     try:
         parts, lines = _parts(state, path, everyone)
         key = suited_exporter(path, parts[0].actor.figure)
         files = motion_files(state, path, everyone)
-        # The dialog has asked what becomes of files that are there.
+        # The dialog has asked whether to replace existing files.
         if path.suffix:
             check_targets(files, state.inputs, force=True)
         else:
@@ -122,21 +122,21 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
 
 
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[str]]:
-    """Return what is to be written, and lines about who is left out."""
+    """Return the parts to write, and messages about actors that are left out."""
     actors = moving_actors(state) if everyone else [state.actor]
     paths = motion_paths(path, actors) if path.suffix else [path] * len(actors)
     parts, lines = [], []
     for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
-            lines.append(f"{printable(actor.name)}: not there in the range, and not written")
+            lines.append(f"{printable(actor.name)}: absent throughout the range, not written")
             continue
-        # What goes on in the window meanwhile must not change what is written.
+        # Edits in the window meanwhile must not change what is written.
         taken = actor.copy()
         rate = state.clock.frame_rate if isinstance(actor.clip, Clip) else None
         parts.append(_Part(taken, file, frames, rate, number))
     if not parts:
-        raise RigError("nobody is there in the range that is played: there is nothing to write")
+        raise RigError("everybody is absent in the playback range: nothing to write")
     points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
     if everyone and points:
         names = ", ".join(printable(actor.name, 60) for actor in points)
@@ -155,7 +155,7 @@ def _write(scene: Scene, parts: Sequence[_Part], key: str, options: MotionOption
 def _write_capture(
     scene: Scene, parts: Sequence[_Part], path: Path, options: MotionOptions
 ) -> list[str]:
-    """Write everybody into one folder."""
+    """Write all actors into one folder."""
     from viewer.export.easymocap import export_animations
 
     found = [
@@ -171,7 +171,7 @@ def _write_capture(
 
 
 def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
-    """Return the frames of the actor's own clip that are played; None for all."""
+    """Return the frames of the actor's clip within the playback range; None for all."""
     clock, clip = state.clock, actor.clip
     if (clock.start, clock.end) == clock.whole or clip is None:
         return None

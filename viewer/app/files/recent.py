@@ -1,4 +1,4 @@
-"""Files that were opened before and panels that were closed, remembered between runs."""
+"""Recent files and closed panels, stored between runs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def state_folder() -> Path:
 
 
 def load_recent() -> list[tuple[str, ...]]:
-    """Return groups of files that were opened together, latest first; none if unreadable."""
+    """Return groups of files that were opened together, latest first; empty if unreadable."""
     try:
         groups = json.loads((state_folder() / "recent.json").read_text("utf-8"))
         lists = [group for group in groups if isinstance(group, list) and group]
@@ -39,7 +39,7 @@ def load_recent() -> list[tuple[str, ...]]:
 
 
 def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
-    """Put files first in the list and save it; return what went wrong, or nothing.
+    """Put files first in the list and save it; return an error message, empty if saved.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
 
 
 def load_closed_panels() -> set[str]:
-    """Return the panels that were closed when the last window was; none if unreadable."""
+    """Return the panels that were closed in the last run; empty if unreadable."""
     try:
         names = json.loads((state_folder() / "closed.json").read_text("utf-8"))
         return {name for name in names if isinstance(name, str)}
@@ -71,7 +71,7 @@ def load_closed_panels() -> set[str]:
 
 
 def save_closed_panels(names: set[str]) -> None:
-    """Remember which panels are closed; a folder that cannot be written remembers nothing."""
+    """Store which panels are closed; an unwritable folder is ignored."""
     with contextlib.suppress(OSError, OutputError):
         state_folder().mkdir(parents=True, exist_ok=True)
         save_bytes(state_folder() / "closed.json", json.dumps(sorted(names)).encode())

@@ -1,4 +1,4 @@
-"""Saving of files from the window, which says what was saved or why nothing was."""
+"""Saving of files from the window, with a message about the result."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["save_files"]
 
 
 def save_files(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
-    """Write files unless one of them was opened, and say which, or why not."""
+    """Write files unless one of them is open; show which were saved, or why none was."""
     try:
         # The dialog has asked what becomes of files that are there.
         check_targets(files, state.inputs, force=True)

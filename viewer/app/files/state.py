@@ -1,4 +1,4 @@
-"""State of files: what is being opened or chosen, and what was opened before."""
+"""State of opening and choosing files, with the recent ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Files"]
 
 @dataclass(slots=True)
 class Files:
-    """What goes on with files.
+    """State of opening and choosing files.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Files:
     recent : list of tuple of str
         Groups of files that were opened together, latest first.
     models : dict
-        Body models in the model folder, by name; looked for when the menu opens.
+        Body models in the model folder, by name; searched for when the menu opens.
     """
 
     dialog: FileDialog | None = None

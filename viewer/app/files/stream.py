@@ -1,4 +1,4 @@
-"""Read the rest of captures beside the frame loop, while their first frames are shown."""
+"""Reading of captures beside the frame loop while their first frames are shown."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from viewer.rig.scene import Actor
 
 __all__ = ["Stream"]
 
-_WAITING = 4  # parts that may wait to be taken in: memory stays bounded
+_WAITING = 4  # parts in the queue: bounds the memory
 
 
 class Stream:
-    """Parts of captures being read in a thread of their own, taken in by the frame loop.
+    """Thread that reads parts of captures, which the frame loop adds to the scene.
 
     Parameters
     ----------
     builders : sequence of Builder
-        What is left to read; their actors are in the scene.
+        Builders of the captures; their actors are in the scene.
     wake : callable
-        Called from the thread when there is something to take in.
+        Called from the thread when a part is ready.
 
     Attributes
     ----------
     error : str
-        Why reading ended before its end; empty if nothing is wrong.
+        Why reading ended early; empty if there is no error.
     """
 
     def __init__(self, builders: Sequence[Builder], wake: Callable[[], None]) -> None:
@@ -59,7 +59,7 @@ class Stream:
         self._wake()
 
     def _hand_over(self, builder: Builder, part: CapturePart) -> bool:
-        """Wait for room in the queue; return False if reading was cancelled."""
+        """Wait for space in the queue; return False if reading was cancelled."""
         while not self._stop.is_set():
             try:
                 self._parts.put((builder, part), timeout=0.1)
@@ -70,21 +70,21 @@ class Stream:
         return False
 
     def take(self) -> tuple[list[Actor], list[Diagnostic], bool]:
-        """Take in what has been read since the last call.
+        """Add the parts read since the last call to the scene.
 
         Returns
         -------
         new : list of Actor
             People who appeared.
         notes : list of Diagnostic
-            What was noticed.
+            Messages about the parts.
         grew : bool
-            Whether anything was taken in.
+            Whether anything was added.
 
         Raises
         ------
         RigError
-            If bodies do not fit the model; the stream is then over.
+            If bodies do not fit the model; the stream then ends.
         """
         new: list[Actor] = []
         notes: list[Diagnostic] = []
@@ -96,7 +96,7 @@ class Stream:
                 return new, notes, grew
             known = builder.actors
             more, said = builder.add(part)
-            # The rate may have been changed since the first of them appeared.
+            # The user may have changed the rate since the first of them appeared.
             _keep_rate(known[:1], more)
             new += more
             notes += said
@@ -104,23 +104,23 @@ class Stream:
 
     @property
     def is_done(self) -> bool:
-        """Whether everything has been read and taken in."""
+        """Whether everything has been read and added."""
         return not self._thread.is_alive() and self._parts.empty()
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Frames that are in the scene, and frames there are."""
+        """Frames in the scene, and frames in all."""
         read = sum(builder.n_read for builder in self.builders)
         return read, sum(builder.capture.n_frames for builder in self.builders)
 
     def cancel(self) -> None:
-        """Read no further; what is in the scene stays."""
+        """Stop reading; frames in the scene stay."""
         self._stop.set()
         for builder in self.builders:
             builder.is_cut = True
 
     def wait(self) -> None:
-        """Return when the thread is done; its parts must be taken meanwhile. For tests."""
+        """Wait for the thread, whose parts must be taken meanwhile. For tests."""
         while self._thread.is_alive():
             self._thread.join(0.01)
             if self._parts.full():
@@ -128,7 +128,7 @@ class Stream:
 
 
 def _keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
-    """Give people who appear the frame rate of those who are there."""
+    """Give new people the frame rate of those in the scene."""
     for first in known:
         for actor in new:
             if isinstance(actor.clip, SampledClip | PointClip):

@@ -1,4 +1,4 @@
-"""Actions of the Lint panel and its menu entry: check, choose a finding, copy all of them."""
+"""Actions of the Lint panel and its menu item: check, choose a finding, copy all findings."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def check_rig(state: AppState) -> None:
 
 
 def start_check(state: AppState) -> None:
-    """Check the scene as it is now, in a thread; nothing if other work goes on."""
+    """Check the current scene in a thread, unless another job runs."""
     if no_job_room(state):
         return
     source, options, running = state.scene, _options(state), Running()
@@ -62,7 +62,7 @@ def start_check(state: AppState) -> None:
     settings, since = state.motion_settings, state.opened_at
 
     def check(report: Report) -> list[str]:
-        # The figure that is shown without files comes from some as well.
+        # The bundled figure comes from files too.
         files, is_likely = paths or bundled_files(), not paths
         again = lint_again(copy, files, options, settings, since, report, is_likely)
         findings = tuple(worst_first(again.findings))
@@ -74,22 +74,22 @@ def start_check(state: AppState) -> None:
 
 
 def _options(state: AppState) -> LintOptions:
-    """Return what counts as a fault; frames are those of the timeline."""
+    """Return the limits of the check, with the timeline's frame rate."""
     return replace(state.of(Linting).options, frame_rate=state.clock.keyed_rate)
 
 
 def _copied(scene: Scene) -> Scene:
-    """Return a scene whose poses stay as they are while the other one is posed on."""
+    """Return a copy of the scene whose poses stay unchanged."""
     return Scene([actor.copy() for actor in scene.actors], world_up=scene.up)
 
 
 def take_findings(state: AppState) -> None:
-    """Show the findings of a check that has ended; those of another scene are forgotten."""
+    """Show the findings of a finished check; those of another scene are dropped."""
     view = state.of(Linting)
     running = view.running
     if running is not None and running.job is not state.job:
         view.running = None
-        # A check that was cancelled, or of a scene that is gone, has nothing to show.
+        # A cancelled check, or one of a scene that is gone, has nothing to show.
         if running.result is not None and running.result.source is state.scene:
             view.checked, view.chosen = running.result, -1
             view.is_edited, view.seen = False, _moving(state)
@@ -98,9 +98,9 @@ def take_findings(state: AppState) -> None:
 
 
 def is_stale(state: AppState) -> bool:
-    """Return whether the scene, or what counts as a fault, is another than when it was checked.
+    """Return whether the scene or the limits have changed since the check.
 
-    That time moves on, and poses with it, changes nothing. To be asked once a frame.
+    Playback does not count as a change. Called once per frame.
     """
     view = state.of(Linting)
     known = view.checked
@@ -119,7 +119,7 @@ def is_stale(state: AppState) -> bool:
 
 
 def _moving(state: AppState) -> tuple[object, ...]:
-    """Return what the scene was posed for, and the poses of what moves."""
+    """Return the key of the scene's poses, and the poses of moving actors."""
     poses = [actor.pose for actor in state.scene.actors if actor.clip is not None]
     return (state.clock.posed_for, *(pose_key(pose) for pose in poses if pose is not None))
 
@@ -135,12 +135,12 @@ def _differs(actor: Actor, old: Actor) -> bool:
 
 
 def choose_finding(state: AppState, index: int) -> None:
-    """Look at a finding: its actor, joint and time; -1 or the same one again: at none.
+    """Show a finding: its actor, joint and time; -1 or the same index again clears the choice.
 
     Parameters
     ----------
     state : AppState
-        The camera goes there with the next picture.
+        Its camera moves there with the next picture.
     index : int
         Of ``state.of(Linting).checked.findings``.
     """
@@ -160,18 +160,18 @@ def choose_finding(state: AppState, index: int) -> None:
         seek = finding.times[0] if finding.seek is None else finding.seek
         state.clock.seek(float(seek))
         if finding.seek is not None and finding.code == "C005":
-            state.say_status("The last frame before the gap: in it nobody is there")
+            state.say_status("The last frame before the gap: the person is absent in the next one")
     if not actor.visible:
-        state.say_status(f"{printable(actor.name, 60)} is hidden: see the panel Actors")
+        state.say_status(f"{printable(actor.name, 60)} is hidden: see the Actors panel")
 
 
 def is_in_scene(state: AppState, finding: Finding) -> bool:
-    """Return whether a finding is about an actor that is shown; others are of files alone."""
+    """Return whether a finding is about an actor of the scene; others concern files only."""
     return finding.actor is not None and finding.actor < len(state.scene.actors)
 
 
 def is_known_there(state: AppState, finding: Finding) -> bool:
-    """Return whether an actor's figure is still the one in which something was found.
+    """Return whether an actor's figure is still the one that was checked.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def is_known_there(state: AppState, finding: Finding) -> bool:
 
 
 def file_place(finding: Finding) -> str:
-    """Return path and line of a finding, as editors take them; empty if it is in no file."""
+    """Return path and line of a finding in the form editors accept; empty if it is in no file."""
     if finding.file is None or finding.file == Path():
         return ""
     line = "" if finding.line is None else f":{finding.line}"
@@ -195,7 +195,7 @@ def file_place(finding: Finding) -> str:
 
 
 def copy_place(state: AppState, finding: Finding) -> None:
-    """Put path and line of a finding that is in no figure on the clipboard; look at none."""
+    """Copy path and line of a finding that is in no figure, and clear the choice."""
     choose_finding(state, -1)
     place = file_place(finding)
     if place:
@@ -204,7 +204,7 @@ def copy_place(state: AppState, finding: Finding) -> None:
 
 
 def copy_findings(state: AppState, as_json: bool) -> None:
-    """Put all findings on the clipboard, as ``viewer lint`` prints them."""
+    """Copy all findings as ``viewer lint`` prints them."""
     known = state.of(Linting).checked
     if known is None:
         return

@@ -1,4 +1,4 @@
-"""Lint: what is wrong with rigs and motions, where, and what to do about it."""
+"""Lint panel: faults of rigs and motions, their places, and remedies."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ _COLORS = {
 }
 _STALE_COLOR = _COLORS["warning"]
 _GROUNDS = {
-    "auto": "where feet rest",
+    "auto": "estimated from the feet",
     "height": "at a height",
     "none": "none: feet are not checked",
 }
-_LONGEST = 400  # characters of a message in the list
-_FASTEST = 100.0  # speeds that can be set, units a second
+_LONGEST = 400  # longest message in the list, characters
+_FASTEST = 100.0  # largest speed that can be set, units per second
 _TIP_WIDTH = 30.0  # letters' heights
 
 
 def draw(state: AppState) -> None:
-    """Draw the panel; the first time it is shown it checks by itself."""
+    """Draw the panel; the first time it is shown it starts a check."""
     view = state.of(Linting)
     take_findings(state)
     if not view.was_shown:
@@ -63,7 +63,7 @@ def draw(state: AppState) -> None:
             imgui.text_wrapped("This scene has not been checked yet.")
         return
     if is_stale(state):
-        _draw_warning("Figure, pose or limits are others than when it was checked.")
+        _draw_warning("The figure, pose or limits have changed since the check.")
     for note in known.notes:
         _draw_warning(note)
     _draw_filters(state, known)
@@ -86,7 +86,7 @@ def _draw_buttons(state: AppState, known: Checked | None) -> None:
     if button(state, "Limits…"):
         imgui.open_popup("lint limits")
     _draw_limits(state)
-    why = "" if known is not None and known.findings else "there is no finding to copy"
+    why = "" if known is not None and known.findings else "there are no findings to copy"
     same_line_if_room("Copy text")
     if button(state, "Copy text", why):
         copy_findings(state, as_json=False)
@@ -98,14 +98,14 @@ def _draw_buttons(state: AppState, known: Checked | None) -> None:
 
 
 def _draw_limits(state: AppState) -> None:
-    """Draw what only the person who asks can know."""
+    """Draw the limits that depend on the user's intent."""
     if not imgui.begin_popup("lint limits"):
         return
     view = state.of(Linting)
     options = view.options
     turn = np.degrees(options.max_turn)
-    moved = slider(state, "Largest turn", turn, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
-    explain("of a joint against its parent between two frames")
+    moved = slider(state, "Largest rotation", turn, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
+    explain("of a joint relative to its parent, between two frames")
     if moved != turn:
         view.options = replace(view.options, max_turn=float(np.radians(max(moved, 0.0))))
     speed = options.max_speed or 0.0
@@ -117,24 +117,24 @@ def _draw_limits(state: AppState) -> None:
     sure = options.confidence
     moved = slider(state, "Low confidence", sure, 0.0, 1.0)
     explain(
-        "a captured point is reported if its confidence is below in more than "
-        f"{100.0 * LOW_FRACTION:g} % of the frames that see it, and in {LOW_FRAMES} at least"
+        "report a captured point if its confidence is below this in more than "
+        f"{100.0 * LOW_FRACTION:g} % of the frames that see it, and in at least {LOW_FRAMES}"
     )
     if moved != sure:
         view.options = replace(view.options, confidence=moved)
     _draw_ground(state)
-    if button(state, "Usual limits"):
+    if button(state, "Default limits"):
         view.options = LintOptions()
     imgui.end_popup()
 
 
 def _draw_ground(state: AppState) -> None:
-    """Draw where the ground is: found out, at a height, or nowhere."""
+    """Draw the choice of the ground: estimated, at a height, or none."""
     view = state.of(Linting)
     ground = view.options.ground
     is_given = not isinstance(ground, str)
     chosen = choice(state, "Ground", "height" if is_given else str(ground), _GROUNDS)
-    explain("no foot may be below by more than 1 % of the figure's height")
+    explain("feet may be below it by at most 1 % of the figure's height")
     if chosen == "height":
         height = float(ground) if is_given else 0.0
         size = box_size(state.box) or 1.0
@@ -186,7 +186,7 @@ def _draw_list(state: AppState, known: Checked) -> None:
         if finding.severity in view.severities and view.text.lower() in _words(finding)
     ]
     if not shown:
-        imgui.text_disabled("no finding is like this" if known.findings else "nothing was found")
+        imgui.text_disabled("no finding matches" if known.findings else "no findings")
         return
     flags = imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_inner_h
     if not imgui.begin_table("findings", 2, flags):
@@ -202,7 +202,7 @@ def _draw_list(state: AppState, known: Checked) -> None:
 
 
 def _words(finding: Finding) -> str:
-    """Return what the filter looks at, in small letters."""
+    """Return the text that the filter searches, in lower case."""
     words = (finding.code, finding.severity, finding.title, finding.message, finding.name)
     return " ".join((*words, _place(finding))).lower()
 
@@ -216,7 +216,7 @@ def _place(finding: Finding) -> str:
 
 
 def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> None:
-    """Draw a finding: what it is, whose, and its message; the whole row can be clicked."""
+    """Draw a finding: title, actor and message; the whole row can be clicked."""
     imgui.table_next_row()
     imgui.table_set_column_index(1)
     title, message = finding.title, printable(finding.message, _LONGEST)
@@ -263,19 +263,19 @@ def _draw_tooltip(state: AppState, finding: Finding) -> None:
 
 
 def _click_text(state: AppState, finding: Finding) -> str:
-    """Return what a click on the row of a finding does."""
+    """Return the tooltip about a click on a finding."""
     if is_known_there(state, finding):
-        return "a click shows it in the view; another one, or Esc, ends that"
+        return "click to show it in the view; click again or press Esc to stop"
     if is_in_scene(state, finding):
-        return "a click chooses the actor: its figure is another than when it was checked"
+        return "click to select the actor: its figure has changed since the check"
     if not file_place(finding):
-        return "nothing in the view is what this is about"
+        return "it has no location in the view"
     copied = "its path" if finding.line is None else "its path and line"
-    return f"it is in the file, not in the figure that is shown: a click copies {copied}"
+    return f"it is in the file, not in the figure shown: click to copy {copied}"
 
 
 def _draw_severity(severity: str) -> None:
-    """Draw the sign of a severity: a cross in a disc, a triangle with "!", a ring with "i"."""
+    """Draw the icon of a severity: a cross in a disc, a triangle with "!", a ring with "i"."""
     size = imgui.get_text_line_height()
     corner = imgui.get_cursor_screen_pos()
     x, y, r = corner.x + 0.5 * size, corner.y + 0.5 * size, 0.42 * size

@@ -21,19 +21,19 @@ from viewer.rig.scene import actor_points
 
 __all__ = ["aim", "marks_of", "show_finding"]
 
-_MOST = 3000  # vertices, and triangles' edges, that are marked
-_FEW = 200  # triangles whose middles are marked too: the smallest have edges of no pixel
-_AROUND, _AROUND_JOINTS = 0.06, 0.15  # of the actor's size: seen around a place, to know where
-_ONE_WAY = 0.5  # length of a mean normal from which a place has a side to be seen from
-_AWAY = 0.2  # cosine to the line of sight below which that side is not seen
+_MOST = 3000  # largest numbers of marked vertices and triangles' edges
+_FEW = 200  # triangles whose middles are marked too: the smallest edges cover no pixel
+_AROUND, _AROUND_JOINTS = 0.06, 0.15  # of the actor's size: surroundings shown for orientation
+_ONE_WAY = 0.5  # least length of a mean normal that gives a place a front
+_AWAY = 0.2  # cosine to the line of sight below which the front is not visible
 _STEEPEST = 70.0  # degrees
 _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 
 
 def show_finding(state: AppState) -> Marks | None:
-    """Return the marks of the chosen finding as the scene is posed; send the camera if asked.
+    """Return the marks of the chosen finding in the current pose; move the camera if asked.
 
-    To be called when the scene has been posed, before it is drawn.
+    Called when the scene has been posed, before it is drawn.
     """
     view = state.of(Linting)
     finding = view.finding
@@ -61,7 +61,7 @@ def show_finding(state: AppState) -> Marks | None:
 
 
 def _key(state: AppState) -> object:
-    """Return all that the marks depend on; None if their actor is there no more."""
+    """Return a key that identifies the marks; None if their actor is gone."""
     linting = state.of(Linting)
     known, finding = linting.checked, linting.finding
     if known is None or known.source is not state.scene:
@@ -70,7 +70,7 @@ def _key(state: AppState) -> object:
         return None
     actor = state.scene.actors[finding.actor]
     if actor.figure is not known.scene.actors[finding.actor].figure:
-        return None  # the finding's numbers may mean others on it
+        return None  # the finding's indices may be invalid for it
     options = state.options
     return (
         id(finding),
@@ -83,7 +83,7 @@ def _key(state: AppState) -> object:
 
 
 def marks_of(places: Places) -> tuple[Marks, str]:
-    """Return marks of places, and words about what is not marked because there are too many.
+    """Return marks of places, and a note if there are too many to mark all.
 
     Parameters
     ----------
@@ -126,23 +126,23 @@ def _finite(places: Floats) -> Floats:
 
 
 def _radius(count: int) -> float:
-    """Return how large many points are drawn, pixels: the more, the smaller."""
+    """Return the size of points, pixels: the more, the smaller."""
     return 4.5 if count <= 50 else 3.0 if count <= 500 else 1.8
 
 
 def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
-    """Let the camera look at some points, from the side that they face if it saw them from behind.
+    """Aim the camera at some points, from their front if it saw them from behind.
 
     Parameters
     ----------
     state : AppState
-        Its camera moves at once; some of the actor around the points is seen too.
+        Its camera moves at once and shows some surroundings of the points too.
     points : (N, 3)
         Scene space.
     facing : (3,)
         Mean normal, as ``Places`` has it.
     around : float
-        How much around their middle is seen at least, as a share of the actor's size.
+        Least visible surroundings of their middle, as a fraction of the actor's size.
     """
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding
@@ -156,7 +156,7 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
 
 
 def _turn(camera: Camera, facing: Floats) -> None:
-    """Turn a camera that looks at the back of a surface to its front."""
+    """Rotate a camera that looks at the back of a surface to its front."""
     length = float(np.linalg.norm(facing))
     backward = camera_axes(camera)[2]
     if length < _ONE_WAY or float(facing @ backward) > _AWAY * length:

@@ -14,7 +14,7 @@ __all__ = ["Checked", "Linting", "Running"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """A scene that was checked.
+    """Result of a check.
 
     Attributes
     ----------
@@ -23,13 +23,13 @@ class Checked:
     scene : Scene
         A copy of it as it was when the check began.
     options : LintOptions
-        What counted as a fault.
+        Limits of the check.
     findings : tuple of Finding
         The worst first.
     n_files : int
-        How many files it came from, which were read again.
+        Number of its files, which were read again.
     notes : tuple of str
-        What of these files is not as it was.
+        Changes of these files since they were opened.
     """
 
     source: Scene
@@ -42,7 +42,7 @@ class Checked:
 
 @dataclass(slots=True, eq=False)
 class Running:
-    """A check that goes on in a thread, which puts its result here."""
+    """A check that runs in a thread, which stores its result here."""
 
     job: CountedJob | None = None
     result: Checked | None = None
@@ -50,36 +50,36 @@ class Running:
 
 @dataclass(slots=True)
 class Linting:
-    """The Lint panel's own state.
+    """State of the Lint panel.
 
     Attributes
     ----------
     options : LintOptions
-        What counts as a fault when it is checked next.
+        Limits of the next check.
     checked : Checked or None
         The last check that ended.
     running : Running or None
-        The one that goes on.
+        The check in progress.
     was_shown : bool
-        Whether the panel was ever shown: it checks by itself the first time.
+        Whether the panel was ever shown: the first time it starts a check.
     severities : set of str
-        Those that are listed.
+        Severities that are listed.
     text : str
-        Only findings with this in their words are listed.
+        Text that listed findings contain.
     chosen : int
-        Index of the finding that is looked at, -1 for none.
+        Index of the chosen finding, -1 for none.
     wants_aim : bool
-        The camera goes to the chosen finding when the scene has been posed next.
+        Whether the camera moves to the chosen finding once the scene is posed.
     is_edited : bool
-        Whether what moves was posed by hand since the check.
+        Whether a moving actor was posed by hand since the check.
     seen : tuple
-        Time and poses of what moves, a frame ago.
+        Time and poses of moving actors in the previous frame.
     marks : Marks or None
         Of the chosen finding.
     marks_key : object
-        What they depend on.
+        Key that identifies the marks.
     marks_note : str
-        What of the finding is not marked; empty if all is.
+        Note about parts of the finding that are not marked; empty if all are.
     """
 
     options: LintOptions = field(default_factory=LintOptions)
@@ -98,7 +98,7 @@ class Linting:
 
     @property
     def finding(self) -> Finding | None:
-        """The finding that is looked at."""
+        """The chosen finding."""
         known = self.checked
         if known is None or not 0 <= self.chosen < len(known.findings):
             return None

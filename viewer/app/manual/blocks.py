@@ -1,4 +1,4 @@
-"""Pages of the manual as blocks that can be drawn one by one: the part of Markdown they use."""
+"""Parser of the manual's subset of Markdown into blocks that can be drawn one by one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Block:
     kind : str
         ``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``.
     text : str
-        One line, to be wrapped; of code, all lines. Empty for tables.
+        One line, to be wrapped; for code, all lines. Empty for tables.
     rows : tuple of tuples of str
         Cells of a table, the head first.
     """
@@ -40,7 +40,7 @@ def blocks_of(text: str) -> list[Block]:
     [('title', 'Keys'), ('text', 'H or ? lists them.')]
     """
     found: list[Block] = []
-    # Every other part between fences is code, after the line that names its language.
+    # Every other part is code, after the line that names its language.
     for number, part in enumerate(re.split(rf"^{_FENCE}", text, flags=re.MULTILINE)):
         if number % 2:
             found.append(Block("code", part.partition("\n")[2].rstrip("\n")))
@@ -60,7 +60,7 @@ def _prose(text: str) -> list[Block]:
 
 
 def _paragraph(lines: list[str]) -> list[Block]:
-    """Return the blocks of lines without an empty one between them."""
+    """Return the blocks of consecutive nonempty lines."""
     if lines[0].startswith("|"):
         rows = (_cells(line) for number, line in enumerate(lines) if number != 1)
         return [Block("table", rows=tuple(rows))]
@@ -80,10 +80,10 @@ def _paragraph(lines: list[str]) -> list[Block]:
 
 
 def _cells(line: str) -> tuple[str, ...]:
-    """Return the cells of a table's line, without the bars at its ends."""
+    """Return the cells of a table row, without the bars at its ends."""
     return tuple(_plain(cell.strip().replace("\\|", "|")) for cell in _CELLS.split(line)[1:-1])
 
 
 def _plain(text: str) -> str:
-    """Return text without the marks of code and bold letters."""
+    """Return text without the markup of code and bold text."""
     return _MARKS.sub("", text)

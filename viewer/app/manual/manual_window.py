@@ -1,4 +1,4 @@
-"""The window "Manual": the list of pages, and the page that was chosen."""
+"""The window "Manual": the list of pages, and the chosen page."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ __all__ = ["Manual", "draw_manual", "draw_manual_menu"]
 
 _SIZE = (60.0, 40.0)  # letters' heights
 _TOPICS = 8.5  # letters' heights across
-_TITLE = 1.35  # times the usual letters
+_TITLE = 1.35  # relative to the font size
 _TITLE_COLOR = (1.0, 0.78, 0.45, 1.0)
 _CODE_COLOR = (0.72, 0.85, 0.95, 1.0)
 _ALIGNED = re.compile(" {2,}#")
-_NARROWEST, _WIDEST = 6, 60  # letters that a column is given room for
+_NARROWEST, _WIDEST = 6, 60  # least width of a column, characters
 
 
 @dataclass(slots=True)
 class Manual:
-    """The page that is shown.
+    """State of the manual's window.
 
     Attributes
     ----------
     topic : str
         A key of ``viewer.manual.PAGES``; empty while the window is closed.
     pages : dict
-        Blocks of the pages that were shown so far, by topic.
+        Blocks of the pages shown so far, by topic.
     """
 
     topic: str = ""
@@ -46,7 +46,7 @@ def draw_manual_menu(state: AppState) -> None:
         return
     manual = state.of(Manual)
     for topic in PAGES:
-        # Some pages are called like other items.
+        # Some pages have the names of other items.
         if menu_item(state, f"{_title(topic)}##page {topic}", "", topic == manual.topic):
             manual.topic = topic
     imgui.end_menu()
@@ -76,7 +76,7 @@ def draw_manual(state: AppState) -> None:
 
 
 def _title(topic: str) -> str:
-    """Return a topic as menus show it."""
+    """Return a topic's label in menus."""
     return topic.capitalize()
 
 
@@ -93,12 +93,12 @@ def _draw_topics(state: AppState, manual: Manual) -> None:
 
 
 def _draw_page(state: AppState, manual: Manual) -> None:
-    """Draw the chosen page; each keeps the place that it was scrolled to."""
+    """Draw the chosen page; each keeps its scroll position."""
     topic = manual.topic
     if topic not in manual.pages:
         try:
             manual.pages[topic] = blocks_of(page_text(topic))
-        except ViewerError as problem:  # the installation lacks it
+        except ViewerError as problem:  # the installation is incomplete
             state.error, manual.topic = str(problem), ""
             return
     if imgui.begin_child(f"##page {topic}", (0.0, 0.0), imgui.ChildFlags_.borders):
@@ -130,19 +130,19 @@ def _draw_block(block: Block, number: int) -> None:
 
 
 def _draw_code(text: str, number: int) -> None:
-    """Draw lines that are not wrapped, in a frame that scrolls where they are too long."""
+    """Draw lines without wrapping, in a frame that scrolls if they are too long."""
     flags = imgui.ChildFlags_.frame_style | imgui.ChildFlags_.auto_resize_y
     scrolls = imgui.WindowFlags_.horizontal_scrollbar
     if imgui.begin_child(f"##code {number}", (0.0, 0.0), flags, scrolls):
         imgui.push_style_color(imgui.Col_.text, _CODE_COLOR)
-        # Blanks that align comments do so only where all letters are equally wide.
+        # Spaces align comments only in a monospaced font.
         imgui.text_unformatted(_ALIGNED.sub("   #", text))
         imgui.pop_style_color()
     imgui.end_child()
 
 
 def _draw_table(block: Block, number: int) -> None:
-    """Draw a table as wide as the page; columns share the width by their longest cells."""
+    """Draw a table as wide as the page, with columns in proportion to their longest cells."""
     flags = imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.row_bg
     head, *rows = block.rows
     if not imgui.begin_table(f"##table {number}", len(head), flags):

@@ -1,4 +1,4 @@
-"""Actions that move time, and the range that is played."""
+"""Actions on time and the playback range."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ def play(state: AppState) -> None:
 
 
 def step(state: AppState, frames: int) -> None:
-    """Go some frames on, or back."""
+    """Step by some frames, forwards or backwards."""
     if state.clock.has_motion:
         state.clock.step(frames)
 
 
 def go_to_end(state: AppState, last: bool) -> None:
-    """Go to the first or last frame of the range that is played."""
+    """Go to the first or last frame of the playback range."""
     clock = state.clock
     if clock.has_motion:
         clock.seek(clock.end if last else clock.start)
 
 
 def range_in(state: AppState) -> None:
-    """Let the range that is played start at the present time."""
+    """Start the playback range at the current time."""
     clock = state.clock
     if clock.has_motion:
         clock.set_range(clock.time, max(clock.end, clock.time))
@@ -40,7 +40,7 @@ def range_in(state: AppState) -> None:
 
 
 def range_out(state: AppState) -> None:
-    """Let the range that is played end at the present time."""
+    """End the playback range at the current time."""
     clock = state.clock
     if clock.has_motion:
         clock.set_range(min(clock.start, clock.time), clock.time)

@@ -1,4 +1,4 @@
-"""Frames a second: of the chosen actor's capture, or by which keyed clips are counted."""
+"""Frame rate of the chosen actor's capture, or the rate for counting keyed clips."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from viewer.rig.scene import Actor
 __all__ = ["LIMITS", "foreign_rate", "rate_of", "set_rate"]
 
 LIMITS = (0.01, 1000.0)
-"""Slowest and fastest rate that can be set, frames a second."""
+"""Lowest and highest rate that can be set, frames per second."""
 
 
 def rate_of(state: AppState) -> float:
-    """Return the frames a second of the chosen actor's motion."""
+    """Return the frame rate of the chosen actor's motion, frames per second."""
     clip = state.actor.clip
     if isinstance(clip, SampledClip | PointClip):
         return clip.timing.frame_rate
@@ -25,46 +25,46 @@ def rate_of(state: AppState) -> float:
 
 
 def foreign_rate(state: AppState) -> str:
-    """Say why the rate cannot be set through the chosen actor: another one's frames count."""
+    """Return why the rate cannot be set for the chosen actor: another one gives the frames."""
     clock = state.clock
     if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
         return ""
-    return "another motion gives the frames: choose its actor"
+    return "the frames come from another motion: select its actor"
 
 
 def set_rate(state: AppState, rate: float) -> None:
-    """Let the chosen actor's frames come at another rate, together with all of its capture.
+    """Set the frame rate of the chosen actor and of all people of its capture.
 
-    Keyed clips have no frames: what one steps and counts by is set for them, and no clip changes.
+    Keyed clips have no frames: for them the rate of stepping and counting is set, no clip changes.
 
     Parameters
     ----------
     state : AppState
-        Clips of its actors are replaced, so that it can be undone.
+        Clips of its actors are replaced, so that the edit can be undone.
     rate : float
-        Frames a second; what is not within ``LIMITS`` is refused with a message.
+        Frames per second; a rate outside ``LIMITS`` is rejected with a message.
     """
     if foreign_rate(state) or rate == rate_of(state):
         return
     if not (math.isfinite(rate) and LIMITS[0] <= rate <= LIMITS[1]):
         low, high = LIMITS
-        state.say(f"frames a second: expected {low:g} to {high:g}, found {rate:g}")
+        state.say(f"frames per second: expected {low:g} to {high:g}, found {rate:g}")
         return
     clip = state.actor.clip
     if not isinstance(clip, SampledClip | PointClip):
         state.clock.count_by(rate)
-        state.say_status(f"Keys are counted by {rate:g} frames a second")
+        state.say_status(f"Keys are counted at {rate:g} frames per second")
         return
     together = [actor for actor in state.scene.actors if _is_together(actor, state.actor)]
     for actor in together:
         if isinstance(actor.clip, SampledClip | PointClip):
             actor.clip = with_rate(actor.clip, rate)
     who = f" for {len(together)} actors of this capture" if len(together) > 1 else ""
-    state.say_status(f"{rate:g} frames a second{who}")
+    state.say_status(f"{rate:g} frames per second{who}")
 
 
 def _is_together(one: Actor, other: Actor) -> bool:
-    """Return whether two actors are the same, or people of one capture."""
+    """Return whether two actors are identical or belong to one capture."""
     first, second = one.clip, other.clip
     if one is other:
         return True

@@ -1,4 +1,4 @@
-"""Gaps in captures: whether any frame of a motion is missing."""
+"""Detection of missing frames in motions."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _gaps: Memo[Motion, bool] = Memo()
 
 
 def no_gaps(state: AppState) -> str:
-    """Say why gaps cannot be filled; while a capture is read some may still come."""
+    """Return why there are no gaps to interpolate; a capture being read may still get some."""
     if state.of(Files).stream is not None or any(
         _has_gaps(actor.clip) for actor in state.scene.actors if actor.clip is not None
     ):
         return ""
-    return "no frame of any motion is missing"
+    return "no motion has missing frames"
 
 
 def _has_gaps(clip: Motion) -> bool:

@@ -1,4 +1,4 @@
-"""Timeline: the clock's buttons, a ruler to scrub, and a track per actor with its gaps."""
+"""Timeline panel: playback buttons, a ruler to scrub, and a track per actor with its gaps."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _draw_transport(state: AppState) -> None:
         step(state, -1)
     explain("one frame back (Left)")
     imgui.same_line()
-    # One width for both words, or the buttons behind it would jump.
+    # One width for both labels, or the buttons after it would jump.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
@@ -62,7 +62,7 @@ def _draw_transport(state: AppState) -> None:
     imgui.same_line()
     if button(state, ">"):
         step(state, 1)
-    explain("one frame on (Right)")
+    explain("one frame forward (Right)")
     imgui.same_line()
     if button(state, ">|"):
         go_to_end(state, last=True)
@@ -75,7 +75,7 @@ def _draw_place(state: AppState) -> None:
     shown = clock.frame + clock.first_frame
     changed, frame = imgui.input_int("##frame", shown, 0, 0)
     note_item(state, "Frame")
-    explain("the frame that is shown")
+    explain("current frame")
     if changed and frame != shown:
         clock.playing = False
         clock.seek(clock.frame_time(frame - clock.first_frame))
@@ -86,15 +86,15 @@ def _draw_place(state: AppState) -> None:
 
 
 def _draw_rate(state: AppState) -> None:
-    """Draw how many frames a second there are; a number that is typed and entered sets it."""
+    """Draw the field of the frame rate, which Enter applies."""
     foreign = foreign_rate(state)
     with disabled(foreign):
         imgui.set_next_item_width(4.0 * imgui.get_font_size())
         entered, typed = imgui.input_double(
-            "Frames a second##rate", rate_of(state), 0.0, 0.0, "%.6g", _TYPED
+            "Frames per second##rate", rate_of(state), 0.0, 0.0, "%.6g", _TYPED
         )
         note_item(state, "Frame rate")
-        explain("Enter sets it: the same frames faster or slower", foreign)
+        explain("press Enter to play the same frames faster or slower", foreign)
     if entered:
         set_rate(state, typed)
 
@@ -112,18 +112,18 @@ def _draw_settings(state: AppState) -> None:
     clock.speed = slider(state, "Speed", clock.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.speed = 1.0
-    explain("seconds of motion a second; a right click sets 1")
+    explain("seconds of motion per second; right-click resets it to 1")
     same_line_if_room("M" * 14)
     _draw_range(state)
-    same_line_if_room("Fill gaps")
+    same_line_if_room("Interpolate gaps")
     gapless = no_gaps(state)
-    clock.fill_gaps = checkbox(state, "Fill gaps", clock.fill_gaps, gapless)
-    text = "show captures in their gaps too, on the way from the frame before to the one after"
+    clock.fill_gaps = checkbox(state, "Interpolate gaps", clock.fill_gaps, gapless)
+    text = "interpolate captures in their gaps, between the frames before and after"
     explain(text, gapless)
 
 
 def _draw_range(state: AppState) -> None:
-    """Draw the frames at which playing starts and ends."""
+    """Draw the start and end frame of the playback range."""
     clock = state.clock
     rate, origin = clock.frame_rate, clock.origin
     first = round((clock.start - origin) * rate) + clock.first_frame
@@ -132,12 +132,12 @@ def _draw_range(state: AppState) -> None:
     imgui.set_next_item_width(9 * imgui.get_font_size())
     changed, low, high = imgui.drag_int_range2("Range", first, last, 0.3, lowest, highest)
     note_item(state, "Range")
-    text = "frames that are played; I and O set them to the present one, a right click to all"
+    text = "frames to play; I and O set them to the current frame, right-click resets them to all"
     explain(text)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.set_range(*clock.whole)
     elif changed:
-        # What was not touched keeps its exact time.
+        # An untouched end keeps its exact time.
         start = clock.frame_time(low - clock.first_frame) if low != first else clock.start
         end = clock.frame_time(high - clock.first_frame) if high != last else clock.end
         clock.set_range(start, end)

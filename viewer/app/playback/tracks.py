@@ -1,4 +1,4 @@
-"""The timeline's ruler and tracks: where in time each actor is there, and where time stands."""
+"""Ruler and tracks of the timeline: presence of each actor over time, and the current time."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from viewer.rig.scene import Actor, Motion
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
 _NAME_WIDTH = 9.0  # letters' heights
-_TICK_GAP = 5.0  # the same: smallest distance of two numbers on the ruler
+_TICK_GAP = 5.0  # font sizes: smallest distance of two numbers on the ruler
 _TICK_ASIDE = 3.0  # points between a line of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
 _PLAIN = (0.44, 0.62, 0.80)  # of actors without a colour of their own, sRGB
-_QUIET = 0.6  # opacity of the tracks of actors that are not chosen
+_QUIET = 0.6  # opacity of the tracks of unchosen actors
 _CHOSEN_EDGE = (1.0, 1.0, 1.0, 0.85)
-_NARROWEST = 0.35  # letters' heights, of a bar: a single frame between gaps is to be seen
-_NARROWEST_GAP = 1.0  # points between two bars that are as narrow as that
+_NARROWEST = 0.35  # font sizes, of a bar: a single frame between gaps must be visible
+_NARROWEST_GAP = 1.0  # points between two bars of least width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
 _LINE, _TEXT = (1.0, 1.0, 1.0, 0.13), (1.0, 1.0, 1.0, 0.6)
 _BACK = (1.0, 1.0, 1.0, 0.03)
 
 
 def draw_tracks(state: AppState) -> None:
-    """Draw the ruler and the tracks; dragging in them moves time by whole frames, Alt freely."""
+    """Draw the ruler and the tracks; dragging moves time by whole frames, with Alt freely."""
     size = imgui.get_font_size()
     moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
     height = imgui.get_text_line_height_with_spacing()
@@ -111,14 +111,14 @@ def _draw_track(
 
 
 def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[float, float]]:
-    """Return from where to where bars are drawn, none too narrow to be seen.
+    """Return the extents of bars, widened to be visible.
 
     Parameters
     ----------
     places : sequence of float
-        Start and end of each, one after the other, in points.
+        Start and end of each in turn, in points.
     narrowest : float
-        Width of a bar; less only between others that leave no room for it.
+        Least width of a bar, unless its neighbours leave less room.
     end : float
         The right end of all.
 
@@ -136,14 +136,14 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
 
 
 def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
-    """Return from when to when a motion has its actor.
+    """Return the intervals in which a motion's actor is present.
 
     Parameters
     ----------
     clip : Motion
-        Keyed clips are there all of their range.
+        A motion; in keyed clips the actor is always present.
     shortest : float
-        Gaps shorter than this, in seconds, are not told: nobody could see them.
+        Gaps shorter than this, in seconds, are ignored: they would be invisible.
 
     Returns
     -------
@@ -164,14 +164,14 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
 
 
 def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: float) -> None:
-    """Draw frame numbers and lines, and darken what is not played."""
+    """Draw frame numbers and lines, and darken the time outside the playback range."""
     draw_list = imgui.get_window_draw_list()
     left, top, width, total = area
     low, high = clock.whole
     scale = width / max(high - low, 1e-9)
     line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
     first, last = (clock.first_frame + frame for frame in clock.frame_range)
-    # Room for two numbers: the last one may stand left of its line.
+    # Room for two numbers: the last one may be left of its line.
     room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
     room = max(_TICK_GAP * imgui.get_font_size(), room)
     step = nice_step(room / scale * clock.frame_rate)
@@ -188,16 +188,16 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: f
 
 
 def ruler_text_place(x: float, length: float, end: float) -> float:
-    """Return where a number of the ruler begins: right of its line, left of it at the end.
+    """Return the start of a number on the ruler: right of its line, or left of it at the end.
 
     Parameters
     ----------
     x : float
         Of the line, points.
     length : float
-        Of the number as it is written, points.
+        Width of the number, points.
     end : float
-        Where the ruler ends, points.
+        End of the ruler, points.
 
     >>> ruler_text_place(50.0, 20.0, 100.0), ruler_text_place(90.0, 20.0, 100.0)
     (53.0, 67.0)

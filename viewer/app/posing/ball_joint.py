@@ -1,4 +1,4 @@
-"""Ball joints in the Joints panel: as rotation vectors, and as the file's own numbers."""
+"""Ball joints in the Joints panel as rotation vectors and as the file's own numbers."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from viewer.rig.posing.pose_vector import own_numbers, rotation_rows, set_joint_
 
 __all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
 
-_SAME = 1e-9  # rotations nearer to each other are one
+_SAME = 1e-9  # tolerance within which rotations are equal
 
 
 def is_ball(figure: Figure, joint: int) -> bool:
-    """Return whether a joint may be a vector: of a body model, about x, y and z, unlimited."""
+    """Return whether a joint of a body model has three unlimited DOFs about x, y and z."""
     skeleton = figure.skeleton
     if skeleton is None or figure.pose_layout is None:
         return False
@@ -34,9 +34,9 @@ def is_ball(figure: Figure, joint: int) -> bool:
 def draw_vector_component(
     state: AppState, figure: Figure, pose: Pose, joint: int, axis: int, label: str
 ) -> None:
-    """Draw the slider of one component of a joint's rotation vector, and turn the joint by it."""
+    """Draw the slider of one component of a joint's rotation vector, and apply it."""
     skeleton = figure.skeleton
-    assert skeleton is not None  # the panel looked
+    assert skeleton is not None  # checked by the panel
     vector = _shown_vector(state, figure, pose, joint)
     factor = math.degrees(1.0) if state.in_degrees else 1.0
     text = "%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad"
@@ -65,9 +65,9 @@ def draw_vector_component(
 
 
 def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Floats:
-    """Return a joint's rotation vector: the one being edited, as long as it is its rotation."""
+    """Return a joint's rotation vector: the edited one while it matches the rotation."""
     posing = state.of(Posing)
-    assert figure.skeleton is not None  # the caller looked
+    assert figure.skeleton is not None  # checked by the caller
     rotation = joint_rotations(figure.skeleton, pose)[joint]
     held = posing.held_vector
     if held is not None and (held.joint, held.n_choices) == (joint, state.n_choices):
@@ -78,7 +78,7 @@ def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Fl
 
 
 def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) -> None:
-    """Draw the three numbers that the model's own files would hold for a joint."""
+    """Draw the three numbers that the model's own files store for a joint."""
     layout, skeleton = figure.pose_layout, figure.skeleton
     if layout is None or skeleton is None:
         return

@@ -1,4 +1,4 @@
-"""Captured keypoints in the Joints panel: their names, and how sure each is right now."""
+"""Captured keypoints in the Joints panel, with their current confidences."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _NAME_SHARE = 0.55  # of the panel's width
 
 
 def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> None:
-    """Say what the figure is, and list its points.
+    """Draw a description of the figure and the list of its points.
 
     Parameters
     ----------
     state : AppState
-        Gives the filter and the least confidence that is drawn.
+        Holds the filter and the least confidence that is drawn.
     actor : Actor
         Consists of captured points.
     layout : PointLayout
@@ -34,7 +34,7 @@ def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> 
     imgui.push_text_wrap_pos(0.0)
     imgui.text_unformatted(
         f"{len(layout.names)} captured points ({printable(layout.title, 40)}), not a skeleton: "
-        "there are no joints to turn."
+        "there are no joints to rotate."
     )
     imgui.text_disabled(_seen_text(state, points))
     imgui.pop_text_wrap_pos()
@@ -59,7 +59,7 @@ def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> 
 
 def _seen_text(state: AppState, points: Floats | None) -> str:
     if points is None:
-        return "Not there at this time."
+        return "Absent at this time."
     confidences, least = points[:, 3], state.options.min_confidence
     text = f"{int((confidences > 0.0).sum())} are seen at this time"
     doubtful = int(((confidences > 0.0) & (confidences < least)).sum())

@@ -1,4 +1,4 @@
-"""A pose edited while a clip drives the actor: time stops, and the user is told what follows."""
+"""Pausing of a clip that drives the actor while its pose is edited."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["pause_for_edit"]
 
 
 def pause_for_edit(state: AppState) -> None:
-    """Pause a clip that would overwrite the chosen actor's pose in the next frame, and say so.
+    """Pause a clip that would overwrite the chosen actor's pose in the next frame, with a message.
 
     Parameters
     ----------

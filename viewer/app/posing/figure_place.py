@@ -1,4 +1,4 @@
-"""Place of a figure as a whole: rows of the Joints panel."""
+"""Rows of the Joints panel for the placement of the whole figure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["draw_figure_place"]
 def draw_figure_place(state: AppState, pose: Pose) -> None:
     """Draw translation and scale, which are applied after skinning."""
     imgui.set_next_item_open(state.actor.figure.pose_layout is not None, imgui.Cond_.once)
-    is_open = imgui.tree_node_ex("Figure as a whole", imgui.TreeNodeFlags_.span_avail_width)
+    is_open = imgui.tree_node_ex("Whole figure", imgui.TreeNodeFlags_.span_avail_width)
     note_item(state, "figure")
     if not is_open:
         return

@@ -1,7 +1,7 @@
-"""Handles in the view: what a press takes hold of, and what happens until it is let go.
+"""Handles in the view: picking, dragging and releasing them.
 
-ImGuizmo turns matrices about three axes at right angles; joints here have one, two or three DOFs
-about axes that may lean, with limits, so rings and arrows are our own.
+ImGuizmo rotates matrices about three orthogonal axes; joints here have one, two or three DOFs
+about axes that may be oblique, with limits, so rings and arrows are our own.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ __all__ = [
 ]
 
 DOT_REACH = 9.0
-"""Window coordinates around a joint in which it is chosen."""
+"""Radius around a joint in which a click selects it, window coordinates."""
 
-_STILL = 2.0  # window coordinates by which a hand that clicks may shake
+_STILL = 2.0  # window coordinates that the pointer may move in a click
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
 
 def use_handles(state: AppState) -> bool:
-    """Begin, go on with or end a drag; return whether the mouse belongs to a handle."""
+    """Begin, continue or end a drag; return whether the mouse belongs to a handle."""
     posing = state.of(Posing)
     io = imgui.get_io()
     place = (io.mouse_pos.x, io.mouse_pos.y)
@@ -66,10 +66,10 @@ def use_handles(state: AppState) -> bool:
 
 
 def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
-    """Pose by where the pointer is; let go with the button, give up with the other one."""
+    """Pose by the pointer; releasing the button ends the drag, the other button cancels it."""
     posing = state.of(Posing)
     if state.actor is not drag.actor or drag.actor.pose is not drag.outcome.pose:
-        drag.is_over = True  # undone, reset or closed meanwhile: that stays
+        drag.is_over = True  # undone, reset or closed meanwhile: keep that
     if imgui.is_mouse_clicked(_RIGHT):
         cancel_drag(state)
     if drag.is_over:
@@ -97,12 +97,12 @@ def _apart(one: Place, other: Place) -> float:
 
 def _pose(state: AppState) -> Pose:
     pose = state.actor.pose
-    assert pose is not None  # no_tool looked
+    assert pose is not None  # checked by no_tool
     return pose
 
 
 def _grabbed(state: AppState, place: Place) -> Handle | None:
-    """Return the handle under the pointer; with the tool Move any joint is one."""
+    """Return the handle under the pointer; with the Move tool any joint is one."""
     handle = handle_at(state, view_frame(state), place)
     if handle is not None or state.of(Posing).tool != "move":
         return handle
@@ -115,7 +115,7 @@ def _grabbed(state: AppState, place: Place) -> Handle | None:
 
 
 def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
-    """Return the handle of the selected joint that a place belongs to.
+    """Return the handle of the selected joint at a place of the window.
 
     Parameters
     ----------
@@ -146,19 +146,19 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
 
 
 def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
-    """Return what dragging a joint itself does: its chain follows, or it is shifted."""
+    """Return the handle of the joint itself: its chain follows, or it is translated."""
     pose, skeleton = _pose(state), posed.skeleton
     length = len(used_chain(skeleton, posed.joint, state.of(Posing).chain_length))
     if length:
         return ReachHandle(posed, pose, place, length)
     if shifts(skeleton, posed.joint):
         return ShiftHandle(posed, pose, place)
-    state.say_status(f"No joint above {joint_label(skeleton, posed.joint)} can turn")
+    state.say_status(f"No joint above {joint_label(skeleton, posed.joint)} can rotate")
     return None
 
 
 def joint_places(state: AppState) -> Floats:
-    """Return where the chosen actor's joints are seen: (J, 2), NaN for those not before the eye."""
+    """Return the projections of the chosen actor's joints: (J, 2), NaN for those behind the eye."""
     posed = posed_joint(state.actor, 0)
     if posed is None:
         return np.zeros((0, 2))
@@ -166,7 +166,7 @@ def joint_places(state: AppState) -> Floats:
 
 
 def joint_at(state: AppState, place: Place) -> int:
-    """Return the chosen actor's joint that is seen at a place, -1 for none."""
+    """Return the chosen actor's joint at a place of the window, -1 for none."""
     distances = np.linalg.norm(joint_places(state) - place, axis=1)
     distances[np.isnan(distances)] = np.inf
     nearest = int(distances.argmin()) if len(distances) else -1

@@ -1,6 +1,6 @@
-"""The look of the handles: joints, chain, limit arcs, rings, arrows, and the numbers beside them.
+"""Drawing of the handles: joints, chain, limit arcs, rings, arrows, and their labels.
 
-Drawn behind the panels like the picture of the scene, so it has to come after that.
+Drawn behind the panels like the picture of the scene, so it must come after that.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ _AXES = ((0.98, 0.36, 0.33), (0.45, 0.86, 0.38), (0.36, 0.60, 1.0), (0.92, 0.92,
 _HOT = (1.0, 0.92, 0.55)
 _LIMIT = (1.0, 0.70, 0.10)
 _CHAIN = (0.45, 0.90, 0.95)
-_BEHIND = 0.28  # opacity of what is on the far side of a ring
-_MOST_DOTS = 300  # joints of which each gets a dot
+_BEHIND = 0.28  # opacity of the far side of a ring
+_MOST_DOTS = 300  # most joints that get a dot each
 _ARC_SHARE = 0.62  # of the rings' radius
 _GAP = 10.0  # window coordinates between a ring and its text
 
@@ -55,14 +55,14 @@ class _Pen:
         self.frame, self.list = frame, imgui.get_background_draw_list()
 
     def line(self, points: Floats, color: Color, thickness: float) -> None:
-        """Draw a line through (N, 3) points; none if one of them is not before the eye."""
+        """Draw a line through (N, 3) points; none if one of them is behind the eye."""
         seen = self.frame.project(points)
         if np.isfinite(seen).all():
             ink = imgui.get_color_u32(color)
             self.list.add_polyline([(x, y) for x, y in seen.tolist()], ink, thickness, 0)
 
     def fan(self, center: Floats, points: Floats, color: Color) -> None:
-        """Fill what lies between a point and a line."""
+        """Fill the area between a point and a line."""
         seen, middle = self.frame.project(points), self.frame.place(center)
         if middle is None or not np.isfinite(seen).all():
             return
@@ -82,7 +82,7 @@ class _Pen:
 
 
 def draw_gizmo(state: AppState) -> None:
-    """Draw what the chosen tool needs over the scene."""
+    """Draw the handles of the chosen tool over the scene."""
     posing = state.of(Posing)
     x, y, width, height = state.view_rect
     if not posing.is_on or min(width, height) < 40.0 or no_tool(state):
@@ -103,13 +103,13 @@ def draw_gizmo(state: AppState) -> None:
 
 
 def _drag(state: AppState) -> Drag | None:
-    """Return what is held, None once it was cancelled."""
+    """Return the handle that is held, None once cancelled."""
     drag = state.of(Posing).drag
     return None if drag is None or drag.is_over else drag
 
 
 def _hovered(state: AppState, frame: ViewFrame) -> Handle | None:
-    """Return the handle under a pointer that no panel has."""
+    """Return the handle under the pointer if no panel covers it."""
     io = imgui.get_io()
     if io.want_capture_mouse or not imgui.is_mouse_pos_valid():
         return None
@@ -128,7 +128,7 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
     is_free = _drag(state) is None and not io.want_capture_mouse
     under = joint_at(state, (io.mouse_pos.x, io.mouse_pos.y)) if is_free else -1
     skeleton = state.actor.figure.skeleton
-    # A click chooses it also where it lies under a handle, which a drag takes.
+    # A click selects it even under a handle, which only a drag moves.
     if under >= 0 and skeleton is not None:
         x, y = places[under].tolist()
         pen.list.add_circle((x, y), 7.0, imgui.get_color_u32((*_HOT, 1.0)), 0, 2.0)
@@ -137,11 +137,11 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
 
 def _draw_arcs(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
     """Draw the limits of the joint's rotations."""
-    assert state.actor.pose is not None  # there is a posed joint
+    assert state.actor.pose is not None  # limits imply a posed joint
     unit = pen.frame.unit_length(posed.center)
     found = limit_arcs(posed, state.actor.pose)
     for rank, arc in enumerate(found):
-        # Each a little smaller than the one before: axes may lie on each other.
+        # Each a little smaller than the one before: axes may coincide.
         _draw_arc(pen, posed.center, arc, (_ARC_SHARE - 0.07 * rank) * RADIUS * unit)
 
 
@@ -159,12 +159,12 @@ def _draw_arc(pen: _Pen, center: Floats, arc: LimitArc, radius: float) -> None:
 
 
 def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
-    """Draw the rings of the joint; while one is turned, that one and how far."""
+    """Draw the rings of the joint; during a drag only its ring and the angle."""
     drag, pose = _drag(state), state.actor.pose
     if drag is not None and isinstance(drag.handle, TurnHandle):
         _draw_turn(pen, posed, drag.handle, drag.outcome.angle or 0.0)
         return
-    assert pose is not None  # there is a posed joint
+    assert pose is not None  # limits imply a posed joint
     under = hot.ring if isinstance(hot, TurnHandle) else None
     for ring in rings(posed, pose, state.of(Posing).orientation, pen.frame):
         is_hot = under is not None and (ring.color, ring.dof) == (under.color, under.dof)
@@ -186,14 +186,14 @@ def _draw_ring(pen: _Pen, center: Floats, ring: Ring, is_hot: bool) -> None:
 
 
 def _runs(flags: np.ndarray) -> list[list[int]]:
-    """Split indices where a flag changes; neighbouring parts share an index, so lines meet."""
+    """Split indices where a flag changes; neighbouring parts share an index, so that lines meet."""
     edges = [0, *(np.flatnonzero(np.diff(flags)) + 1).tolist(), len(flags)]
     pairs = pairwise(edges)
     return [list(range(first, min(last + 1, len(flags)))) for first, last in pairs]
 
 
 def _draw_turn(pen: _Pen, posed: PosedJoint, handle: TurnHandle, angle: float) -> None:
-    """Draw the ring that is held, and the sector that it was turned through."""
+    """Draw the ring that is held, and the sector of its rotation."""
     unit = pen.frame.unit_length(posed.center)
     ring, radius = handle.ring, handle.ring.size * unit
     color = _AXES[ring.color]
@@ -208,7 +208,7 @@ def _draw_turn(pen: _Pen, posed: PosedJoint, handle: TurnHandle, angle: float) -
 
 
 def _draw_chain(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
-    """Draw the joints between the selected one and the highest that may turn."""
+    """Draw the joints between the selected one and the highest that may rotate."""
     skeleton, drag = posed.skeleton, _drag(state)
     chain = used_chain(skeleton, posed.joint, state.of(Posing).chain_length).tolist()
     if not chain:
@@ -232,7 +232,7 @@ def _draw_chain(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
 
 
 def _draw_arrows(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
-    """Draw the middle, by which the joint is dragged, and the arrows along which it shifts."""
+    """Draw the handle at the joint, and the arrows along which it is translated."""
     drag = _drag(state)
     held = drag.handle if drag is not None else hot
     arrow = held.arrow if isinstance(held, ShiftHandle) else None
@@ -262,7 +262,7 @@ def _draw_arrow(pen: _Pen, center: Floats, arrow: Arrow, is_hot: bool) -> None:
 
 
 def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
-    """Write what the drag has come to, and which limits hold it back."""
+    """Write the result of the drag, and the limits that restrict it."""
     center, drag = pen.frame.place(posed.center), _drag(state)
     if center is None or drag is None or not drag.outcome.text:
         return
@@ -277,7 +277,7 @@ def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
 def _text_box(
     state: AppState, pen: _Pen, corner: tuple[float, float], lines: Sequence[tuple[str, Color]]
 ) -> None:
-    """Write lines on a dark ground, within the view."""
+    """Write lines on a dark background, within the view."""
     x, y, width, height = state.view_rect
     sizes = [imgui.calc_text_size(text) for text, _ in lines]
     wide, high = max(size.x for size in sizes), sum(size.y for size in sizes)

@@ -1,4 +1,4 @@
-"""Hands: a slider per principal component of hand poses, flat and mean hands."""
+"""Hands panel: a slider per principal component of hand poses, flat and mean hands."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.posing.pose_vector import set_joint_rotations
 
 __all__ = ["draw"]
 
-_REACH = 3.0  # of a slider; more can be typed
+_REACH = 3.0  # range of a slider; more can be typed
 _CLAMP = imgui.SliderFlags_.always_clamp
 _coefficients: Memo[Hand, Floats] = Memo()
 
@@ -64,14 +64,14 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
         )
         note_item(state, f"{side} component {index}")
         if changed and math.isfinite(value) and abs(value) < 1e3:
-            # The other components, and what none of them can make, stay as they are.
+            # The other components, and the residual that none represents, stay unchanged.
             step = (value - values[index]) * hand.components[index].reshape(-1, 3)
             _turn(figure, pose, hand, vectors + step)
     imgui.pop_item_width()
 
 
 def _vectors(figure: Figure, pose: Pose, hand: Hand) -> Floats:
-    assert figure.skeleton is not None  # whoever has hands has a skeleton
+    assert figure.skeleton is not None  # hands imply a skeleton
     return matrix_to_rotation_vector(joint_rotations(figure.skeleton, pose)[hand.joints])
 
 

@@ -1,4 +1,4 @@
-"""The joint tree of the Joints panel: filter, open rows, and the row of the selected joint."""
+"""State of the joint tree: filter, open rows, and scrolling to the selected joint."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from viewer.rig.skeleton import joint_label
 
 __all__ = ["JointTree", "joint_tree", "select_joint"]
 
-_MOST_OPENED = 128  # joints of a rig that is seen whole at first
+_MOST_OPENED = 128  # largest rig that is fully open at first
 
 
 @dataclass(slots=True)
 class JointTree:
-    """Which rows are listed.
+    """State of the joint tree.
 
     Attributes
     ----------
     filter : str
-        Only joints, or captured points, with this in their names are listed.
+        Text that the names of listed joints or captured points contain.
     opened : set of int
         Joints whose DOFs and children are listed.
     scrolls_to : int
-        The joint that is to be brought into view, -1 for none.
+        Joint to scroll to, -1 for none.
     n_choices : int
-        That of the state for which filter and opened rows are.
+        The state's ``n_choices`` for which filter and open rows are valid.
     """
 
     filter: str = ""
@@ -36,7 +36,7 @@ class JointTree:
 
 
 def joint_tree(state: AppState) -> JointTree:
-    """Return the tree of the chosen actor; of another one than before it begins anew."""
+    """Return the tree of the chosen actor, reset if the actor changed."""
     tree = state.of(JointTree)
     if tree.n_choices != state.n_choices:
         tree.n_choices = state.n_choices
@@ -45,7 +45,7 @@ def joint_tree(state: AppState) -> JointTree:
 
 
 def _first_opened(actor: Actor) -> set[int]:
-    """Return the joints whose rows are open at first: all of a small rig, else the roots."""
+    """Return the joints whose rows are open at first: all of a small rig, otherwise the roots."""
     skeleton = actor.figure.skeleton
     if skeleton is None:
         return set()
@@ -55,12 +55,12 @@ def _first_opened(actor: Actor) -> set[int]:
 
 
 def select_joint(state: AppState, joint: int) -> None:
-    """Select a joint of the chosen actor; its row is opened, brought into view, and not hidden.
+    """Select a joint of the chosen actor, and reveal its row.
 
     Parameters
     ----------
     state : AppState
-        Gets the joint; a filter that hides it is emptied.
+        Gets the joint; a filter that hides it is cleared.
     joint : int
         Index, 0 or more.
     """
@@ -72,5 +72,5 @@ def select_joint(state: AppState, joint: int) -> None:
     if tree.filter.lower() not in joint_label(skeleton, joint).lower():
         tree.filter = ""
     while joint >= 0:
-        tree.opened.add(joint)  # so that the rows below it are seen
+        tree.opened.add(joint)  # so that the rows below it are visible
         joint = int(skeleton.parents[joint])

@@ -1,4 +1,4 @@
-"""Joints: the tree with a filter, a slider per DOF within its limits, and the pose as a whole."""
+"""Joints panel: the joint tree with a filter, sliders of DOFs, and actions on the whole pose."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ __all__ = ["draw", "rows"]
 Rows: TypeAlias = tuple[tuple[int, int, int], ...]
 
 OWN_NUMBERS = -2
-"""In place of a DOF: the row with the numbers that the model's own files would hold."""
+"""Stands for a DOF in the row with the numbers of the model's own files."""
 
 _FIRST_ROTATION = 3
-_INDENT = 9.0  # points a level
-_DEEPEST = 14  # levels that are indented: chains of thousands must stay readable
+_INDENT = 9.0  # points per level
+_DEEPEST = 14  # most levels that are indented: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
 _known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
 _known_rows: Memo[Skeleton, Rows] = Memo(kept=4)
@@ -90,14 +90,14 @@ def draw(state: AppState) -> None:
 
 
 def _include_wanted(state: AppState, clipper: imgui.ListClipper, shown: Rows) -> None:
-    """Let the row of a joint that was chosen elsewhere be drawn, so that it can be scrolled to."""
+    """Include the row of a joint selected elsewhere, so that the list can scroll to it."""
     for row, (joint, dof, _) in enumerate(shown if joint_tree(state).scrolls_to >= 0 else ()):
         if joint == joint_tree(state).scrolls_to and dof == -1:
             clipper.include_item_by_index(row)
 
 
 def _draw_actor_choice(state: AppState) -> None:
-    """Draw a list of the actors if there are several."""
+    """Draw a list of actors if there are several."""
     if len(state.scene.actors) < 2:
         return
     names = [
@@ -137,13 +137,13 @@ def _draw_head(state: AppState) -> None:
 
 
 def _show_angles(state: AppState, in_degrees: bool) -> None:
-    """Choose the unit of angles; curves are fitted again, as their axis has other numbers."""
+    """Set the unit of angles; curves are fitted again because the scale of their axis changes."""
     state.of(Curves).wants_fit |= in_degrees != state.in_degrees
     state.in_degrees = in_degrees
 
 
 def _draw_pose_menu(state: AppState) -> None:
-    """Draw what can be done to the pose as a whole."""
+    """Draw the menu of actions on the whole pose."""
     if not imgui.begin_popup("pose menu"):
         return
     for text, action in (
@@ -163,12 +163,12 @@ def _labels(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool = False) -> Rows:
-    """Return what is listed, as (joint, DOF or -1 for the joint's own row, depth).
+    """Return the listed rows as (joint, DOF or -1 for the joint's own row, depth).
 
     Parameters
     ----------
     skeleton : Skeleton
-        Gives joints and DOFs.
+        Joints and DOFs.
     opened : frozenset of int
         Joints whose DOFs and children are listed.
     wanted : str
@@ -260,7 +260,7 @@ def _draw_dof(
         why = f"locked at {_value_text(low, kind, state.in_degrees)}" if locked else ""
         if menu_item(state, "Reset", why=why):
             value = float(skeleton.rest_dofs[dof])
-        outside = "" if low <= 0.0 <= high else "0 is outside of its limits"
+        outside = "" if low <= 0.0 <= high else "0 is outside its limits"
         if menu_item(state, "Set to 0", why=why or outside):
             value = 0.0
         if menu_item(state, "Copy value"):
@@ -272,7 +272,7 @@ def _draw_dof(
 
 
 def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> float:
-    """Draw the slider in the chosen unit and return the value in the file's own."""
+    """Draw the slider in the displayed unit and return the value in radians or lengths."""
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
     is_rotation = skeleton.dof_kinds[dof] >= _FIRST_ROTATION
     unlimited = math.pi if is_rotation else _reach(state)
@@ -289,17 +289,17 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
         text,
         _STAYS_WITHIN if bounded else _MAY_TYPE_BEYOND,
     )
-    # float32 of the widget must not touch a value that nobody moved; "nan" can be typed.
+    # The widget's float32 must not change a value that was not moved; "nan" can be typed.
     return moved / factor if changed and math.isfinite(moved) else float(pose.dofs[dof])
 
 
 def _reach(state: AppState) -> float:
-    """Return how far a slider moves the root: the size of the scene."""
+    """Return the range of a slider of the root's translation: the size of the scene."""
     return box_size(state.box) or 1.0
 
 
 def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
-    """Return what a slider's tooltip says of its limits, in the unit that is shown."""
+    """Return the text about limits in a slider's tooltip, in the displayed unit."""
     texts = [_value_text(limit, kind, in_degrees) for limit in (low, high)]
     if low == high:
         return f"locked at {texts[0]}"
@@ -312,7 +312,7 @@ def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
 
 
 def _value_text(value: float, kind: int, in_degrees: bool) -> str:
-    """Return a DOF's value in the unit that is shown."""
+    """Return a DOF's value in the displayed unit."""
     return angle_text(value, in_degrees) if kind >= _FIRST_ROTATION else number_text(value)
 
 

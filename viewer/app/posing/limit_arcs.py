@@ -1,8 +1,8 @@
-"""Limits as arcs: how far each rotation of a joint may go, about the axis that it has right now.
+"""Arcs of rotation limits, about the current axes of a joint.
 
-An arc lies where the bone would swing to: its middle line is the present direction of the bone,
-across the axis, and its ends are the limits, seen from there. A bone that lies along the axis, as
-in a twist, is replaced by an axis of the joint that turns with it.
+An arc covers the directions that the bone can reach: it starts at the bone's current direction
+perpendicular to the axis, and its ends are the limits. A bone that lies along the axis, as
+in a twist, is replaced by an axis of the joint that rotates with it.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from viewer.rig.posing.joint_rotation import rotation_dofs
 
 __all__ = ["LimitArc", "arc_points", "limit_arcs"]
 
-_ALONG = 0.35  # sine between bone and axis below which the bone shows no angle
+_ALONG = 0.35  # sine of the angle between bone and axis below which the bone shows no rotation
 _STEP = math.radians(4.0)
 _WHOLE = 2.0 * math.pi
-_ROUNDING = 1e-6  # radians from a limit that count as on it
+_ROUNDING = 1e-6  # radians from a limit within which a value is at it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,11 +38,11 @@ class LimitArc:
     color : int
         0, 1, 2 for x, y, z.
     axis, start : (3,)
-        What it turns about, and the present direction across that: unit vectors, scene space.
+        Rotation axis, and the current direction perpendicular to it: unit vectors, scene space.
     low, high : float
-        The limits from the present value, radians about the axis; low <= 0 <= high.
+        Limits relative to the current value, radians about the axis; low <= 0 <= high.
     is_limited : bool
-        Whether the value stands at one of them.
+        Whether the value is at one of them.
     """
 
     dof: int
@@ -81,11 +81,11 @@ def limit_arcs(joint: PosedJoint, pose: Pose) -> list[LimitArc]:
 
 
 def _present(joint: PosedJoint, axis: Floats, kind: int) -> Floats:
-    """Return the direction across an axis that shows how far the joint is turned about it."""
+    """Return the direction perpendicular to an axis that shows the rotation about it."""
     own = joint.axes("local")
     across = _without(_bone(joint), axis)
     if np.linalg.norm(across) < _ALONG:
-        # Of the joint's other two axes the one that is more across, so that it never vanishes.
+        # Of the joint's other two axes the more perpendicular one, so that it never vanishes.
         others = [_without(own[:, (kind + k) % 3], axis) for k in (1, 2)]
         across = max(others, key=lambda vector: float(np.linalg.norm(vector)))
     return unit(across)
@@ -96,7 +96,7 @@ def _without(vector: Floats, axis: Floats) -> Floats:
 
 
 def _bone(joint: PosedJoint) -> Floats:
-    """Return the way from a joint to the middle of its children, of its box for an end."""
+    """Return the vector from a joint to the middle of its children, or of a leaf's box."""
     skeleton, index = joint.skeleton, joint.joint
     children = np.flatnonzero(skeleton.parents == index)
     if len(children):
@@ -115,9 +115,9 @@ def arc_points(arc: LimitArc, center: Floats, radius: float) -> Floats:
     Parameters
     ----------
     arc : LimitArc
-        Which; more than a whole turn is drawn as one.
+        Arc to draw; more than 2 pi is drawn as 2 pi.
     center : (3,)
-        Where the joint is.
+        Position of the joint.
     radius : float
         Scene units.
     """

@@ -1,8 +1,8 @@
-"""The tool "Move": a joint dragged in the plane of the picture, and arrows that shift the root.
+"""Move tool: a joint dragged in the image plane, and arrows that translate the root.
 
-A joint below others is brought to the pointer by inverse kinematics, from the pose in which the
-drag began: however the pointer goes there, the same place gives the same pose. A root, and a
-joint with translations of its own, is shifted.
+A joint below others follows the pointer by inverse kinematics, solved from the pose in which the
+drag began: the result depends on the pointer's place, not on its path. A root, and a
+joint with translations of its own, is translated.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ __all__ = [
 LENGTH = 72.0
 """Of the arrows, window coordinates."""
 
-_REACH = 7.0  # window coordinates around an arrow in which it is taken
-_SHORTEST = 12.0  # window coordinates: an arrow that is seen shorter points at the eye
-_BARE = 14.0  # window coordinates at an arrow's foot that belong to the handle in the middle
-_ROUNDS = 40  # of the solver: a frame must not take long
-_MET = 1e-3  # of the chain's reach: a distance that is shown
+_REACH = 7.0  # window coordinates around an arrow within which it is grabbed
+_SHORTEST = 12.0  # window coordinates: a shorter projection points at the eye
+_BARE = 14.0  # window coordinates at an arrow's base that belong to the handle in the middle
+_ROUNDS = 40  # iterations of the solver: bounds the time of a frame
+_MET = 1e-3  # of the chain's reach: smallest distance that is shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrow:
-    """A direction in which a joint can be shifted.
+    """A direction in which a joint can be translated.
 
     Attributes
     ----------
@@ -61,12 +61,12 @@ class Arrow:
 
 
 def longest_chain(skeleton: Skeleton, joint: int) -> int:
-    """Return how many joints above one can turn."""
+    """Return how many joints above one can rotate."""
     return len(chain_above(skeleton, joint, skeleton.n_joints)) if joint >= 0 else 0
 
 
 def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
-    """Return the joints that turn when one is dragged, the nearest first: (N,) int32.
+    """Return the joints that rotate when one is dragged, the nearest first: (N,) int32.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     joint : int
         The dragged one.
     asked : int
-        How many at most; 0 for two without a root, which would turn the whole figure, unless
-        nothing else can.
+        Largest number; 0 for two without a root, which would rotate the whole figure, unless
+        nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)
     if not asked and len(chain) > 1:
@@ -96,7 +96,7 @@ def shifts(skeleton: Skeleton, joint: int) -> bool:
 
 
 def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
-    """Return the arrows of a joint; none if it cannot be shifted.
+    """Return the arrows of a joint; none if it cannot be translated.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def grab_arrow(found: list[Arrow], center: Floats, frame: ViewFrame, place: Plac
 
 
 class ReachHandle:
-    """A joint that is dragged, and the chain above it that follows.
+    """Handle of a dragged joint, and of the chain above it that follows.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class ReachHandle:
     place : (float, float)
         The pointer then.
     length : int
-        How many joints above may turn.
+        How many joints above may rotate.
     """
 
     def __init__(self, posed: PosedJoint, start: Pose, place: Place, length: int) -> None:
@@ -186,7 +186,7 @@ class ReachHandle:
 
 
 class ShiftHandle:
-    """A root, or a joint that can move of its own, that is dragged.
+    """Handle of a root, or of a joint with translations of its own.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ class ShiftHandle:
     place : (float, float)
         The pointer then.
     arrow : Arrow or None
-        Along which it moves; None for the plane of the picture.
+        Along which it moves; None for the image plane.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class ShiftHandle:
         self.joint = posed.joint
 
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
-        """Return the pose with the joint, or the whole figure, shifted to the pointer."""
+        """Return the pose with the joint, or the whole figure, translated to the pointer."""
         if self.arrow is None:
             way = _dragged(self.posed.center, self.place, frame, place) - self.posed.center
         else:
@@ -216,14 +216,14 @@ class ShiftHandle:
         return self._shift_dofs(rows, way) if len(rows) else self._shift_figure(way)
 
     def _along(self, frame: ViewFrame, place: Place) -> float:
-        """Return how far along the arrow the line of sight passes, from where it did at first."""
-        assert self.arrow is not None  # the caller looked
+        """Return the movement of the line of sight along the arrow since the start of the drag."""
+        assert self.arrow is not None  # checked by the caller
         center, axis = self.posed.center, self.arrow.axis
         first = _nearest_to(center, axis, *frame.ray(self.place))
         return _nearest_to(center, axis, *frame.ray(place)) - first
 
     def _shift_dofs(self, rows: Ints, way: Floats) -> Outcome:
-        """Change the joint's translations; those that it lacks stay."""
+        """Change the translations that the joint has."""
         skeleton, pose = self.posed.skeleton, self.start.copy()
         columns = self.posed.parent_linear[:, skeleton.dof_kinds[rows]]
         steps = np.linalg.lstsq(columns, way, rcond=None)[0]
@@ -235,7 +235,7 @@ class ShiftHandle:
         return Outcome(pose, _shift_text(joint_label(skeleton, self.joint), done), limited)
 
     def _shift_figure(self, way: Floats) -> Outcome:
-        """Move the whole figure: its translation counts before its placement in the scene."""
+        """Move the whole figure: its translation applies before its placement in the scene."""
         pose = self.start.copy()
         # The placement of the actor is the joint's placement without the figure's own part.
         linear = self.posed.placement[:3, :3] / self.start.figure_scale
@@ -244,13 +244,13 @@ class ShiftHandle:
 
 
 def _dragged(center: Floats, first: Place, frame: ViewFrame, place: Place) -> Floats:
-    """Return where a joint is dragged to: it keeps its depth, and its way off the pointer."""
+    """Return the target of a dragged joint: it keeps its depth and its offset from the pointer."""
     start = frame.at_depth_of(center, first)
     return np.asarray(center + frame.at_depth_of(center, place) - start)
 
 
 def _nearest_to(center: Floats, axis: Floats, origin: Floats, direction: Floats) -> float:
-    """Return where on an axis through a point another line comes nearest to it."""
+    """Return the position along an axis that is nearest to another line."""
     across = float(axis @ direction)
     room = max(1.0 - across * across, 1e-6)
     away = origin - center

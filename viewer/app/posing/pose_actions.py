@@ -1,4 +1,4 @@
-"""Actions on a pose as a whole: copy, paste, save, mirror, random shape."""
+"""Actions on a whole pose: copy, paste, save, mirror, random shape."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = [
     "save_pose",
 ]
 
-_RANDOM = 10  # leading coefficients, which vary most, that a random body varies
+_RANDOM = 10  # number of leading coefficients, of largest variance, that a random body varies
 
 
 def _record(state: AppState) -> PoseRecord | None:
@@ -43,7 +43,7 @@ def _record(state: AppState) -> PoseRecord | None:
 
 
 def copy_pose(state: AppState) -> None:
-    """Put the chosen actor's pose on the clipboard as JSON."""
+    """Copy the chosen actor's pose to the clipboard as JSON."""
     from viewer.formats.pose import pose_text
 
     record = _record(state)
@@ -53,7 +53,7 @@ def copy_pose(state: AppState) -> None:
 
 
 def copy_numbers(state: AppState) -> None:
-    """Put the pose on the clipboard as the model's own numbers."""
+    """Copy the pose to the clipboard as the model's own numbers."""
     actor = state.actor
     if actor.pose is None or actor.figure.skeleton is None:
         return
@@ -63,10 +63,10 @@ def copy_numbers(state: AppState) -> None:
 
 
 def paste_pose(state: AppState) -> None:
-    """Pose the chosen actor by what is on the clipboard: JSON, or the model's own numbers.
+    """Pose the chosen actor from the clipboard: JSON, or the model's own numbers.
 
-    A pose that was copied from a figure with other DOFs is carried over joint by joint: JSON says
-    how they are turned.
+    A pose copied from a figure with other DOFs is transferred joint by joint: JSON contains
+    their rotations.
     """
     from viewer.formats import pose
 
@@ -75,7 +75,7 @@ def paste_pose(state: AppState) -> None:
         return
     text = imgui.get_clipboard_text() or ""
     try:
-        # Numbers may come with commas, from a list in a program.
+        # Numbers may be separated by commas, as in a program's list.
         words = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
         source = Source("clipboard", words.encode("utf-8", "replace"))
         if not text.strip():
@@ -94,7 +94,7 @@ def paste_pose(state: AppState) -> None:
 
 
 def save_pose(state: AppState, path: Path) -> None:
-    """Write the chosen actor's pose; the suffix chooses the form."""
+    """Write the chosen actor's pose; the suffix selects the format."""
     record = _record(state)
     if record is not None:
         save_files(state, lambda: write(record, path), [path])

@@ -1,4 +1,4 @@
-"""The selected joint as the tools need it: where it is in the scene, and its axes there."""
+"""The selected joint with its position and axes in the scene, for the tools."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["PosedJoint", "posed_joint"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedJoint:
-    """One joint of an actor, posed and placed.
+    """One joint of a posed and placed actor.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class PosedJoint:
     joint : int
         Which one.
     placement : (4, 4)
-        Figure space to scene, the figure's own place and size included.
+        Figure space to scene, including the figure's own translation and scale.
     world : (J, 4, 4)
         Joint space to scene, all joints.
     """
@@ -41,7 +41,7 @@ class PosedJoint:
 
     @property
     def center(self) -> Floats:
-        """Where the joint is: (3,), scene space."""
+        """Position of the joint: (3,), scene space."""
         return np.asarray(self.world[self.joint, :3, 3])
 
     @property
@@ -52,13 +52,13 @@ class PosedJoint:
 
     @property
     def parent_rotation(self) -> Floats:
-        """The parent's axes in the scene, at right angles and of unit length: (3, 3)."""
+        """The parent's axes in the scene, orthonormalised: (3, 3)."""
         return _axes(self.parent_linear)
 
     def turning_axis(self, axis: Floats) -> Floats:
-        """Return about what the joint is seen to turn: cof(A) axis, with the parent's axes A.
+        """Return the axis of a rotation in the scene: cof(A) axis, with the parent's axes A.
 
-        Cofactors carry axes of rotations through mirrored and stretched frames too.
+        Cofactors transform rotation axes correctly through reflected and stretched frames too.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class PosedJoint:
         return unit(cofactors @ axis)
 
     def parent_axis(self, axis: Floats) -> Floats:
-        """Return what is an axis of rotation in the scene in the parent's frame: (3,), unit."""
+        """Return a rotation axis of the scene in the parent's frame: (3,), unit."""
         linear = self.parent_linear
         return unit(linear.T @ axis) * (-1.0 if np.linalg.det(linear) < 0.0 else 1.0)
 
@@ -95,7 +95,7 @@ class PosedJoint:
 
 
 def _axes(linear: Floats) -> Floats:
-    """Return the rotation next to a matrix: axes without their lengths, mirrored ones turned."""
+    """Return the rotation nearest to a matrix, without its scale or reflection."""
     if abs(np.linalg.det(linear)) < 1e-300:
         return np.eye(3)
     return nearest_rotations(linear)[0]

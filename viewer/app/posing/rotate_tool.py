@@ -1,8 +1,8 @@
-"""The tool "Rotate": rings about a joint, and what turning one of them does.
+"""Rotate tool: rings about a joint, and the rotations made by dragging them.
 
-A joint that turns freely about three axes is turned as a whole, about the axes of the chosen
+A joint that rotates freely about three axes is rotated as a whole, about the axes of the chosen
 orientation or the line of sight. Any other joint has a ring for each of its DOFs, about the axis
-which that DOF really has.
+of that DOF.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ RADIUS = 78.0
 """Of the rings, window coordinates."""
 
 SNAP = math.radians(15.0)
-_VIEW_RADIUS = 1.2  # of the ring about the line of sight, in the others' radii
-_REACH = 7.0  # window coordinates around a ring in which it is taken
-_FLAT = 0.25  # cosine between axis and line of sight below which a ring is turned along its edge
+_VIEW_RADIUS = 1.2  # radius of the ring about the line of sight, relative to the others
+_REACH = 7.0  # window coordinates around a ring within which it is grabbed
+_FLAT = 0.25  # cosine between axis and line of sight below which a ring is dragged along its edge
 _STEPS = 72
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring:
-    """A circle about a joint that turns it.
+    """A circle about a joint that rotates it.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Ring:
     size : float
         Its radius in window coordinates.
     dof : int
-        The DOF that it turns, -1 for the whole joint.
+        The DOF that it rotates, -1 for the whole joint.
     """
 
     axis: Floats
@@ -68,7 +68,7 @@ class Ring:
 
 
 def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> list[Ring]:
-    """Return the rings that a joint can be turned by; none if it cannot turn.
+    """Return the rings of a joint; none if it cannot rotate.
 
     Parameters
     ----------
@@ -95,13 +95,13 @@ def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> 
 
 
 def toward_eye(frame: ViewFrame, point: Floats) -> Floats:
-    """Return the direction from a point to the eye: (3,), a unit vector; up if it is not seen."""
+    """Return the unit direction from a point to the eye: (3,); up if it is not visible."""
     seen = frame.place(point)
     return np.array([0.0, 1.0, 0.0]) if seen is None else -frame.ray(seen)[1]
 
 
 def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = None) -> Floats:
-    """Return points all around an axis, the first one again at the end: (N, 3).
+    """Return points of a closed circle around an axis: (N, 3).
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = N
     radius : float
         Scene units.
     start : (3,), optional
-        The direction of the first point, at right angles to the axis.
+        The direction of the first point, perpendicular to the axis.
     """
     first = _across(axis) if start is None else start
     second = np.cross(axis, first)
@@ -119,7 +119,7 @@ def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = N
 
 
 def _across(axis: Floats) -> Floats:
-    """Return some unit vector at right angles to an axis."""
+    """Return some unit vector perpendicular to an axis."""
     least = np.eye(3)[int(np.argmin(np.abs(axis)))]
     return unit(np.cross(axis, least))
 
@@ -127,9 +127,9 @@ def _across(axis: Floats) -> Floats:
 def grab_ring(
     found: list[Ring], center: Floats, frame: ViewFrame, place: Place
 ) -> tuple[Ring, Floats] | None:
-    """Return the ring under the pointer and the direction to where it is held.
+    """Return the ring under the pointer and the direction to its grabbed point.
 
-    Of several the nearest is taken; the half of a ring that is behind the joint counts as farther.
+    Of several the nearest is chosen; the half of a ring behind the joint counts as farther.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def grab_ring(
 
 
 def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Return how far a place is from each piece of a line, and where along it: (N,) both."""
+    """Return a place's distances from the segments of a line, and the parameters: (N,) both."""
     starts, steps = line[:-1], np.diff(line, axis=0)
     lengths = np.maximum(np.einsum("na,na->n", steps, steps), 1e-12)
     shares = np.clip(np.einsum("na,na->n", place - starts, steps) / lengths, 0.0, 1.0)
@@ -171,7 +171,7 @@ def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
 
 
 class TurnHandle:
-    """A ring that is held and turned.
+    """Handle of a ring.
 
     Parameters
     ----------
@@ -180,13 +180,13 @@ class TurnHandle:
     start : Pose
         The pose then.
     ring : Ring
-        What is held.
+        The ring.
     held : (3,)
-        From the joint to where it is held: a unit vector, scene space.
+        From the joint to the grabbed point: a unit vector, scene space.
     place : (float, float)
         The pointer then.
     in_degrees : bool
-        How angles are written.
+        Unit of angles in text.
     """
 
     def __init__(
@@ -205,10 +205,10 @@ class TurnHandle:
         self._first: float | None = None
 
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
-        """Return the pose with the joint turned as far as the pointer went around it."""
+        """Return the pose with the joint rotated by the pointer's angle around it."""
         angle = self._turned(frame, place)
         if angle is not None:
-            # Around and around: of the angles that look the same the nearest to the last.
+            # Several revolutions: of the equivalent angles, the nearest to the last one.
             self._angle = angle - 2 * math.pi * round((angle - self._angle) / (2 * math.pi))
         turn = SNAP * round(self._angle / SNAP) if snaps else self._angle
         if self.ring.dof >= 0:
@@ -216,7 +216,7 @@ class TurnHandle:
         return self._whole(turn)
 
     def _turned(self, frame: ViewFrame, place: Place) -> float | None:
-        """Return the angle from where the ring was held to the pointer, None if there is none."""
+        """Return the angle from the grabbed point to the pointer, None if there is none."""
         if self.ring.color == 3:
             return self._on_screen(frame, place)
         axis, eye = self.ring.axis, toward_eye(frame, self.center)
@@ -228,7 +228,7 @@ class TurnHandle:
         return None if found is None or self._first is None else found - self._first
 
     def _on_screen(self, frame: ViewFrame, place: Place) -> float | None:
-        """Return the angle around the joint in the picture, against the clock."""
+        """Return the angle around the joint in the image, counterclockwise."""
         center = frame.place(self.center)
         if center is None:
             return None
@@ -238,21 +238,21 @@ class TurnHandle:
         return now - first
 
     def _angle_at(self, frame: ViewFrame, place: Place) -> float | None:
-        """Return the angle from the held direction to where the ring's plane is pointed at."""
+        """Return the angle from the held direction to the pointer in the ring's plane."""
         axis, (origin, direction) = self.ring.axis, frame.ray(place)
         along = float(axis @ direction)
         if abs(along) < 1e-6:
             return None
         away = origin + direction * float(axis @ (self.center - origin)) / along - self.center
         if not np.isfinite(frame.project(self.center + away)).all():
-            return None  # the plane is met behind the eye
+            return None  # the plane is intersected behind the eye
         return math.atan2(float(axis @ np.cross(self.held, away)), float(self.held @ away))
 
     def _along_edge(self, frame: ViewFrame, place: Place) -> float:
-        """Return the angle of a ring seen from its edge: like a wheel rolled by the pointer."""
+        """Return the angle of a ring seen edge-on: like a wheel rolled by the pointer."""
         eye = toward_eye(frame, self.center)
         radius = self.ring.size * frame.unit_length(self.center)
-        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # the way of its front, a mrad long
+        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # its front moved by 1 mrad
         ends = frame.project(np.stack([self.center, self.center + rim]))
         way = (ends[1] - ends[0]) * 1e3
         length = float(way @ way)
@@ -262,7 +262,7 @@ class TurnHandle:
         return side * float((np.array(place) - self.place) @ way) / length
 
     def _one_dof(self, turn: float) -> Outcome:
-        """Turn the DOF of the ring, as far as its limits let it."""
+        """Rotate the DOF of the ring within its limits."""
         skeleton, dof, pose = self.posed.skeleton, self.ring.dof, self.start.copy()
         low, high = skeleton.dof_limits[dof]
         value = float(pose.dofs[dof]) + turn
@@ -273,7 +273,7 @@ class TurnHandle:
         return Outcome(pose, f"{self._text(done, '+')}   {now}", limited, angle=done)
 
     def _whole(self, turn: float) -> Outcome:
-        """Turn the joint about the ring's axis; where a limit is met, as near as it can."""
+        """Rotate the joint about the ring's axis; at a limit, as near to that as possible."""
         skeleton, joint = self.posed.skeleton, self.joint
         axis = self.posed.parent_axis(self.ring.axis)
         now = joint_rotations(skeleton, self.start)[joint]
@@ -290,7 +290,7 @@ class TurnHandle:
 
 
 def limit_text(skeleton: Skeleton, limited: tuple[int, ...]) -> str:
-    """Return a line on the DOFs that stand at their limits; empty if there is none."""
+    """Return a line about the DOFs at their limits; empty if there is none."""
     if not limited:
         return ""
     names = ", ".join(dof_label(skeleton, dof) for dof in limited[:4])

@@ -1,4 +1,4 @@
-"""Shape: a slider per coefficient of shape, expression or morph, and what the body measures."""
+"""Shape panel: a slider per coefficient of shape, expression or morph, and body measures."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from viewer.rig.shape import shaped
 
 __all__ = ["draw"]
 
-_REACH = 5.0  # standard deviations that a slider covers; more can be typed
-_WIDEST = 20.0  # a slider, in heights of the letters
+_REACH = 5.0  # range of a slider in standard deviations; more can be typed
+_WIDEST = 20.0  # width of a slider, in font sizes
 _HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
@@ -64,14 +64,14 @@ def _draw_seed(state: AppState) -> None:
 
 
 def _width_beside(label: str, most: float) -> float:
-    """Return the width of a widget whose label fits beside it, if there is room for both."""
+    """Return a widget's width that leaves room for its label, if there is room for both."""
     room = imgui.get_content_region_avail().x
     taken = imgui.calc_text_size(label).x + imgui.get_style().item_inner_spacing.x
     return min(max(room - taken, 0.35 * room), most * imgui.get_font_size())
 
 
 def _draw_measures(figure: Figure, pose: Pose) -> None:
-    """Draw height, volume and weight of the shaped rest body."""
+    """Draw height, volume and mass of the shaped rest body."""
     rest = shaped(figure, pose.shape_weights)
     for name, value in _measured.get(rest, None, lambda: _measures(rest)):
         imgui.text_disabled(name)
@@ -92,7 +92,7 @@ def _measures(rest: Figure) -> tuple[tuple[str, str], ...]:
 
 def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     shapes = figure.blend_shapes
-    assert shapes is not None  # the caller looked
+    assert shapes is not None  # checked by the caller
     if len(pose.shape_weights) < shapes.n_shapes:
         padding = np.zeros(shapes.n_shapes - len(pose.shape_weights))
         pose.shape_weights = np.concatenate([pose.shape_weights, padding])

@@ -1,4 +1,4 @@
-"""State of the tools that pose by hand, handles, and the outcome of dragging one."""
+"""State of the posing tools, the interface of handles, and the result of a drag."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from viewer.rig.scene import Actor
 __all__ = ["ORIENTATIONS", "TOOLS", "Drag", "Handle", "HeldVector", "Outcome", "Posing"]
 
 TOOLS = {
-    "select": ("Select", "Q", "click chooses, drag orbits"),
-    "rotate": ("Rotate", "E", "turn the selected joint by its rings"),
+    "select": ("Select", "Q", "click selects, drag orbits"),
+    "rotate": ("Rotate", "E", "rotate the selected joint with its rings"),
     "move": (
         "Move",
         "D",
         "drag a joint: the joints above it follow (IK); the root moves the figure",
     ),
 }
-"""The tools: what their button says, their key, what they do."""
+"""Tools: label of the button, key, tooltip."""
 
 ORIENTATIONS = {
     "local": "Local axes",
     "parent": "Parent axes",
     "world": "World axes",
 }
-"""Whose axes rings and arrows follow, where the joint is free to turn or move about all three."""
+"""Orientations of rings and arrows, for joints free to rotate or move along all three axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,13 +40,13 @@ class Outcome:
     pose : Pose
         Within the limits.
     text : str
-        What was done, to be shown beside the handle.
+        Text about the change, shown beside the handle.
     limited : tuple of int
-        DOFs that stand at a limit and hold the drag back.
+        DOFs at a limit that restrict the drag.
     target : (3,) or None
-        Where the pointer is, scene space, if the joint could not come there.
+        Pointer in scene space, if the joint could not reach it.
     angle : float or None
-        By how much a ring was turned, radians.
+        Rotation by a ring, radians.
     """
 
     pose: Pose
@@ -73,29 +73,29 @@ class Handle(Protocol):
         place : (float, float)
             The pointer, window coordinates.
         snaps : bool
-            Whether angles go by whole steps.
+            Whether angles snap to whole steps.
         """
         ...
 
 
 @dataclass(slots=True, eq=False)
 class Drag:
-    """A handle that is held.
+    """A drag in progress.
 
     Attributes
     ----------
     actor : Actor
         Whose pose changes.
     handle : Handle
-        What is dragged.
+        The handle that is held.
     outcome : Outcome
-        What it came to last.
+        The last result.
     asked : tuple
-        The pointer and the keys it was found for: nothing is solved twice.
+        Pointer and keys of the last result, so that nothing is solved twice.
     has_moved : bool
-        Whether the pointer went anywhere: a click on a handle changes nothing.
+        Whether the pointer has moved: a click on a handle changes nothing.
     is_over : bool
-        Whether it was cancelled and only waits for the button to come up.
+        Whether it was cancelled and only awaits the release of the button.
     """
 
     actor: Actor
@@ -108,18 +108,18 @@ class Drag:
 
 @dataclass(slots=True)
 class HeldVector:
-    """A joint's rotation vector as it was typed: beyond half a turn its rotation has another.
+    """A joint's rotation vector as edited: beyond pi its rotation has a shorter one.
 
     Attributes
     ----------
     joint : int
-        Of the actor that was chosen then.
+        Joint of the actor that was chosen then.
     vector : (3,)
-        As it was typed.
+        The vector as edited.
     rotation : (3, 3)
-        That of the joint.
+        Rotation of the joint.
     n_choices : int
-        That of the state: of another actor the joint means nothing.
+        The state's ``n_choices``: for another actor the joint is invalid.
     """
 
     joint: int
@@ -130,7 +130,7 @@ class HeldVector:
 
 @dataclass(slots=True)
 class Posing:
-    """The state of tools and panels that pose.
+    """State of the tools and panels for posing.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Posing:
     orientation : str
         A key of ``ORIENTATIONS``.
     chain_length : int
-        How many joints above a dragged one may turn; 0 until it is chosen: two, without the root.
+        How many joints above a dragged one may rotate; 0 until chosen: two, without the root.
     drag : Drag or None
         The handle that is held.
     as_vectors : bool
@@ -147,7 +147,7 @@ class Posing:
     held_vector : HeldVector or None
         The rotation vector being edited.
     shape_seed : int
-        Of the random shape drawn last.
+        Seed of the last random shape.
     n_hand_components : int
         How many principal components of the hands have sliders.
     """
@@ -163,5 +163,5 @@ class Posing:
 
     @property
     def is_on(self) -> bool:
-        """Whether a tool other than the one that only selects is chosen."""
+        """Whether a tool other than Select is chosen."""
         return self.tool != "select"

@@ -1,4 +1,4 @@
-"""Actions of the posing tools' buttons and keys, and the reasons why they cannot act."""
+"""Actions of the posing tools' buttons and keys, and reasons why they are disabled."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 
 def choose_tool(state: AppState, tool: str) -> None:
-    """Take a tool in hand, a key of ``TOOLS``, and say what it needs."""
+    """Choose a tool, a key of ``TOOLS``, and show what it needs."""
     why = no_tool(state)
     if tool != "select" and why:
         state.say_status(f"{TOOLS[tool][0]}: {why}")
@@ -41,7 +41,7 @@ def choose_tool(state: AppState, tool: str) -> None:
 
 
 def next_orientation(state: AppState) -> None:
-    """Go on to the next of local, parent and world axes."""
+    """Switch to the next of local, parent and world axes."""
     posing = state.of(Posing)
     names = list(ORIENTATIONS)
     following = names[(names.index(posing.orientation) + 1) % len(names)]
@@ -50,7 +50,7 @@ def next_orientation(state: AppState) -> None:
 
 
 def cancel_drag(state: AppState) -> bool:
-    """Let go of a handle and restore the pose of before; return whether one was held."""
+    """Cancel a drag and restore the pose before it; return whether there was one."""
     drag = state.of(Posing).drag
     if drag is None or drag.is_over:
         return False
@@ -62,13 +62,13 @@ def cancel_drag(state: AppState) -> bool:
 
 
 def key_pose_now(state: AppState) -> None:
-    """Make the pose keys of its clip at the time that is shown."""
+    """Key the pose in its clip at the current time."""
     if not no_keys(state):
         key_present_pose(state)
 
 
 def selected(state: AppState) -> PosedJoint | None:
-    """Return the selected joint in the scene, None if there is none to be posed."""
+    """Return the selected joint in the scene, None if there is none to pose."""
     actor = state.actor
     if not actor.is_drawn or state.options.show == "binding":
         return None
@@ -76,7 +76,7 @@ def selected(state: AppState) -> PosedJoint | None:
 
 
 def no_tool(state: AppState) -> str:
-    """Say why nothing can be posed in the view."""
+    """Return why nothing can be posed in the view."""
     if state.options.show == "binding" and state.actor.figure.is_attached:
         return "the skin is shown in its binding space: K shows the pose"
     if not state.actor.is_drawn:
@@ -85,27 +85,27 @@ def no_tool(state: AppState) -> str:
 
 
 def no_orientation(state: AppState) -> str:
-    """Say why the choice of axes does nothing for the selected joint."""
+    """Return why the choice of axes has no effect on the selected joint."""
     skeleton, joint = state.actor.figure.skeleton, state.selected_joint
     if skeleton is None or joint < 0:
         return ""
     if state.of(Posing).tool != "rotate":
-        return "" if shifts(skeleton, joint) else "it is dragged in the plane of the picture"
+        return "" if shifts(skeleton, joint) else "it is dragged in the image plane"
     if rotates_freely(skeleton, joint):
         return ""
     if not len(rotation_dofs(skeleton, joint, free=True)):
-        return f"{joint_label(skeleton, joint)} cannot turn"
-    return "this joint turns about the axes of its DOFs alone"
+        return f"{joint_label(skeleton, joint)} cannot rotate"
+    return "this joint turns about the axes of its DOFs only"
 
 
 def chain_limit(state: AppState) -> int:
-    """Return how long the chain above the selected joint can be; 0 if nothing above it turns."""
+    """Return the longest chain above the selected joint; 0 if nothing above it rotates."""
     skeleton = state.actor.figure.skeleton
     return 0 if skeleton is None else longest_chain(skeleton, state.selected_joint)
 
 
 def chain_length(state: AppState) -> int:
-    """Return how many joints would follow the selected one if it was dragged; at least 1."""
+    """Return how many joints would follow a drag of the selected one; at least 1."""
     posing = state.of(Posing)
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:
@@ -114,22 +114,22 @@ def chain_length(state: AppState) -> int:
 
 
 def no_chain(state: AppState) -> str:
-    """Say why there is no chain to choose the length of."""
+    """Return why the length of the chain cannot be chosen."""
     if state.of(Posing).tool != "move":
-        return "the tool Move (D) has chains"
+        return "only the Move tool (D) has chains"
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:
         return "select a joint"
     if not chain_limit(state):
-        return f"no joint above {joint_label(skeleton, state.selected_joint)} can turn"
+        return f"no joint above {joint_label(skeleton, state.selected_joint)} can rotate"
     return ""
 
 
 def no_keys(state: AppState) -> str:
-    """Say why the pose cannot become keys."""
+    """Return why the pose cannot be keyed."""
     clip = state.actor.clip
     if clip is None:
-        return no_pose(state) or "there is no clip: New clip (menu Edit) makes one"
+        return no_pose(state) or "there is no clip: create one with Edit > New clip"
     if not isinstance(clip, Clip):
-        return "this motion consists of frames, not of keys"
+        return "this motion has sampled frames, no keys"
     return ""

@@ -1,4 +1,4 @@
-"""The tools in the upper right corner of the view, with their settings and what poses need."""
+"""Toolbar in the upper right corner of the view: tools, their settings, and pose actions."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ __all__ = ["draw_toolbar"]
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
-_WIDTH = 14.5  # of the rows, in heights of letters: buttons stay in place as rows come and go
+_WIDTH = 14.5  # of the rows, in font sizes: buttons stay in place as rows come and go
 _ACCENT = (0.62, 0.36, 0.12, 1.0)
 
 
 def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
-    """Draw the tools; return where they are.
+    """Draw the tools; return their rectangle.
 
     Parameters
     ----------
     state : AppState
         What they act on.
     legend : Rect or None
-        Where the legend is: the tools go beneath it if there is no room beside it.
+        Rectangle of the legend: the tools go below it if there is no room beside it.
     """
     x, y, width, height = state.view_rect
     if not state.panels_visible or width < _NARROWEST or height < _LOWEST:
@@ -63,7 +63,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
 
 
 def _draw_tools(state: AppState) -> None:
-    """Draw a button per tool; the one in hand is lit."""
+    """Draw a button per tool; the chosen one is highlighted."""
     width = _share(len(TOOLS))
     for number, (tool, (name, key, text)) in enumerate(TOOLS.items()):
         why = no_tool(state) if tool != "select" else ""
@@ -100,7 +100,7 @@ def _draw_settings(state: AppState) -> None:
     with disabled(why):
         imgui.set_next_item_width(_share(2 if has_chain else 1))
         posing.orientation = choice(state, "##axes", posing.orientation, ORIENTATIONS)
-        explain("whose axes rings and arrows follow (X)", why)
+        explain("axes that the rings and arrows follow (X)", why)
     if has_chain:
         imgui.same_line()
         _draw_chain(state)
@@ -115,19 +115,19 @@ def _draw_chain(state: AppState) -> None:
             "##chain", chain_length(state), 1, longest, "chain %d", imgui.SliderFlags_.always_clamp
         )
         note_item(state, "Chain")
-        explain("how many joints above the dragged one may turn", why)
+        explain("how many joints above the dragged one may rotate", why)
     if changed:
         state.of(Posing).chain_length = min(max(length, 1), longest)
 
 
 def _draw_actions(state: AppState) -> None:
-    """Draw what can be done to the pose as a whole."""
+    """Draw the buttons of actions on the whole pose."""
     why = no_pose(state)
     rows = (
-        ("Mirror", mirror, "exchange left and right of the pose (M)", why),
+        ("Mirror", mirror, "mirror the pose left to right (M)", why),
         ("Copy", copy_pose, "copy the pose (Ctrl+C)", why),
-        ("Paste", paste_pose, "paste a pose, also of another figure (Ctrl+V)", why),
-        ("Key", key_pose_now, "make the pose keys at the time shown", no_keys(state)),
+        ("Paste", paste_pose, "paste a pose, also from another figure (Ctrl+V)", why),
+        ("Key", key_pose_now, "key the pose at the current time", no_keys(state)),
     )
     for number, (name, action, text, reason) in enumerate(rows):
         if number:

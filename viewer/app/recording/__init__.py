@@ -1,1 +1,1 @@
-"""Recording: pictures and videos of what is shown."""
+"""Recording: pictures and videos of the view."""

@@ -1,4 +1,4 @@
-"""The window "Record": pictures, a contact sheet or a video of what is shown."""
+"""The window "Record": pictures, a contact sheet or a video of the view."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from viewer.rig.number_text import number_text
 __all__ = ["draw_record_dialog"]
 
 _SIZES = {
-    "view": "as the view",
+    "view": "view size",
     "1280x720": "1280 x 720",
     "1920x1080": "1920 x 1080",
     "1080x1080": "1080 x 1080",
     "3840x2160": "3840 x 2160",
-    "own": "own size",
+    "own": "custom size",
 }
 _TITLE = "Record"
 _MOST_PIXELS = 16384
@@ -68,8 +68,8 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
         settings.n_cells = min(max(count, 1), 400) if changed else settings.n_cells
     else:
         shown = settings.rate or state.clock.frame_rate
-        changed, rate = imgui.input_float("Frames a second", shown, 0.0, 0.0, "%.3f")
-        note_item(state, "Frames a second")
+        changed, rate = imgui.input_float("Frames per second", shown, 0.0, 0.0, "%.3f")
+        note_item(state, "Frames per second")
         if changed and 0.01 <= rate <= 1000.0:
             settings.rate = rate
     if settings.kind in (".mp4", ".webm"):
@@ -92,9 +92,9 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
 def _span_text(state: AppState, settings: RecordSettings) -> str:
     clock = state.clock
     if not clock.has_motion:
-        return "one turn" if settings.turntable else "nothing moves: one frame"
+        return "one revolution" if settings.turntable else "no motion: one frame"
     low, high = clock.start, clock.end
-    return f"the range that is played: {number_text(low, '.3f')} to {number_text(high, '.3f')} s"
+    return f"the playback range: {number_text(low, '.3f')} to {number_text(high, '.3f')} s"
 
 
 def _ask_where(state: AppState, settings: RecordSettings) -> None:

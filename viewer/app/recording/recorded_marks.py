@@ -1,4 +1,4 @@
-"""Marks and explanations of the view, made for each frame of a recording."""
+"""Marks and explanations of the view for each frame of a recording."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["RecordedMarks"]
 
 
 class RecordedMarks:
-    """Annotations of a scene that moves: the pinned vertex and the chosen finding of this moment.
+    """Annotations of a moving scene: the pinned vertex and the chosen finding at creation.
 
     Parameters
     ----------
     state : AppState
-        What is pinned or chosen in it later changes nothing.
+        Later changes of the pinned vertex or finding have no effect.
     """
 
     def __init__(self, state: AppState) -> None:
@@ -37,7 +37,7 @@ class RecordedMarks:
         self._binding = state.options.show == "binding"
 
     def at(self, scene: Scene, size: tuple[int, int]) -> Sequence[Annotation]:
-        """Return what is drawn over one frame.
+        """Return the annotations of one frame.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Record what the window shows: a step a frame, so that it answers and can be cancelled."""
+"""Recording of the view, one step per frame, so that the window responds and can cancel it."""
 
 from __future__ import annotations
 
@@ -36,43 +36,43 @@ def recording_steps(
     path: Path,
     ghost: Ghost | None = None,
 ) -> Generator[tuple[int, int], None, list[str]]:
-    """Record the range that is played, from the view as it is now.
+    """Record the playback range from the current view.
 
     Parameters
     ----------
     state : AppState
-        Its scene is copied; going on with it changes nothing of the recording but clips that
+        Its scene is copied; later edits do not affect the recording, except for clips that
         are being edited.
     context : moderngl.Context
         Current in every step.
     settings : RecordSettings
-        What is asked for.
+        Settings of the recording.
     path : Path
-        Where the result goes; ``{frame}`` in the name of numbered pictures is their number.
+        Target file; ``{frame}`` in the name of numbered pictures stands for their number.
     ghost : Ghost, optional
-        A surface that is shown over the scene.
+        A surface drawn over the scene.
 
     Yields
     ------
     (int, int)
-        Frames done, and all frames.
+        Frames done, and number of frames.
 
     Returns
     -------
     list of str
-        What was written.
+        Messages about the written files.
 
     Raises
     ------
     ViewerError
-        If it cannot be drawn or written.
+        If a frame cannot be drawn or written.
     """
     times, numbers, rate = _times(state, settings)
     size = settings.pixels((state.view_rect[2], state.view_rect[3]))
     files = [path]
     if settings.kind == "pictures":
         files = _numbered(path, numbers)
-    # The dialog asks only about a file that it can see.
+    # The dialog asks only about the file whose name it knows.
     is_asked = settings.kind != "pictures"
     check_targets(files, state.inputs, is_asked, hint="choose another name")
     sink, size = _sink(settings, files, size, rate, numbers)
@@ -80,7 +80,7 @@ def recording_steps(
     renderer = Renderer(context)
     renderer.ghost = ghost
     try:
-        # Closed before its renderer goes, also if this generator is.
+        # Closed before its renderer is released, also if this generator is closed.
         with contextlib.closing(record(recording, renderer, sink)) as steps:
             for progress in steps:
                 yield progress.done, progress.total
@@ -94,7 +94,7 @@ def recording_steps(
 def _recording(
     state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
 ) -> Recording:
-    """Return what is recorded: all that the view shows, but tools and panels."""
+    """Return the recorder of everything that the view shows, without tools and panels."""
     following = state.of(Following)
     options = copy.deepcopy(state.options)
     if settings.transparent and settings.kind != ".mp4":
@@ -119,7 +119,7 @@ def _recording(
 
 
 def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int], float]:
-    """Return the seconds of every frame, what they are called, and frames a second."""
+    """Return the times of all frames in seconds, their numbers, and the frame rate."""
     clock = state.clock
     rate = settings.rate or clock.frame_rate
     if settings.kind == ".gif":
@@ -159,7 +159,7 @@ def _sink(
     rate: float,
     numbers: list[int],
 ) -> tuple[Sink, tuple[int, int]]:
-    """Return where frames go, and their size."""
+    """Return the sink of the frames, and their size."""
     if settings.kind == "pictures":
         from viewer.media.picture_sinks import PictureSink
 

@@ -1,4 +1,4 @@
-"""State of recording: the settings of the window "Record", and what was asked for there."""
+"""State of recording: the settings of the window "Record", and its request."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KINDS = {
     "pictures": "Numbered pictures (PNG)",
     "sheet": "Contact sheet (PNG)",
 }
-"""What can be recorded, with the name that the dialog shows."""
+"""Kinds of recordings, with their labels."""
 
 LEAST_PIXELS = 16
 """Smallest width and height of a recording."""
@@ -22,7 +22,7 @@ LEAST_PIXELS = 16
 
 @dataclass(slots=True)
 class RecordSettings:
-    """What is recorded, and how.
+    """Settings of a recording.
 
     Attributes
     ----------
@@ -33,17 +33,17 @@ class RecordSettings:
     own_size : (int, int)
         For ``"own"``.
     rate : float
-        Frames a second; 0 for the scene's own.
+        Frames per second; 0 for the scene's own rate.
     turntable : bool
-        Whether the camera turns once around.
+        Whether the camera orbits once around the scene.
     seconds : float
-        How long a turn takes if nothing moves.
+        Duration of the orbit if there is no motion.
     transparent : bool
         Whether the background is left out.
     n_cells : int
         Frames of a contact sheet.
     quality : int
-        Of videos, 0 to 100.
+        Quality of videos, 0 to 100.
     """
 
     kind: str = ".mp4"
@@ -57,10 +57,10 @@ class RecordSettings:
     quality: int = 75
 
     def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
-        """Return width and height, of a view of that size."""
+        """Return width and height for a view of a size."""
         if self.size == "view":
             wide, high = (max(round(side), LEAST_PIXELS) for side in view)
-            # Videos want even sizes; nobody misses a row of the view.
+            # Videos need even sizes; a lost row of the view does not matter.
             return wide - wide % 2, high - high % 2
         if self.size == "own":
             return self.own_size
@@ -70,12 +70,12 @@ class RecordSettings:
 
 @dataclass(slots=True)
 class Recording:
-    """What is asked for.
+    """State of the window "Record" and its request.
 
     Attributes
     ----------
     settings : RecordSettings or None
-        What the window "Record" asks for, while it is open.
+        Settings in the window "Record" while it is open.
     wanted : Path or None
         Where to record to, after the frame.
     """

@@ -54,9 +54,11 @@ _HOW = {
     "given": "by hand",
 }
 """How a template came to where it lies, as ``Alignment.how`` says it."""
-_POSES = "; joints are turned and limbs resized where that fits much better"
-_FITS = "; joints are turned and limbs resized, or all of it stretched, where that fits much better"
-_SCALE_TEXTS = {"uniform": "one scale", "axes": "one along each axis", "none": "as it is"}
+_POSES = "; joints are rotated and limbs resized where that fits much better"
+_FITS = (
+    "; joints are rotated and limbs resized, or all of it stretched, where that fits much better"
+)
+_SCALE_TEXTS = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 
 
 def draw_alignment(state: AppState) -> None:
@@ -67,20 +69,20 @@ def draw_alignment(state: AppState) -> None:
     choices.up = choice(state, "Up", choices.up, axes)
     explain("the target's axis that points up")
     choices.facing = choice(state, "Facing", choices.facing, axes)
-    explain("the target's axis that it looks along")
+    explain("the target's axis that points forward")
     choices.scale = choice(state, "Scale", choices.scale, {s: _SCALE_TEXTS[s] for s in SCALES})
     choices.fits = checkbox(state, "Fit pose and proportions", choices.fits)
-    explain("turn the template's joints and resize its limbs where the target is otherwise")
+    explain("rotate the template's joints and resize its limbs where the target differs")
     if button(state, "Align", why):
         start_align(state)
     if not why:
-        explain(f"found by closest points{_FITS if choices.fits else ''}")
+        explain(f"searched for by closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):
         _refine(state)
     if not refuses:
-        explain(f"from where it lies, by closest points{_POSES if choices.fits else ''}")
+        explain(f"from its current placement, by closest points{_POSES if choices.fits else ''}")
     _draw_placing(placing_now(state))
     rigging.ghost = choice(state, "Template shown", rigging.ghost, GHOSTS)
     _draw_tools(state)
@@ -94,7 +96,7 @@ def draw_alignment(state: AppState) -> None:
     for line in placing.lines if placing is not None else ():
         imgui.text_wrapped(line.labelled)
     if is_posed_since(state):
-        imgui.text_wrapped("the template was posed otherwise since: align again")
+        imgui.text_wrapped("the template has been posed since: align again")
 
 
 def _draw_placing(placing: Placing | None) -> None:
@@ -108,7 +110,7 @@ def _draw_placing(placing: Placing | None) -> None:
 def _draw_error(found: Alignment | None) -> None:
     """Draw the error: trimmed RMS, as in the report."""
     if found is None:
-        imgui.text_disabled("error: not measured here")
+        imgui.text_disabled("error: not measured at this placement")
         return
     text = f"error {100.0 * found.error:.2f} % ({_how(found)})"
     if found.error > _DOUBTFUL:
@@ -118,8 +120,8 @@ def _draw_error(found: Alignment | None) -> None:
     else:
         imgui.text_wrapped(text)
     explain(
-        "of the target's size: RMS distance of its best 90 % from the template; of the template "
-        f"from the target: {100.0 * found.away:.2f} %"
+        "RMS distance of the best 90 % of the target from the template, relative to the target's "
+        f"size; of the template from the target: {100.0 * found.away:.2f} %"
     )
 
 
@@ -161,7 +163,7 @@ def _draw_numbers(state: AppState, template: Template) -> None:
     angles = np.degrees(matrix_to_euler(now.rotation[None])[0])
     shift, angle, scale = _inputs(state, now.shift, angles, now.scale)
     if shift is None and angle is None and scale is None:
-        if button(state, "Lay box on box"):
+        if button(state, "Align boxes"):
             fit = box_fit(posed_template(state.of(Rigging), template), target_mesh(state))
             _move(state, template, fit)
         return
@@ -184,15 +186,18 @@ def _inputs(
     """Draw the fields; return what was typed, None for each that was not."""
     flags = imgui.InputTextFlags_.enter_returns_true
     typed: list[Floats | None] = []
-    for label, values, digits in (("Shift", shift, "%.4g"), ("Turn (degrees)", angles, "%.2f")):
+    for label, values, digits in (
+        ("Translation", shift, "%.4g"),
+        ("Rotation (degrees)", angles, "%.2f"),
+    ):
         changed, new = imgui.input_float3(
             label, [plain_zero(value, digits) for value in values.tolist()], digits, flags
         )
         note_item(state, label)
         fits = changed and bool(np.isfinite(new).all())
         typed.append(np.array(new, dtype=np.float64) if fits else None)
-    changed, size = imgui.input_float("Scale by", scale, 0.0, 0.0, "%.6g", flags)
-    note_item(state, "Scale by")
+    changed, size = imgui.input_float("Scale factor", scale, 0.0, 0.0, "%.6g", flags)
+    note_item(state, "Scale factor")
     fits = changed and math.isfinite(size) and size > 0.0
     return typed[0], typed[1], size if fits else None
 
@@ -220,7 +225,7 @@ def _draw_landmarks(state: AppState, template: Template) -> None:
             imgui.same_line()
     if removed >= 0:
         del view.landmarks[removed]
-    view.choices.refines = checkbox(state, "Closest points refine it", view.choices.refines)
+    view.choices.refines = checkbox(state, "Refine by closest points", view.choices.refines)
     missing = _FEWEST - len(view.landmarks)
     why = f"{missing} more pair{'s' * (missing != 1)} needed" if missing > 0 else ""
     if button(state, "Align by landmarks", why or no_job_room(state)):
@@ -229,7 +234,7 @@ def _draw_landmarks(state: AppState, template: Template) -> None:
             start_align(state, landmark_settings(state, mesh, view.choices.refines))
         except ViewerError as problem:
             state.error = str(problem)
-    with disabled("" if view.landmarks else "there is none"):
+    with disabled("" if view.landmarks else "there are no landmarks"):
         same_line_if_room("Delete all")
         if button(state, "Delete all"):
             view.landmarks, view.pending = [], None

@@ -87,7 +87,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
     view, actors = state.of(Rigging), state.scene.actors
     target = results[0].target
     if not any(actor is target for actor in actors):
-        state.say("The mesh that was rigged is there no more")
+        state.say("The mesh that was rigged no longer exists")
         return
     if view.target is not target:
         view.results = {}
@@ -113,7 +113,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
         state.choose_actor(_row(actors, results[0].actor))
     if state.options.scalar in MATCH_COLORS:
         show_colors(state, "")  # those numbers were the target's
-    state.say_status(f"Rigged: {printable(target.name, 60)}; A shows the mesh as it was")
+    state.say_status(f"Rigged: {printable(target.name, 60)}; A shows the original mesh")
 
 
 def _row(actors: list[Actor], actor: Actor) -> int:
@@ -145,14 +145,14 @@ def shown_result(state: AppState) -> Result | None:
 
 def no_other_version(state: AppState) -> str:
     """Say why A/B has nothing to switch to."""
-    return "" if len(versions(state)) > 1 else "nothing was rigged yet: Run"
+    return "" if len(versions(state)) > 1 else "nothing is rigged yet: press Run"
 
 
 def switch_version(state: AppState) -> None:
     """Show the next of the target and its results, in the same place."""
     known = list(versions(state))
     if len(known) < 2:
-        state.say_status("A/B: nothing was rigged yet, see Window > Rig")
+        state.say_status("A/B: nothing is rigged yet, see Window > Rig")
         return
     shown = shown_version(state)
     following = known[(known.index(shown) + 1) % len(known)] if shown else known[0]
@@ -165,7 +165,7 @@ def show_version(state: AppState, name: str) -> None:
     state.history.observe(state.scene, state.options, busy=False)
     _look(state, name)
     state.history.accept(state.scene, state.options)
-    text = "The mesh as it was" if name == TARGET else f"Rigged, method {name}"
+    text = "Original mesh" if name == TARGET else f"Rigged, method {name}"
     state.say_status(text)
 
 
@@ -209,7 +209,7 @@ def plays_motion(result: Result) -> bool:
 def no_motion_of(result: Result | None) -> str:
     """Say why a result cannot move as its template does."""
     if result is None:
-        return "nothing was rigged yet: Run"
+        return "nothing is rigged yet: press Run"
     if isinstance(result.template.clip, Clip | SampledClip):
         return ""
     return "the template has no motion: give it one before running"

@@ -40,15 +40,15 @@ def draw_results(state: AppState) -> None:
     """Draw what is seen, how sure it is, the numbers of both methods, and the report."""
     why, result = no_results(state), shown_result(state)
     if why or result is None:
-        imgui.text_wrapped("What was rigged was undone; Ctrl+Shift+Z brings it back.")
+        imgui.text_wrapped("The rig was undone; Ctrl+Shift+Z restores it.")
         return
     _draw_versions(state)
     _draw_colors(state)
     moves = plays_motion(result)
     still = no_motion_of(result)
-    plays = checkbox(state, "Move as the template", moves, still)
+    plays = checkbox(state, "Move like the template", moves, still)
     if not still:
-        explain("its motion, standing where the target stands")
+        explain("its motion, at the target's place")
     if plays != moves:
         set_motion(state, result, plays)
     _draw_table(state)
@@ -62,16 +62,16 @@ def draw_results(state: AppState) -> None:
 
 
 def _draw_versions(state: AppState) -> None:
-    """Draw the target and its results as radio buttons; the key A goes through them."""
+    """Draw the target and its results as radio buttons; the key A cycles through them."""
     shown = shown_version(state)
     for number, name in enumerate(versions(state)):
-        text = "as it was" if name == TARGET else name
+        text = "original" if name == TARGET else name
         if number:
             same_line_if_room(text)
         if imgui.radio_button(f"{text}###version {name}", name == shown) and name != shown:
             show_version(state, name)
         note_item(state, f"version {name}")
-        explain("A goes through them")
+        explain("A cycles through them")
 
 
 def _draw_colors(state: AppState) -> None:
@@ -96,22 +96,22 @@ def _draw_table(state: AppState) -> None:
     _row("", "", [one.method for one in found])
     _row(
         "matched",
-        "vertices whose weights are those of the template's surface under them",
+        "vertices with the weights of the template's surface under them",
         [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
     )
     _row(
         "residual",
-        "how far the mesh is from the target when it is posed again, at most, of its size",
+        "largest distance of the posed result from the target, relative to its size",
         [f"{one.residual:.1e}" for one in rigged],
     )
     _row(
         "guarded",
-        "vertices bent too far to be undone exactly: their rest position is a guess",
+        "vertices bent too far for exact inverse skinning: their rest position is an estimate",
         [f"{int(one.guarded.sum()):,}" for one in rigged],
     )
     _row(
         "joints outside",
-        "joints that lie outside the mesh, and inside the template",
+        "joints outside the mesh that are inside the template",
         [f"{len(one.outside):,}" for one in rigged],
     )
     imgui.end_table()

@@ -46,7 +46,7 @@ from viewer.rig.scene import Actor, actor_points, free_title
 __all__ = ["draw"]
 
 _MOST_ROUNDS, _MOST_INFLUENCES = 50, 16
-_NEAREST_WHY = "the method nearest has no such choice"
+_NEAREST_WHY = "the method nearest has no such option"
 _ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
 _GAP = 1.2  # of the template's width, between it and the target
 
@@ -60,9 +60,9 @@ def draw(state: AppState) -> None:
     if why:
         imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
     with disabled(why):
-        if _section("Align", "the template is laid onto the target"):
+        if _section("Align", "align the template with the target"):
             draw_alignment(state)
-        if _section("Match", "which vertices take the template's weights as they are"):
+        if _section("Match", "which vertices take the template's weights unchanged"):
             _draw_match(state)
         if _section("Rig", "weights, joints and the rest pose"):
             _draw_run(state)
@@ -72,7 +72,7 @@ def draw(state: AppState) -> None:
         # Its height counts from the second frame on.
         rigging.scrolls -= 1
         imgui.set_scroll_here_y(0.0)
-    if _section("Result", "the rigged mesh in place of the target"):
+    if _section("Result", "the rigged mesh, in place of the target"):
         draw_results(state)
 
 
@@ -96,7 +96,7 @@ def _draw_sources(state: AppState) -> None:
     if button(state, "Add mesh…", why):
         _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES)
     if not why:
-        explain("a mesh without a rig, put into this scene")
+        explain("add a mesh without a rig to this scene")
     with disabled(why):
         key = choice(state, "Template", view.template_key, template_texts(state))
     if key != view.template_key:
@@ -116,7 +116,7 @@ def _draw_sources(state: AppState) -> None:
             else:
                 _add_template(state)
         if not refuses:
-            explain("puts the template beside the target, to be posed like it")
+            explain("adds the template beside the target, to pose it like the target")
     imgui.push_text_wrap_pos(0.0)
     imgui.text_disabled(_template_text(template))
     imgui.pop_text_wrap_pos()
@@ -128,7 +128,7 @@ def _template_text(template: Template | None) -> str:
         return "read when it is needed"
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
     assert skeleton is not None and mesh is not None  # it is attached
-    pose = "in its present pose" if template.actor is not None else "in its file's pose"
+    pose = "in its current pose" if template.actor is not None else "in its file's pose"
     return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
 
 
@@ -204,12 +204,12 @@ def _draw_run(state: AppState) -> None:
     if button(state, "Run", why):
         start_run(state, (choices.method,))
     if not why:
-        explain("what is not aligned yet is aligned first")
+        explain("the template is aligned first if it is not aligned yet")
     same_line_if_room("Compare methods")
     if button(state, "Compare methods", why):
         start_run(state, tuple(METHODS))
     if not why:
-        explain("runs both; A goes through the mesh as it was and both results")
+        explain("runs both; A cycles through the original mesh and both results")
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
@@ -229,19 +229,19 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
     why = _NEAREST_WHY if choices.method == "nearest" else ""
     with disabled(why):
         choices.refines = checkbox(state, "Refine alignment", choices.refines)
-        explain("closest points improve on what the search or the landmarks found", why)
+        explain("refine the result of the search or the landmarks by closest points", why)
         choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
-        explain("carried: moved as the surface around them; copied: with the alignment alone", why)
+        explain("carried: move with the surface around them; copied: with the alignment only", why)
         changed, rounds = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ROUNDS)
         note_item(state, "Smoothing")
-        explain("rounds of evening out weights that were filled in", why)
+        explain("smoothing iterations for inpainted weights", why)
         choices.smoothing = min(max(rounds, 0), 1000) if changed else choices.smoothing
         text = "%d" if choices.max_influences else "all"
         changed, most = imgui.slider_int(
             "Max. influences", choices.max_influences, 0, _MOST_INFLUENCES, text
         )
         note_item(state, "Max. influences")
-        explain("of each vertex, the strongest; 0 keeps all", why)
+        explain("per vertex, the largest; 0 keeps all", why)
         choices.max_influences = max(most, 0) if changed else choices.max_influences
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
-        explain("carry those of the template, if it has some", why)
+        explain("transfer those of the template, if any", why)

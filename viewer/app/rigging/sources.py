@@ -137,7 +137,7 @@ def no_target(state: AppState) -> str:
     """Say why there is nothing to rig."""
     if state.of(Rigging).target is not None:
         return ""
-    return f"every mesh here has a rig: add one without, an {one_of(MESHES)}"
+    return f"every mesh in the scene has a rig: add one without, an {one_of(MESHES)}"
 
 
 def no_results(state: AppState) -> str:
@@ -145,4 +145,4 @@ def no_results(state: AppState) -> str:
     there = {id(actor) for actor in state.scene.actors}
     if any(id(result.actor) in there for result in state.of(Rigging).results.values()):
         return ""
-    return "nothing was rigged yet: Run"
+    return "nothing is rigged yet: press Run"

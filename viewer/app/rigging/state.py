@@ -35,11 +35,11 @@ __all__ = [
 ]
 
 TOOLS = {
-    "": ("None", "the mouse orbits and chooses as usual"),
-    "move": ("Move", "drag the template by arrows and squares"),
-    "rotate": ("Turn", "drag the template around by rings"),
-    "scale": ("Scale", "drag the ring out or in: the template grows as a whole"),
-    "landmarks": ("Landmarks", "click a point of the template, then the same of the target"),
+    "": ("None", "the mouse orbits and selects as usual"),
+    "move": ("Move", "drag the template by its arrows and squares"),
+    "rotate": ("Rotate", "rotate the template with its rings"),
+    "scale": ("Scale", "drag the ring out or in to scale the template uniformly"),
+    "landmarks": ("Landmarks", "click a point of the template, then the same point of the target"),
 }
 """Ways to lay the template onto the target by hand: name and what the mouse does."""
 

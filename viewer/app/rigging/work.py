@@ -59,12 +59,12 @@ __all__ = [
 
 _Finish = Callable[[AppState], None]
 _STEPS = {
-    "alignment": "laying the template onto the mesh",
+    "alignment": "aligning the template",
     "pose": "fitting pose and proportions",
     "joints": "placing the joints",
-    "rest pose": "undoing the pose",
+    "rest pose": "inverse skinning",
     "checks": "checking the result",
-    "weighing": "carrying weights over",
+    "weighing": "transferring weights",
 }
 """What the transfer calls its steps, in words for somebody who waits."""
 _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # what is added to the mesh's name
@@ -285,11 +285,11 @@ def start_match(state: AppState) -> None:
 
     def act(report: Report) -> _Finish:
         template = take(report)
-        report(0, 0, "Looking for closest points")
+        report(0, 0, "Finding closest points")
         fields, share = match_fields(template, similarity, mesh, settings)
         return lambda state: show_match(state, actor, fields, share)
 
-    _begin(state, "Looking for closest points", act)
+    _begin(state, "Finding closest points", act)
 
 
 def start_run(state: AppState, methods: tuple[str, ...]) -> None:

@@ -47,7 +47,9 @@ def look_through(state: AppState, index: int) -> None:
         setattr(state.camera, name, getattr(seen, name))
     error = distortion_error(view)
     if error >= 0.5:
-        state.say(f"The lens of {printable(view.name)} bends pictures by up to {error:.1f} pixels")
+        state.say(
+            f"The lens of {printable(view.name)} distorts pictures by up to {error:.1f} pixels"
+        )
 
 
 def toggle_projection(state: AppState) -> None:

@@ -56,7 +56,7 @@ def _draw_front(state: AppState) -> None:
     texts = {axis: axis for axis in front_axes(up)}
     now = next((axis for axis in texts if front_azimuth(axis, up) == ahead), "auto")
     chosen = choice(state, "Front axis", now, {**texts, "auto": "guess"})
-    explain("the axis that the figures face: named views go by it")
+    explain("axis that the figures face, from which named views are derived")
     if chosen != now:
         face(state, chosen)
 

@@ -46,7 +46,7 @@ def _draw_method(state: AppState, skinning: Skinning) -> None:
 def _draw_share(state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]) -> None:
     """Draw the blend factor of a method between two others; moving it selects the method."""
     shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(skinning.method, skinning.blend_factor)
-    share = slider(state, f"{METHODS[ends[1]].short} share", shown, 0.0, 1.0, flags=_CLAMP)
+    share = slider(state, f"{METHODS[ends[1]].short} fraction", shown, 0.0, 1.0, flags=_CLAMP)
     if share != shown:
         skinning.method, skinning.blend_factor = key, share
 
@@ -63,7 +63,7 @@ def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> Non
     changed, chosen = imgui.slider_int("Influences", count, 1, max(most, _ENGINE), "%d", _CLAMP)
     note_item(state, "Influences")
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        imgui.set_tooltip(f"the file lists up to {most} a vertex")
+        imgui.set_tooltip(f"the file lists up to {most} per vertex")
     if changed and skinning.max_influences:
         skinning.max_influences = chosen
     imgui.end_disabled()

@@ -24,7 +24,7 @@ def draw(state: AppState) -> None:
         ("Frame", f"{state.stats.frame_ms:.1f} ms" if state.stats.frame_ms else "not measured"),
         ("Renderer", state.stats.renderer),
         ("OpenGL", state.stats.version),
-        ("Samples", f"{state.stats.samples or 1} a pixel"),
+        ("Samples", f"{state.stats.samples or 1} per pixel"),
     ):
         imgui.text_disabled(name)
         imgui.same_line(imgui.get_font_size() * 6)
@@ -42,5 +42,5 @@ def _counts(figures: tuple[Figure, ...]) -> tuple[tuple[str, str], ...]:
         ("DOFs", f"{sum(skeleton.n_dofs for skeleton in skeletons):,}"),
         ("Vertices", f"{sum(mesh.n_vertices for mesh in meshes):,}"),
         ("Triangles", f"{sum(mesh.n_triangles for mesh in meshes):,}"),
-        ("Influences", f"{sum(len(skin.joints) for skin in skins):,}, at most {most} a vertex"),
+        ("Influences", f"{sum(len(skin.joints) for skin in skins):,}, at most {most} per vertex"),
     )

@@ -52,7 +52,7 @@ def no_view(state: AppState, key: str) -> str:
     lacks = [missing_part(key, figure) for figure in figures]
     if not all(lacks) or (SCALARS[key].takes_joint and "a selected joint" in lacks):
         return ""
-    return f"no figure here has {lacks[0]}"
+    return f"no figure in the scene has {lacks[0]}"
 
 
 def start_heat_map(state: AppState) -> None:
@@ -87,7 +87,7 @@ def _start_with_joint(state: AppState, key: str) -> None:
         return
     if joint >= 0:
         names = (printable(joint_text(figure, one), 60) for one in (joint, most))
-        state.say("{} has no influence: {} is selected, which has the most".format(*names))
+        state.say("{} has no influence: selected {}, which has the most".format(*names))
     select_joint(state, most)
 
 
@@ -137,7 +137,7 @@ def toggle_picking(state: AppState) -> None:
     """Let clicks pin vertices, or choose actors and joints again."""
     view = state.of(Weights)
     view.picks_vertices = not view.picks_vertices
-    state.say_status("Click a vertex" if view.picks_vertices else "Clicks choose again")
+    state.say_status("Click a vertex" if view.picks_vertices else "Clicks select again")
 
 
 def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
@@ -154,7 +154,9 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
     """
     figure = state.scene.actors[actor].figure
     if not figure.is_attached:
-        state.say_status("This figure has no skin that follows a skeleton: nothing moves a vertex")
+        state.say_status(
+            "This figure has no skin that follows a skeleton: no influences to explain"
+        )
         return
     state.of(Weights).pinned = Pinned(actor, figure, vertex)
     set_open(state, "vertex", True)

@@ -44,7 +44,7 @@ def draw(state: AppState) -> None:
         return
     pinned = weights.pinned
     if explanation is None or pinned is None or pinned.figure.skeleton is None:
-        imgui.text_wrapped("Alt+click a vertex: here is said why it is where it is.")
+        imgui.text_wrapped("Alt+click a vertex to explain its position here.")
         text = "Click without Alt"
         if checkbox(state, text, weights.picks_vertices) != weights.picks_vertices:
             toggle_picking(state)
@@ -108,7 +108,7 @@ def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
     """Draw what happens to the vertex, in the order in which it does."""
     _draw_rest(sheet, one)
     if one.is_free:
-        imgui.text_wrapped("No influence: the vertex stays where it was bound.")
+        imgui.text_wrapped("No influence: the vertex stays at its bind position.")
     else:
         for index in range(len(one.joints)):
             _draw_influence(sheet, one, index, colors[index])
@@ -126,14 +126,14 @@ def _draw_head(state: AppState, one: Explanation) -> None:
     imgui.text_wrapped(f"Vertex {one.vertex} of {name}: {METHODS[one.skinning.method].title}")
     if button(state, "Copy as text"):
         imgui.set_clipboard_text("\n".join(explanation_text(one, _COPIED_DIGITS)))
-        state.say_status("The explanation was copied")
+        state.say_status("Explanation copied")
     same_line_if_room("Unpin")
     if button(state, "Unpin"):
         unpin(state)
-    explain("let go of the vertex (Esc)")
+    explain("unpin the vertex (Esc)")
     same_line_if_room("Lines")
     weights.draws_lines = checkbox(state, "Lines", weights.draws_lines)
-    explain("to where each joint alone would carry the vertex; thicker for larger weights")
+    explain("to where each joint alone would move the vertex; thicker for larger weights")
 
 
 def _draw_rest(sheet: _Sheet, one: Explanation) -> None:
@@ -173,7 +173,7 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
     _draw_rows(sheet, f"terms {number}", terms)
     if button(state, f"Copy M{number}"):
         imgui.set_clipboard_text(matrix_text(one.matrices[index]))
-        state.say_status(f"M{number} was copied")
+        state.say_status(f"M{number} copied")
 
 
 def _draw_swatch(color: Floats) -> None:
@@ -209,10 +209,10 @@ def _draw_dual(sheet: _Sheet, dual: DualTerms) -> None:
     """Draw the quaternions that dual quaternion skinning adds (Kavan et al. 2008)."""
     imgui.separator_text("Dual quaternions")
     for index, values in enumerate(dual.duals):
-        flip = "" if dual.signs[index] > 0.0 else ", turned to the side of q1"
-        imgui.text_wrapped(f"q{index + 1}: share {dual.shares[index]:.{_DIGITS}f}{flip}")
+        flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
+        imgui.text_wrapped(f"q{index + 1}: weight {dual.shares[index]:.{_DIGITS}f}{flip}")
         _draw_quaternions(sheet, f"dual {index}", values)
-    imgui.text_wrapped("q = sum of share times q, so turned")
+    imgui.text_wrapped("q = sum of weight times q, negated as above")
     _draw_quaternions(sheet, "blended", dual.blended)
     _draw_rows(sheet, "length", [("length", np.array([dual.length]))])
     explain("of the real part; both parts are divided by it")

@@ -49,7 +49,7 @@ def draw(state: AppState) -> None:
     if SCALARS[key].about == "field":
         _draw_fields(state, key)
     _draw_largest(state, key)
-    with disabled("" if options.shading == "scalar" else "no numbers are shown"):
+    with disabled("" if options.shading == "scalar" else "no values are shown"):
         _draw_range(state, key)
         _draw_marks(state, key)
     imgui.separator()
@@ -116,24 +116,24 @@ def _draw_largest(state: AppState, key: str) -> None:
 def _draw_range(state: AppState, key: str) -> None:
     """Draw what the ends of the colours stand for: all that there is, or two numbers."""
     options = state.options
-    why = "it has a colour for each whole number" if SCALARS[key].kind in _WHOLE else ""
+    why = "it has one colour per integer" if SCALARS[key].kind in _WHOLE else ""
     with disabled(why):
         if imgui.radio_button("Automatic", options.scalar_range is None):
             options.scalar_range = None
         note_item(state, "Automatic")
         explain(
-            f"the colours reach over {TYPICAL:.0%} of the numbers that are not 0; larger ones look "
-            "like the ends"
+            f"the colours span {TYPICAL:.0%} of the nonzero values; larger ones take the "
+            "end colours"
             if SCALARS[key].robust
-            else "the colours reach over all numbers that there are",
+            else "the colours span all values",
             why,
         )
         same_line_if_room("Fixed")
         if imgui.radio_button("Fixed", options.scalar_range is not None):
             options.scalar_range = options.scalar_range or _present_range(state)
         note_item(state, "Fixed")
-        explain("the colours stay, whatever the pose; smaller and larger numbers look like the "
-                "ends", why)  # fmt: skip
+        explain("the colours do not change with the pose; values outside take the end "
+                "colours", why)  # fmt: skip
     if options.scalar_range is not None and not why:
         low, high = options.scalar_range
         unit = _unit(state.actor.figure, options.scalar)
@@ -170,7 +170,7 @@ def _unit(figure: Figure, name: str) -> str:
 def _draw_marks(state: AppState, key: str) -> None:
     """Draw the check boxes for isolines and the legend."""
     options, view = state.options, SCALARS[key]
-    why = "there are no numbers between two colours" if view.kind in _WHOLE else ""
+    why = "there are no values between two colours" if view.kind in _WHOLE else ""
     shown = view.isolines if options.isolines is None else options.isolines
     wanted = checkbox(state, "Isolines", shown and not why, why)
     if wanted != shown and not why:
@@ -178,17 +178,17 @@ def _draw_marks(state: AppState, key: str) -> None:
     text = "Legend in pictures"
     same_line_if_room(text)
     options.legend = checkbox(state, text, options.legend)
-    explain("screenshots and recordings show what the colours stand for")
+    explain("draw the legend into screenshots and recordings")
 
 
 def _draw_vertex_tools(state: AppState) -> None:
     """Draw what describes and explains single vertices."""
     view, why = state.of(Weights), no_mesh(state)
-    imgui.text_wrapped("Rest the mouse on a surface: its vertex is described.")
+    imgui.text_wrapped("Rest the mouse on a surface to describe its vertex.")
     text = "Also without this panel"
     view.tells_always = checkbox(state, text, view.tells_always, why)
     view.picks_vertices = checkbox(state, "Pick vertices", view.picks_vertices, why)
-    explain("a click explains why a vertex is where it is; Alt+click does so at any time")
+    explain("click to explain a vertex; Alt+click does so at any time")
     if view.pinned is not None:
         same_line_if_room(f"Unpin {view.pinned.vertex}")
         if button(state, f"Unpin {view.pinned.vertex}###unpin"):
