@@ -31,7 +31,9 @@ def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
         f"{rig[1]}:13: warning W001: weights of 1 vertex do not sum to 1: 1.25 at vertex 1, "
         "an error of 0.25"
     )
-    assert lines[at + 1] == ("    weights do not sum to 1: normalise them (--normalize shows how)")
+    assert lines[at + 1] == (
+        "    weights do not sum to 1: normalise them (--normalize shows the effect)"
+    )
     assert lines[-1].endswith("in 2 files")
 
 
@@ -156,4 +158,4 @@ def test_cures_fit_what_has_no_line(tmp_path: Path, capsys) -> None:
     run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "    file breaks its format: export it again, or open another file"
-    assert lines[3] == "    file breaks its format: mend the line, or export the file again"
+    assert lines[3] == "    file breaks its format: fix the line or export the file again"
