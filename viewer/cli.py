@@ -1,4 +1,4 @@
-"""The command line: finds the subcommand, and turns what goes wrong into one line and a code."""
+"""The command line: subcommands, error messages and exit codes."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _EPILOG = """\
 Without a command, FILES open in a window; without files, the bundled figure does.
 "viewer COMMAND --help" lists a command's options, "viewer help" the pages of the manual.
 
-exit codes: 0 done, 1 lint found or diff measured too much, 2 bad input, 4 no usable OpenGL,
-5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal that
-comes when all is written changes nothing
+exit codes: 0 success, 1 lint findings or diff above the tolerance, 2 bad input, 4 no usable OpenGL,
+5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal
+after everything is written changes nothing
 """
 
-_DOWNWARD = ("-y", "-z")  # axes that point up the other way; no option has these letters
+_DOWNWARD = ("-y", "-z")  # values of --up and --front; no option has these letters
 
 
 @standard_streams()
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
-    Signals end it as they end the program, and are the caller's own again afterwards.
+    Signals end the command like the program; the caller's handlers are restored afterwards.
 
     Parameters
     ----------
@@ -52,13 +52,13 @@ def run(arguments: Sequence[str]) -> int:
             return _attempt(list(arguments))
     except Interrupted as stop:
         return _fail(str(stop), stop.exit_code)
-    except KeyboardInterrupt:  # raised by somebody else, no signal of ours
+    except KeyboardInterrupt:  # raised by other code, not by a signal
         return _fail("interrupted", 130)
 
 
 def _attempt(arguments: list[str]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # A name that the terminal's encoding lacks is no reason to fail.
+        # Names with characters that the terminal cannot encode must not cause a failure.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = _dispatch(arguments)
@@ -66,12 +66,12 @@ def _attempt(arguments: list[str]) -> int:
             sys.stdout.flush()
         return code
     except FormatError as problem:
-        # Path and line first, as compilers do, so that editors jump there.
+        # Path and line first, like compilers, so that editors can jump there.
         return _fail(printable(problem, 2000), problem.exit_code, prefix="")
     except ViewerError as problem:
         return _fail(printable(problem, 2000), problem.exit_code)
     except BrokenPipeError:
-        # The reader of our output has gone (``viewer info x | head -1``): nothing to report.
+        # The reader of the output has exited (``viewer info x | head -1``): no error.
         _drop_output()
         return 0
     except OSError as problem:
@@ -94,7 +94,7 @@ def _dispatch(arguments: list[str]) -> int:
     elif arguments:
         check_command(arguments[0])
     parser = command_parser(name)
-    # What follows "--" are files, whatever they are called.
+    # Everything after "--" is a file, even if it looks like an option.
     end = arguments.index("--") if "--" in arguments else len(arguments)
     before_end = _protect_numbers(arguments[:end])
     parser.check_options(before_end)
@@ -134,13 +134,13 @@ def _overview() -> argparse.ArgumentParser:
 
 
 def _fail(message: str, code: int, prefix: str = "viewer: ") -> int:
-    with contextlib.suppress(OSError):  # the terminal may be gone, which is what ended us
+    with contextlib.suppress(OSError):  # the terminal may be closed
         print(f"{prefix}{message}", file=sys.stderr)
     return code
 
 
 def _drop_output() -> None:
-    """Let what is left of the output vanish, or Python would complain about it at its end."""
+    """Discard the remaining output, or Python would report an error at exit."""
     if sys.stdout is not None:
         with contextlib.suppress(io.UnsupportedOperation):  # no file, as in tests
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

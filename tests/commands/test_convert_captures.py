@@ -47,8 +47,8 @@ def recording(tmp_path):
 def test_keypoints_are_written_person_by_person(keypoints, tmp_path, capsys):
     assert convert(keypoints, "-o", tmp_path / "m.npz") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith(f"{tmp_path}/m-0.npz: 3 frames at 30 a second, z up: name, up, ")
-    assert lines[1].startswith(f"{tmp_path}/m-4.npz: 3 frames at 30 a second; 2 of them missing")
+    assert lines[0].startswith(f"{tmp_path}/m-0.npz: 3 frames at 30 per second, z up: name, up, ")
+    assert lines[1].startswith(f"{tmp_path}/m-4.npz: 3 frames at 30 per second; 2 of them missing")
     with np.load(tmp_path / "m-4.npz") as arrays:
         assert (str(arrays["name"]), str(arrays["up"])) == ("kp body25 4", "z")
         assert arrays["frames"].tolist() == [10, 11, 12]
@@ -69,7 +69,7 @@ def test_keypoints_that_hang_are_written_upright(keypoints, tmp_path):
 def test_keypoints_at_one_frame_keep_their_numbers(keypoints, tmp_path, capsys):
     assert convert(keypoints, "-o", tmp_path / "m.npz", "--frame", 11) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [
-        "kp body25 4: not there at that time, and not written"
+        "kp body25 4: absent at that time, not written"
     ]
     assert [path.name for path in tmp_path.glob("*.npz")] == ["m-0.npz"]
     with np.load(tmp_path / "m-0.npz") as arrays:
@@ -92,7 +92,7 @@ def test_keypoints_beside_bodies_are_said_to_be_left_out(recording, tmp_path, ca
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
-        "keypoints beside bodies are not written (take body25 0): open the keypoints3d folder alone"
+        "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
     )
 
 
@@ -102,13 +102,13 @@ def test_who_is_away_is_left_out_and_the_others_keep_their_names(recording, tmp_
     stem, _, suffix = name.partition(".")
     assert [path.name for path in tmp_path.glob("w*")] == [f"{stem}-0.{suffix}"]
     lines = capsys.readouterr().out.splitlines()
-    assert lines[-1] == "take 7: not there in frames 22 to 23, and not written"
+    assert lines[-1] == "take 7: absent in frames 22 to 23, not written"
 
 
 def test_who_is_away_is_left_out_of_folders(recording, tmp_path, capsys):
     assert convert(*recording, "-o", tmp_path / "w", "--frames", "23:24") == 0
     text = capsys.readouterr().out
-    assert "1 frame of 1 person" in text and "take 7: not there in frame 23, and not" in text
+    assert "1 frame of 1 person" in text and "take 7: absent in frame 23, not" in text
     (frame,) = (tmp_path / "w" / "smpl").iterdir()
     assert [record["id"] for record in json.loads(frame.read_text())] == [0]
 
@@ -118,7 +118,7 @@ def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path,
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
-    message = "nobody is there in frame 23: there is nothing to write"
+    message = "everybody is absent in frame 23: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
     assert {path.name for path in tmp_path.iterdir()} == before
 
@@ -126,7 +126,7 @@ def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path,
 def test_nobody_there_at_one_time_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
-    message = "nobody is there at that time: there is nothing to write"
+    message = "everybody is absent at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 
@@ -138,7 +138,8 @@ def test_people_without_a_track_have_names_of_their_own(recording, tmp_path, cap
     assert names == ["w-3.bvh", "w-untracked-2.bvh", "w-untracked.bvh"]
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1] == (
-        "w-untracked.bvh, w-untracked-2.bvh: without a track, perhaps somebody else in each frame"
+        "w-untracked.bvh, w-untracked-2.bvh: without a track, "
+        "possibly a different person in each frame"
     )
     assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # whoever has a track comes first
 

@@ -129,7 +129,7 @@ def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-o", "w.obj", "--frames", "0:2"], "expected a name with {frame}, as in walk_"),
+        (["-o", "w.obj", "--frames", "0:2"], "expected a name with {frame}, such as walk_"),
         (["-o", "w.bvh", "--frames", "2:1"], "--frames: expected A:B"),
         (["-o", "w.bvh", "--frames", "0:4:2"], "--frames: expected A:B"),
         (["-o", "w.xyz"], 'no exporter for ".xyz"; there are:'),
@@ -152,7 +152,7 @@ def test_still_figures_have_no_frames_to_write(tmp_path, capsys):
     skel, skin = write_rig(tmp_path)
     for options in (["-o", tmp_path / "w_{frame}.obj"], ["--frames", ":9", "-o", tmp_path / "w"]):
         assert convert(skel, skin, *options) == 2
-        assert "no file moves anything: a motion cannot be written" in capsys.readouterr().err
+        assert "no file has a motion: a motion cannot be written" in capsys.readouterr().err
 
 
 def test_existing_files_need_force(walk, tmp_path, capsys):

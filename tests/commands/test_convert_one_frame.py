@@ -17,9 +17,9 @@ from numpy.testing import assert_allclose
 
 from viewer.cli import run
 
-STILL = "one frame: nothing moves, so the present pose was written"
+STILL = "one frame: nothing moves, so the current pose was written"
 POINTS = (
-    "keypoints beside bodies are not written (take body25 0): open the keypoints3d folder alone"
+    "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
 )
 PRINTED = 1e-5  # units: six decimals, summed along an arm
 
@@ -65,7 +65,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert_allclose(places["left_hand"], hand, atol=PRINTED)
     assert_allclose(places["right_hand"], [3, -2, 0], atol=PRINTED)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith(f"{out}: 5 joints, 1 frame (0) at 30 a second, ")
+    assert lines[0].startswith(f"{out}: 5 joints, 1 frame (0) at 30 per second, ")
     assert lines[1:] == [STILL]
 
 
@@ -127,7 +127,7 @@ def test_still_body_becomes_parameters_of_its_family(tmp_path, capsys):
     assert_allclose(rotation(record["Rh"][0]), rotation(pose[:3]), atol=1e-6)
     assert_allclose(record["poses"][0], [0, 0, 0, *pose[3:]], atol=1e-6)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == f"{tmp_path}/a.npz: 1 frame of SMPL at 30 a second, y up"
+    assert lines[0] == f"{tmp_path}/a.npz: 1 frame of SMPL at 30 per second, y up"
     assert lines[1] == lines[-1] == STILL
 
 
@@ -154,7 +154,7 @@ def test_figures_that_move_otherwise_have_no_keys(tmp_path, capsys):
 def test_mesh_alone_has_nothing_to_write_as_bvh(tmp_path, capsys):
     (tmp_path / "stone.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert convert(tmp_path / "stone.obj", "-o", tmp_path / "x.bvh") == 2
-    message = "no file moves anything: a motion cannot be written"
+    message = "no file has a motion: a motion cannot be written"
     assert capsys.readouterr().err == f"viewer: {message}\n"
 
 
@@ -204,7 +204,7 @@ def test_one_frame_of_a_capture_is_its_own(recording, tmp_path, capsys):
         assert one.n_frames == 1
         places = whole.places(1)
         assert_allclose([one.places(0)[n] for n in places], list(places.values()), atol=1e-4)
-    assert "1 frame (21) at 30 a second" in capsys.readouterr().out.splitlines()[0]
+    assert "1 frame (21) at 30 per second" in capsys.readouterr().out.splitlines()[0]
 
 
 def test_one_frame_of_a_capture_goes_back_under_its_number(recording, tmp_path, capsys):
@@ -238,7 +238,7 @@ def test_who_is_away_at_that_frame_is_left_out(recording, tmp_path, capsys, name
     else:
         assert written(tmp_path, "w*") == [name.replace(".", "-0.")]
     text = capsys.readouterr().out
-    assert "take 7: not there " in text and text.splitlines()[-1] == POINTS
+    assert "take 7: absent " in text and text.splitlines()[-1] == POINTS
 
 
 @pytest.mark.parametrize("option", ["frame", "time"])
@@ -264,7 +264,7 @@ def test_still_figures_beside_a_motion_are_said_to_be_left_out(arms, tmp_path, c
     files = [*rig, tmp_path / "walk.anim", arms]
     for options in ([], ["--frame", 3]):
         assert convert(*files, *options, "-o", tmp_path / "x.bvh", "--force") == 0
-        line = "arms: nothing moves it, so it is not written"
+        line = "arms: it has no motion, so it is not written"
         assert capsys.readouterr().out.splitlines()[-1] == line
     assert written(tmp_path, "*.bvh") == ["x.bvh"]
 

@@ -28,18 +28,16 @@ def test_no_option_is_undocumented(command):
     [
         (
             "render",
-            "files, output, captures and BVH, which frames, videos, shape and pose, camera, "
-            "what is shown, skinning",
+            "files, output, captures and BVH, frames, videos, shape and pose, camera, "
+            "display, skinning",
         ),
         (
             "convert",
-            "files, output, writing motions, which frames, captures and BVH, shape and pose, "
-            "skinning",
+            "files, output, writing motions, frames, captures and BVH, shape and pose, skinning",
         ),
         (
             "view",
-            "files, window, captures and BVH, which frames, shape and pose, camera, "
-            "what is shown, skinning",
+            "files, window, captures and BVH, frames, shape and pose, camera, display, skinning",
         ),
     ],
 )

@@ -41,10 +41,10 @@ def test_boxes_are_only_of_what_is_there(info, tmp_path):
     assert lines[:4] == [
         "kp body25 0",
         "  box        (0, 0, 1) to (0, 0, 1.6), size 0.6, z up",
-        "  clip       kp: 0 to 0.0666667 s, 3 frames at 30 a second, 25 points, 8.0 % of them seen",
+        "  clip       kp: 0 to 0.0666667 s, 3 frames at 30 per second, 25 points, 8.0 % visible",
         "    1 frame is missing: 5",
     ]
-    assert lines[4:6] == ["kp body25 4", "  box        none: not there at this time, z up"]
+    assert lines[4:6] == ["kp body25 4", "  box        none: absent at this time, z up"]
     assert lines[7] == "    1 frame is missing: 3"
     away = found["actors"][1]
     assert (away["box"], away["size"], away["present"]) == (None, None, False)
@@ -61,7 +61,7 @@ def test_keypoints_that_nobody_saw_have_no_box(info, tmp_path):
     unseen = {"id": 0, "keypoints3d": [[0.0] * 4] * 25}
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {0: [unseen], 1: [unseen]})
     lines, found, err = info(folder)
-    assert lines[1] == "  box        none: nothing is seen, z up"
+    assert lines[1] == "  box        none: nothing is visible, z up"
     assert found["actors"][0]["present"] and found["actors"][0]["box"] is None
     assert err == "warning: kp: no keypoint of person 0 is ever seen: every confidence is 0\n"
 

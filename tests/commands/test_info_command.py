@@ -49,8 +49,8 @@ def test_text_says_the_same_in_words(tmp_path, capsys):
     text = capsys.readouterr().out
     for words in (
         "2 joints, 9 DOFs (3 limited, 1 of them locked)",
-        "12 vertices, 20 triangles (0 without area), without texture coordinates",
-        "2 bindings, 16 influences, mean 1.33 a vertex",
+        "12 vertices, 20 triangles (0 degenerate), without texture coordinates",
+        "2 bindings, 16 influences, mean 1.33 per vertex",
         "1: 8  2: 4",
         "weight sums 1 to 1",
         "locked",

@@ -55,7 +55,7 @@ def draw(recording, out, *options):
 
 # The corner (0, 0) is seen at x = y = -1/2, r^2 = 1/2; k1 = 0.1 moves it by k1 r^2 of its way from
 # the middle: 0.1 * 0.5 * 500 sqrt(2) = 35.36 pixels.
-NOTE = "warning: camera 02: its lens bends pictures by up to 35.4 pixels, not drawn here\n"
+NOTE = "warning: camera 02: its lens distortion of up to 35.4 pixels is not drawn\n"
 
 
 @pytest.mark.parametrize("view", ["02", "2"])

@@ -105,12 +105,12 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
             '--dof: "figure.rx": expected JOINT.KIND with KIND one of tx, ty, tz, x, y, z',
         ),
         # Clips
-        ("arms.skel --time 1", "--time: no file is a clip"),
-        ("arms.skel --frame 1", "--frame: no file is a clip"),
+        ("arms.skel --time 1", "--time: no file has a motion"),
+        ("arms.skel --frame 1", "--frame: no file has a motion"),
         ("twist.skel move.anim --frame -1", "--frame: expected 0 or more, found -1"),
         (
             "twist.skel move.anim --frame 1 --fps 0",
-            "argument --fps: expected 0.001 to 100,000 frames a second, found 0 "
+            "argument --fps: expected 0.001 to 100,000 frames per second, found 0 "
             "(viewer info --help lists the options)",
         ),
         (

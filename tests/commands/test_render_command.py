@@ -342,7 +342,7 @@ def test_transparency_that_the_format_lacks_is_a_warning(rig, tmp_path, capsys):
     out = tmp_path / "x.jpg"
     arguments = ["-o", str(out), "--size", "40x30", "--background", "transparent"]
     assert run(["render", *map(str, rig), *arguments]) == 0
-    assert "this format knows no transparency" in capsys.readouterr().err
+    assert "this format has no transparency" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("into", ["pipe", "file"])

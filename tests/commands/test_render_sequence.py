@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 av = pytest.importorskip("av")
 ROOT = Path(__file__).resolve().parents[2]
-NOTHING_MOVES = "nothing moves: no file is a clip (--turntable turns the camera)"
+NOTHING_MOVES = "nothing moves: no file has a motion (--turntable rotates the camera)"
 
 
 def anim_text(end: float, channels: int, moving: dict[int, tuple[float, float]]) -> str:
@@ -166,7 +166,7 @@ def test_frames_are_counted_from_0_as_fps_counts(draw, walk, tmp_path, options, 
 
 def test_frames_behind_the_end_are_drawn_and_said(draw, walk, tmp_path):
     said = draw(walk, "{frame}.png", "--frames", "29:33", size="16x16")
-    assert said.err == "warning: --frames: frames 31 to 32 are behind the motion's end\n"
+    assert said.err == "warning: --frames: frames 31 to 32 are after the motion's end\n"
     assert len(names(tmp_path, ".png")) == 4
 
 
@@ -192,7 +192,7 @@ def test_braces_twice_are_braces(draw, walk, tmp_path):
 def test_bad_names_are_refused_before_any_work(draw, tmp_path, name):
     said = draw(["missing.skel"], name, "--frames", "0:2", code=2)
     assert said.err == (
-        "viewer: --output: expected {frame} or {frame:05} in the name of numbered pictures, as "
+        "viewer: --output: expected {frame} or {frame:05} in the name of numbered pictures, as in "
         f'frame_{{frame:05}}.png, found "{tmp_path / name}"\n'
     )
 
@@ -201,7 +201,7 @@ def test_bad_names_are_refused_before_any_work(draw, tmp_path, name):
 def test_bad_ranges_are_one_line(draw, walk, text):
     said = draw(walk, "{frame}.png", f"--frames={text}", code=2)
     assert said.err == (
-        f'viewer: --frames: expected A:B or A:B:STEP with A below B, as 0:100, found "{text}"\n'
+        f'viewer: --frames: expected A:B or A:B:STEP with A below B, as in 0:100, found "{text}"\n'
     )
 
 
@@ -232,7 +232,7 @@ def test_bad_turntables_are_one_line(draw, walk, text):
 def test_video_shows_the_whole_clip(draw, fox, tmp_path, suffix):
     path = tmp_path / f"head{suffix}"
     said = draw(fox, path.name)
-    wanted = f"{path}: 16 frames, 0.533 s, 64 x 48, 30 frames a second, "
+    wanted = f"{path}: 16 frames, 0.533 s, 64 x 48, 30 frames per second, "
     assert said.out.startswith(wanted) and said.out.endswith(" MB\n")
     shown = frames(path)
     assert len(shown) == 16 and shown[0].shape == (48, 64, 3)
@@ -270,12 +270,12 @@ def test_video_has_as_many_frames_as_asked_for(draw, walk, tmp_path, options, co
 
 def test_video_that_skips_frames_keeps_the_motions_pace(draw, walk):
     said = draw(walk, "x.mp4", "--frames", "0:30:3", size="32x32")
-    wanted = "10 frames, 1 s, 32 x 32, 10 frames a second (one of 3 frames, at the motion's own "
-    assert f"{wanted}pace; --fps sets it), " in said.out and said.err == ""
+    wanted = "10 frames, 1 s, 32 x 32, 10 frames per second (one of 3 frames, at the motion's own "
+    assert f"{wanted}speed; --fps sets it), " in said.out and said.err == ""
     said = draw(walk, "y.mp4", "--frames", "0:30:3", "--fps", "30", size="32x32")
-    assert "10 frames, 0.333 s, 32 x 32, 30 frames a second, " in said.out
+    assert "10 frames, 0.333 s, 32 x 32, 30 frames per second, " in said.out
     said = draw(walk, "z.gif", "--frames", "0:31:3", size="32x32")
-    assert "11 frames, 1.1 s, 32 x 32, 10 frames a second (one of 3 frames" in said.out
+    assert "11 frames, 1.1 s, 32 x 32, 10 frames per second (one of 3 frames" in said.out
     said = draw(walk, "{frame}.png", "--frames", "0:31:3", size="16x16")
     assert "one of" not in said.out  # nobody plays pictures
 
@@ -313,7 +313,7 @@ def test_gif_of_what_does_not_move_is_a_picture(draw, walk, tmp_path):
 
 def test_gif_of_many_frames_a_second_says_how_many_it_shows(draw, walk, tmp_path):
     said = draw(walk, "x.gif", "--fps", "100", size="32x32")
-    assert said.err == ("warning: GIFs show at most 50 frames a second: drawn at 50, not 100\n")
+    assert said.err == ("warning: GIFs show at most 50 frames per second: drawn at 50, not 100\n")
     assert "51 frames, 1.02 s" in said.out and n_frames(tmp_path / "x.gif") == 51
 
 
@@ -335,8 +335,8 @@ def test_transparent_videos(draw, fox, tmp_path):
 def test_options_that_a_motion_overrides_are_said(draw, walk):
     said = draw(walk, "x.mp4", "--dof", "arm.x=1", "--mirror", size="32x32")
     assert said.err.splitlines() == [
-        "warning: --dof: only figures without a motion keep it",
-        "warning: --mirror: only figures without a motion keep it",
+        "warning: --dof: applies only to figures without a motion",
+        "warning: --mirror: applies only to figures without a motion",
     ]
 
 
@@ -353,7 +353,7 @@ def test_follow_says_whom_where_two_have_the_joint(draw, pair):
     size = "16x16"
     said = draw(pair, "a.mp4", "--follow", "pelvis", size=size)
     assert said.err == (
-        "warning: --follow pelvis: 2 have it; the first, take 3, is followed "
+        "warning: --follow pelvis: 2 match; the first one, take 3, is followed "
         "(--follow 5:pelvis follows another)\n"
     )
     for index, name in enumerate(("5:pelvis", "take 3:head", "smpl 5/left_foot", "5", "Take 3")):
@@ -366,12 +366,12 @@ def test_follow_says_whom_where_two_have_the_joint(draw, pair):
 
 def test_follow_of_figures_without_numbers_says_that_it_is_the_first(draw, walk):
     said = draw([*walk, *walk[:2]], "x.mp4", "--follow", "arm", size="16x16")
-    assert said.err == ("warning: --follow arm: 2 have it; the first, tiny, is followed\n")
+    assert said.err == ("warning: --follow arm: 2 match; the first one, tiny, is followed\n")
 
 
 def test_shapes_that_a_capture_overrides_are_said(draw, pair):
     said = draw(pair, "x.mp4", "--shape", "1", size="16x16")
-    assert said.err == "warning: --shape: only figures without a motion keep it\n"
+    assert said.err == "warning: --shape: applies only to figures without a motion\n"
 
 
 # Contact sheets
@@ -413,13 +413,13 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         ("x.mp4", "", NOTHING_MOVES),
         ("{frame}.png", "--frames 0:3", NOTHING_MOVES),
         ("x.gif", "--speed 2", NOTHING_MOVES),
-        ("x.mp4", "--turntable --frames 0:3", "--frames: no file is a clip"),
-        ("x.png", "--speed 2", "--speed: only videos have one: .mp4, .webm, .gif"),
-        ("{frame}.png", "--quality 9", "--quality: only videos have one: .mp4, .webm, .gif"),
+        ("x.mp4", "--turntable --frames 0:3", "--frames: no file has a motion"),
+        ("x.png", "--speed 2", "--speed: applies to videos only: .mp4, .webm, .gif"),
+        ("{frame}.png", "--quality 9", "--quality: applies to videos only: .mp4, .webm, .gif"),
         (
             "x.gif",
             "--quality 9 --turntable",
-            "--quality: a GIF has one quality; .mp4 and .webm have more",
+            "--quality: applies to .mp4 and .webm, not to a GIF",
         ),
         ("x.mp4", "--quality 900 --turntable", "video quality: expected 0 to 100, found 900"),
         ("x.mp4", "--speed 0", "--speed: expected 0.001 to 1000 or their negatives, found 0"),
@@ -436,12 +436,12 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         (
             "x.mp4",
             "--panels",
-            "--panels: draws one picture; videos and sequences have no panels",
+            "--panels: applies to one picture only, not to videos or sequences",
         ),
         (
             "x.mp4",
             "--contact-sheet 4",
-            "--contact-sheet: is a picture, as .png; found the name of a video",
+            "--contact-sheet: expected the name of a picture, such as .png, found a video",
         ),
         ("x.png", "--contact-sheet 0", "--contact-sheet: expected 1 to 1000 frames, found 0"),
         (
@@ -564,7 +564,7 @@ def test_interrupted_sequence_leaves_whole_pictures(walk, tmp_path):
 def test_wasp_walks(draw, shared, tmp_path):
     files = [str(shared / name) for name in ("wasp.skel", "wasp.skin", "wasp_walk.anim")]
     said = draw(files, "walk.mp4", size="160x90")
-    assert ": 121 frames, 4.03 s, 160 x 90, 30 frames a second, " in said.out
+    assert ": 121 frames, 4.03 s, 160 x 90, 30 frames per second, " in said.out
     shown = frames(tmp_path / "walk.mp4")
     assert len(shown) == 121 and np.abs(shown[0] - shown[60]).mean() > 1.0
 

@@ -181,7 +181,7 @@ def test_target_with_a_rig_of_its_own_is_taken_as_posed(tmp_path, monkeypatch, c
 
     assert run(["rig", *map(str, bundled_files())]) == 130
     assert_allclose(seen["target"].positions, fox_vertices())
-    assert "warning: fox has a rig already, which is not used" in capsys.readouterr().err
+    assert "warning: fox already has a rig, which is ignored" in capsys.readouterr().err
 
 
 REFUSED = {
@@ -198,7 +198,7 @@ REFUSED = {
     "rounds below 0": (
         ["--smooth=-3"],
         2,
-        "viewer: --smooth: expected 0 or more rounds, found -3",
+        "viewer: --smooth: expected 0 or more iterations, found -3",
     ),
     "suffix": (
         ["-o", "{tmp}/x.glb"],
@@ -221,14 +221,14 @@ REFUSED = {
     "frame of no motion": (
         ["--from", "fox", "--template-frame", "3"],
         2,
-        "viewer: --template-frame: expected a template with a motion, found none; give the "
-        "motion's file by another --from, as --from body --from walk.npz",
+        "viewer: --template-frame: expected a template with a motion, found none; add the "
+        "motion's file with another --from, as in --from body --from walk.npz",
     ),
     "time of no motion": (
         ["--from", "fox", "--time", "3"],
         2,
-        "viewer: --time: expected a template with a motion, found none; give the motion's file "
-        "by another --from, as --from body --from walk.npz",
+        "viewer: --time: expected a template with a motion, found none; add the motion's file "
+        "with another --from, as in --from body --from walk.npz",
     ),
     "two frames": (
         ["--frame", "2", "--template-frame", "3"],

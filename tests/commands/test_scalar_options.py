@@ -111,11 +111,11 @@ def test_legend_stays_in_its_corner(render, body):
             ["--scalar", "stretch:pelvis"],
             'argument --scalar: scalar quantity "stretch": expected no joint, found "pelvis"',
         ),
-        (["--legend"], "--legend: expected --scalar NAME, whose colours it is about"),
+        (["--legend"], "--legend: expected --scalar NAME, to which it applies"),
         (["--no-isolines", "--shading", "parts"], None),
         (
             ["--scalar-range", "0:1"],
-            "--scalar-range: expected --scalar NAME, whose colours it is about",
+            "--scalar-range: expected --scalar NAME, to which it applies",
         ),
         (
             ["--scalar", "cut", "--scalar-range", "5:1"],
@@ -131,7 +131,7 @@ def test_legend_stays_in_its_corner(render, body):
         ),
         (
             ["--scalar", "dominant", "--scalar-range", "0:3"],
-            "--scalar-range: dominant has a colour for each whole number",
+            "--scalar-range: dominant has one colour per integer",
         ),
     ],
 )  # fmt: skip

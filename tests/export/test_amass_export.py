@@ -59,7 +59,7 @@ def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
     path = tmp_path / "walk.npz"
     arrays, notes = written(family_animation(family(kind), motion), path, world_up="z")
     title = {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X"}[kind]
-    assert notes == [f"{path}: 4 frames of {title} at 50 a second, z up"]
+    assert notes == [f"{path}: 4 frames of {title} at 50 per second, z up"]
     assert (arrays["poses"].shape, arrays["betas"].shape) == ((4, 3 * COUNTS[kind]), (16,))
     assert_array_equal(arrays["betas"], [*waves(10, seed=2.0), *[0.0] * 6])
     assert (arrays["mocap_framerate"], arrays["mocap_frame_rate"]) == (50.0, 50.0)
@@ -193,8 +193,8 @@ def test_gaps_split_the_file(family, tmp_path):
     )  # fmt: skip
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.npz", "a-2.npz"]
     assert notes == [
-        f"{tmp_path}/a-1.npz: 2 frames of SMPL at 50 a second, y up",
-        f"{tmp_path}/a-2.npz: 2 frames of SMPL at 50 a second, y up",
+        f"{tmp_path}/a-1.npz: 2 frames of SMPL at 50 per second, y up",
+        f"{tmp_path}/a-2.npz: 2 frames of SMPL at 50 per second, y up",
         "frames 0, 3 to 4 missing: left out between the files",
     ]
     with np.load(tmp_path / "a-2.npz") as arrays:

@@ -67,7 +67,7 @@ def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
     frames, notes = written(family_animation(family(kind), motion), tmp_path / "out", world_up="z")
     assert notes == [
         f"{tmp_path}/out/smpl: 4 frames of 1 person, z up; EasyMocap keeps no frame rate: it is "
-        "50 a second"
+        "50 per second"
     ]
     assert list(frames) == [0, 1, 2, 3]
     for frame, people in frames.items():

@@ -109,7 +109,7 @@ def test_a_body_s_joints_are_where_a_second_reader_finds_them(body: Figure, tmp_
     found, notes = write(animation, tmp_path)
     assert_places(found, animation, 100.0)
     assert notes[0] == (
-        "PATH: 24 joints, 12 frames (0 to 11) at 30 a second, centimetres, y up, channels ZYX"
+        "PATH: 24 joints, 12 frames (0 to 11) at 30 per second, centimetres, y up, channels ZYX"
     )
     assert len(notes) == 1  # nothing is lost, so nothing is said
 

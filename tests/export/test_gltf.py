@@ -85,8 +85,8 @@ def test_fox_is_drawn_as_it_is_skinned(tmp_path):
     percent = 100 * np.linalg.norm(apart, axis=1).max() / size
     assert notes[1:] == [
         "lengths stay as they are: fox does not say its unit, and programs take glTF's for metres",
-        f"up to {counts.max()} influences a vertex, all of them written, strongest first: programs "
-        f"that read only JOINTS_0 are off by up to {percent:.3g} % of the size",
+        f"up to {counts.max()} influences per vertex, all of them written, strongest first: "
+        f"programs that read only JOINTS_0 are off by up to {percent:.3g} % of the size",
         "not held by glTF: limits of joints",
     ]
 

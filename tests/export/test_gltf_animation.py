@@ -78,7 +78,7 @@ def test_frames_are_keys(tmp_path):
     size = (tmp_path / "out.glb").stat().st_size
     assert notes == [
         f"{tmp_path / 'out.glb'}: 7 vertices (5 before they were split along texture seams), "
-        f"3 triangles, 2 joints, 4 frames (7 to 10) at 10 a second, {size} bytes"
+        f"3 triangles, 2 joints, 4 frames (7 to 10) at 10 per second, {size} bytes"
     ]
     # Whoever does not play it sees the rest pose.
     assert_drawn(gltf, animation.figure, Actor(animation.figure).pose)
@@ -162,7 +162,7 @@ def test_keyed_clip_is_sampled(tmp_path):
     actor = viewer.load(*write_twist(tmp_path), tmp_path / "twist.anim").actors[0]
     animation = sample_animation(actor, rate=5.0)
     gltf, notes = write(tmp_path, animation)
-    assert "11 frames (0 to 10) at 5 a second" in notes[0]
+    assert "11 frames (0 to 10) at 5 per second" in notes[0]
     rest = gltf.vertices()[0]
     # Two a second along x, also between frames.
     for time in (0.0, 0.6, 1.1, 2.0):

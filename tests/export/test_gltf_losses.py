@@ -52,7 +52,7 @@ def test_thirteen_influences_are_all_there(tmp_path):
     weights = np.concatenate([w[1] for _, w in sets])
     assert_allclose(weights[:13], shares[::-1], rtol=1e-6)
     assert [j[2].tolist() for j, _ in sets] == [[3, 0, 0, 0]] + [[0] * 4] * 3
-    assert notes[1].startswith("up to 13 influences a vertex, all of them written")
+    assert notes[1].startswith("up to 13 influences per vertex, all of them written")
 
 
 def test_weights_are_scaled_and_the_largest_move_is_told(tmp_path):

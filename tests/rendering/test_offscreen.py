@@ -80,7 +80,7 @@ def test_a_very_wide_picture_shows_the_whole_figure(scene):
 def test_samples_are_a_power_of_two(scene, asked, drawn):
     with Offscreen() as offscreen:
         draw(offscreen, scene, samples=asked)
-        note = f"{asked} samples a pixel asked for, {drawn} drawn"
+        note = f"{asked} samples per pixel requested, {drawn} drawn"
         assert offscreen.renderer.notes == ([] if drawn is None else [note])
 
 
@@ -89,7 +89,7 @@ def test_too_many_samples_are_noted_once(scene):
         for _ in range(2):
             draw(offscreen, scene, samples=4096)
         limit = offscreen.context.max_samples
-        assert offscreen.renderer.notes == [f"4096 samples a pixel asked for, {limit} drawn"]
+        assert offscreen.renderer.notes == [f"4096 samples per pixel requested, {limit} drawn"]
 
 
 def test_one_sample_is_not_noted(scene):
@@ -232,7 +232,7 @@ def test_a_texture_above_the_limit_is_shrunk_with_a_note(ctx):
     assert texture.size == (limit // 2 + 1, 1)
     assert notes == [
         f"a texture of {limit + 2} x 1 pixels is above this driver's limit of {limit} "
-        "and was shrunk by 2"
+        "and was reduced by 2"
     ]
     assert texture.read()[:4] == bytes([200, 0, 0, 0])
     texture.release()
@@ -246,7 +246,7 @@ def test_a_note_about_a_texture_reaches_the_renderer(monkeypatch):
         offscreen.render(scene, (32, 32), Camera(), DisplayOptions(samples=1), scene_box(scene))
         assert offscreen.renderer.notes == [
             "a texture of 1032 x 1032 pixels is above this driver's limit of 1024 "
-            "and was shrunk by 2"
+            "and was reduced by 2"
         ]
 
 

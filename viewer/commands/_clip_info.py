@@ -1,4 +1,4 @@
-"""What ``viewer info`` says of motions."""
+"""Description of motions for ``viewer info``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SHOWN_GAPS = 6
 
 
 def describe_clip(clip: Motion) -> dict[str, Any]:
-    """Return what there is to say of a motion, as JSON has it."""
+    """Return the description of a motion as JSON data."""
     facts: dict[str, Any] = {"name": clip.name, "range": [clip.start, clip.end]}
     if isinstance(clip, Clip):
         return facts | _describe_keys(clip)
@@ -58,14 +58,14 @@ def _describe_rows(clip: SampledClip | PointClip) -> dict[str, Any]:
 
 
 def gaps_of(timing: Timing) -> list[list[int]]:
-    """Return the first and last number of every run of missing frames."""
+    """Return the first and last frame number of every gap."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], timing.present, [True]])))
     pairs = edges.reshape(-1, 2) + np.array([timing.first_frame, timing.first_frame - 1])
     return [[int(first), int(last)] for first, last in pairs]
 
 
 def clip_lines(clip: dict[str, Any]) -> list[str]:
-    """Return the same as lines of text."""
+    """Return the description as lines of text."""
     start, end = clip["range"]
     head = f"  clip       {printable(clip['name'])}: {number_text(start)} to {number_text(end)} s, "
     if "kind" in clip:
@@ -75,19 +75,17 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     if clip["key_times"]:
         first, last = clip["key_times"]
         lines.append(
-            f"    keys from {number_text(first)} to {number_text(last)} s; beyond them {modes}"
+            f"    keys from {number_text(first)} to {number_text(last)} s; extrapolation: {modes}"
         )
     return lines
 
 
 def _rows_text(clip: dict[str, Any]) -> str:
     frames = counted(clip["frames"], "frame")
-    frames += f" at {clip['frame_rate']:g} a second"
+    frames += f" at {clip['frame_rate']:g} per second"
     if clip["kind"] == "points":
-        return (
-            f"{frames}, {counted(clip['points'], 'point')}, {100 * clip['seen']:.1f} % of them seen"
-        )
-    shape = "a shape of its own in each frame" if clip["shape_varies"] else "one shape"
+        return f"{frames}, {counted(clip['points'], 'point')}, {100 * clip['seen']:.1f} % visible"
+    shape = "a different shape in each frame" if clip["shape_varies"] else "one shape"
     return f"{frames}, {counted(clip['joints'], 'joint')}, {shape}"
 
 

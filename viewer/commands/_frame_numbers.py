@@ -1,4 +1,4 @@
-"""What frames are called on the command line: as a capture's files number them, or from 0 on."""
+"""Frame numbers on the command line: those of a capture's files, or counted from 0."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.commands._numbers import number
 from viewer.errors import ViewerError, printable
 from viewer.rig.scene import Actor, Scene
 
-_SLOWEST, _FASTEST = 0.001, 100_000.0  # frames a second
+_SLOWEST, _FASTEST = 0.001, 100_000.0  # frames per second
 _LAST_NUMBER = 1_000_000_000
 
 
@@ -31,20 +31,20 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Numbering:
-    """What the frames of motions are called.
+    """Numbering of the frames of motions.
 
     Attributes
     ----------
     first : int
         Number of the first frame.
     count : int
-        Number of frames to the motions' end.
+        Number of frames up to the end of the motions.
     start, end : float
-        Seconds from the earliest start to the latest end.
+        The earliest start and the latest end, in seconds.
     rate : float
-        Frames a second by which they are counted.
+        Frames per second of the numbering.
     runs_on : bool
-        Whether something moves beyond the last frame: curves of keys do, captures do not.
+        Whether frames beyond the last one exist: keyframed clips extrapolate, captures do not.
     """
 
     first: int
@@ -60,10 +60,10 @@ class Numbering:
         return self.first + self.count - 1
 
     def time_of(self, frame: int, option: str = "--frame") -> float:
-        """Return the seconds at which a frame is shown.
+        """Return the time of a frame in seconds.
 
         ``frame``: its number.
-        ``option``: that it was given with.
+        ``option``: the option that gave it, for messages.
         Raises ViewerError if there is no such frame.
         """
         last = _LAST_NUMBER if self.runs_on else self.last
@@ -75,12 +75,12 @@ class Numbering:
         return self.start + (frame - self.first) / self.rate
 
     def checked_time(self, time: float) -> float:
-        """Return a time at which there is something to see.
+        """Return a time, checked to lie within the motions.
 
-        A capture's last frame counts for half a frame's duration: its exact seconds are seldom
-        what somebody types.
+        A capture's last frame extends for half a frame's duration, since nobody types its exact
+        time.
 
-        Raises ViewerError if the time lies outside of captures.
+        Raises ViewerError if the time lies outside the captures.
         """
         if self.runs_on:
             return time
@@ -92,9 +92,9 @@ class Numbering:
         return min(max(time, self.start), self.end)
 
     def span(self, asked: Range | None) -> tuple[int, int]:
-        """Return the first frame of a range and the one behind its last, counted from 0.
+        """Return the first frame of a range and the one after its last, counted from 0.
 
-        Raises ViewerError if the range begins outside the motions, or leaves a capture.
+        Raises ViewerError if the range begins outside the motions, or exceeds a capture.
         """
         if asked is None:
             return 0, self.count
@@ -109,13 +109,13 @@ class Numbering:
 
 
 def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numbering:
-    """Return what the frames of some actors' motions are called.
+    """Return the frame numbering of some actors' motions.
 
-    The longest capture counts: at its own rate its frames have the numbers of its files. At
-    another rate, and where there are only clips of keys, frames count from 0.
+    The longest capture decides: at its own rate, frames have the numbers of its files. At
+    another rate, or if there are only keyframed clips, frames count from 0.
 
     ``actors``: with or without motions.
-    ``rate``: frames a second; those of the longest capture, or 30, if omitted.
+    ``rate``: frames per second; that of the longest capture, or 30, if omitted.
     """
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
@@ -134,10 +134,8 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
 
 
 def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None:
-    """Add the options that choose frames; ``many`` is how a range is given, if one can be."""
-    group = parser.add_argument_group(
-        "which frames: counted as a capture's files number them, otherwise from 0"
-    )
+    """Add the options that choose frames; ``many`` is the syntax of a range, if one is allowed."""
+    group = parser.add_argument_group("frames: numbered as in a capture's files, otherwise from 0")
     if many:
         step = ", every STEP-th of them" if "STEP" in many else ""
         group.add_argument(
@@ -145,23 +143,23 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
             metavar=many,
             help=f"frames A to B - 1{step}; A or B may be left out (default: the whole motion)",
         )
-    group.add_argument("--frame", type=int, metavar="N", help="pose by the motion at frame N")
+    group.add_argument("--frame", type=int, metavar="N", help="pose at frame N of the motion")
     group.add_argument(
-        "--time", type=number, metavar="S", help="pose by the motion at S seconds (default: start)"
+        "--time", type=number, metavar="S", help="pose at S seconds of the motion (default: start)"
     )
     group.add_argument(
         "--fps",
         type=rate,
         metavar="R",
-        help="frames a second: of captures, and by which frames of clips are counted "
+        help="frames per second of captures, and for numbering the frames of clips "
         "(default: the file's own, or 30)",
     )
-    # Commands that have another name for it say so in messages.
+    # Commands with another name for the option put that name into messages.
     parser.set_defaults(frame_option="--frame")
 
 
 def parse_range(text: str) -> Range:
-    """Return the range that ``A:B`` or ``A:B:STEP`` stands for; A and B may be left out.
+    """Parse ``A:B`` or ``A:B:STEP``; A and B may be left out.
 
     >>> parse_range("10:20:2"), parse_range(":5")
     (Range(first=10, stop=20, step=2), Range(first=None, stop=5, step=1))
@@ -173,24 +171,24 @@ def parse_range(text: str) -> Range:
         if step >= 1 and (stop is None or (first or 0) < stop):
             return Range(first, stop, step)
     raise ViewerError(
-        f'--frames: expected A:B or A:B:STEP with A below B, as 0:100, found "{printable(text)}"'
+        f'--frames: expected A:B or A:B:STEP with A below B, as in 0:100, found "{printable(text)}"'
     )
 
 
 def rate(text: str) -> float:
-    """Return the frames a second that an option is given; see ``number`` for what it raises."""
+    """Return the frame rate given to an option; raises as ``number`` does."""
     value = number(text)
     if not _SLOWEST <= value <= _FASTEST:
         raise argparse.ArgumentTypeError(
-            f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames a second, found {text}"
+            f"expected {_SLOWEST:g} to {_FASTEST:,.0f} frames per second, found {text}"
         )
     return value
 
 
 def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
-    """Pose every actor that has a motion as it is at the frame or time asked for, in place.
+    """Pose every actor that has a motion at the requested frame or time, in place.
 
-    Raises ViewerError if nothing moves, or captures have nothing there.
+    Raises ViewerError if there is no motion, or the time lies outside the captures.
     """
     if arguments.frame is None and arguments.time is None:
         return
@@ -200,7 +198,7 @@ def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     if arguments.frame is not None and arguments.time is not None:
         raise ViewerError(f"{option} and --time: expected one of them, found both")
     if all(actor.clip is None for actor in scene.actors):
-        raise ViewerError(f"{option}: no file is a clip")
+        raise ViewerError(f"{option}: no file has a motion")
     frames = numbering_of(scene.actors, arguments.fps)
     if arguments.frame is not None:
         scene.time = frames.time_of(arguments.frame, option)

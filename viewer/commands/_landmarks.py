@@ -1,6 +1,6 @@
-"""Landmark files: pairs of points that belong together on two meshes.
+"""Landmark files: pairs of corresponding points on two meshes.
 
-One pair a line: three numbers of the posed template and three of the target, or the name of a
+One pair per line: three numbers of the posed template and three of the target, or the name of a
 joint of the template and three numbers of the target; ``#`` begins a comment::
 
     0.0 1.62 0.1      0.0 162.0 9.5
@@ -29,10 +29,10 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     """Read pairs of points.
 
     ``source``: the file.
-    ``template``: gives the joints that are named.
-    ``pose``: puts them where they are.
-    Returns (N, 2, 3): of each pair the template's point, then the target's.
-    Raises FormatError with the line, if it is no pair, or no joint has the name; with the last one
+    ``template``: has the joints that are named.
+    ``pose``: of the template, gives the positions of its joints.
+    Returns (N, 2, 3): for each pair the template's point, then the target's.
+    Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
       if there are fewer than three pairs.
     """
     skeleton = template.require_skeleton()

@@ -1,4 +1,4 @@
-"""What ``info`` says of body models beyond skeleton, mesh and skin."""
+"""Description of body models for ``viewer info``, beyond skeleton, mesh and skin."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import METHODS, PURE, Skinning
 
-_CUTS = (4, 8)  # influences of common engines
+_LIMITS = (4, 8)  # influences per vertex in common engines
 
 
 def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
-    """Return what a body model has, ready for JSON; empty for a plain rig.
+    """Return the properties of a body model as JSON data; empty for a plain rig.
 
     ``actor``: shaped and posed.
-    ``skinning``: how joints move its mesh.
+    ``skinning``: the skinning method and its options.
     """
     figure, pose = actor.figure, actor.pose
     facts = {heading: str(fact) for heading, fact in figure.facts}
@@ -80,14 +80,15 @@ def _annotations(figure: Figure) -> dict[str, Any]:
 
 
 def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str, float]:
-    """Return by how much each way of skinning differs from the other, at most, in this pose."""
+    """Return the largest difference between skinning options in this pose, for each option."""
     if not figure.is_attached or pose is None:
         return {}
     effects: dict[str, float] = {}
-    for count in sorted({*_CUTS, skinning.max_influences} - {0}):
+    for count in sorted({*_LIMITS, skinning.max_influences} - {0}):
         if strongest(figure) > count:
-            cut = Skinning(max_influences=count, correctives=skinning.correctives)
-            effects[f"cut to {count} influences"] = float(compute("cut", figure, pose, cut).max())
+            pruned = Skinning(max_influences=count, correctives=skinning.correctives)
+            largest = float(compute("cut", figure, pose, pruned).max())
+            effects[f"pruned to {count} influences"] = largest
     for name, text in (("normalized", "normalised weights"), ("correctives", "pose correctives")):
         effects[text] = float(compute(name, figure, pose, skinning).max())
     first, *others = (METHODS[name].short for name in PURE)
@@ -98,7 +99,7 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
 
 
 def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
-    """Return the lines for people."""
+    """Return the description as lines of text."""
     lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
     if "rest" in model:
         rest = model["rest"]

@@ -1,4 +1,4 @@
-"""``--shape`` by name, and for figures whose shapes are morphs."""
+"""``--shape`` with named weights, and for figures whose blend shapes are all morphs."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ _LISTED = 12  # names in a message
 
 
 def is_named(text: str) -> bool:
-    """Return whether weights are given by name, as ``open=0.5,wide=1``."""
+    """Return whether weights are given by name, such as ``open=0.5,wide=1``."""
     return "=" in text
 
 
 def has_only_morphs(figure: Figure) -> bool:
-    """Return whether a figure has shapes, all of which are morphs."""
+    """Return whether a figure has blend shapes and all of them are morphs."""
     groups = () if figure.blend_shapes is None else figure.blend_shapes.groups
     return bool(groups) and all(group == MORPH_GROUP for group in groups)
 
 
 def morph_record(figure: Figure, values: Floats) -> PoseRecord:
-    """Return what sets the first morphs of a figure, (N,), and the others to 0.
+    """Return a record that sets the first N morphs to ``values``, (N,), and the others to 0.
 
     Raises ViewerError if it has fewer; the message names them.
     """
@@ -40,17 +40,17 @@ def morph_record(figure: Figure, values: Floats) -> PoseRecord:
             f"--shape: {printable(figure.name)} has {len(names)} morphs ({_listed(names)}), "
             f"found {len(values)} numbers"
         )
-    # Whatever is no coefficient of a body is recorded as an expression.
+    # Weights that are no shape coefficients of a body are recorded as expressions.
     return PoseRecord(expression=values)
 
 
 def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
-    """Return the first actor that has all shapes named in a text, and what sets them.
+    """Return the first actor that has all shapes named in a text, and a record that sets them.
 
     Returns ``actor``: with a pose.
     Returns ``record``: sets the named shapes and keeps the others.
-    Raises ViewerError if the text is wrong, or no actor has these shapes; the message lists those
-      there are.
+    Raises ViewerError if the text is invalid, or no actor has these shapes; the message lists the
+      existing ones.
     """
     wanted = [_pair(part) for part in text.strip().removesuffix(",").split(",")]
     shaped = [actor for actor in scene.actors if actor.pose is not None and actor.figure.n_shapes]
@@ -68,7 +68,7 @@ def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
 
 def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
     pose = actor.require_pose()
-    assert actor.figure.blend_shapes is not None  # the caller looked
+    assert actor.figure.blend_shapes is not None  # checked by the caller
     weights = np.zeros(actor.figure.n_shapes)
     weights[: len(pose.shape_weights)] = pose.shape_weights
     for name, value in wanted:
@@ -99,7 +99,7 @@ def _names(figure: Figure) -> tuple[str, ...]:
 
 
 def _rows(figure: Figure, name: str) -> list[int]:
-    """Return the shapes of this name; in other letters only if none has it exactly."""
+    """Return the shapes of this name; ignore case only if none matches exactly."""
     names = _names(figure)
     exact = [row for row, each in enumerate(names) if each == name]
     return exact or [row for row, each in enumerate(names) if each.lower() == name.lower()]

@@ -1,4 +1,4 @@
-"""Write the motions of a scene: which exporter, which frames, one file for each actor."""
+"""Export of a scene's motions: choice of exporter and frames, one file per actor."""
 
 from __future__ import annotations
 
@@ -35,40 +35,43 @@ from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
 
 _MOST_DIGITS = 15
-_OF_POINTS = "npz"  # the exporter that takes captured points
-_ONE_A_FRAME = (".obj",)  # their motions are many files, which nobody wants by accident
+_OF_POINTS = "npz"  # the exporter for captured points
+# Their motions are written as one file per frame, so only on request.
+_ONE_A_FRAME = (".obj",)
 
 
 def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say how motions are written."""
+    """Add the options of motion export."""
     group = parser.add_argument_group("writing motions")
     kinds = [key for key, kind in EXPORTERS.items() if kind.writes_motion]
     group.add_argument(
         "--as",
         dest="kind",
         choices=[*EXPORTERS],
-        help=f"what to write, where a suffix leaves a choice; motions: {', '.join(kinds)}",
+        help=f"the format, if the suffix is ambiguous; motions: {', '.join(kinds)}",
     )
     group.add_argument(
         "--gaps",
         choices=GAPS,
-        help="missing frames (default: left out of EasyMocap, .obj and arrays, else hold)",
+        help="missing frames (default: omitted from EasyMocap, .obj and arrays, else hold)",
     )
-    group.add_argument("--to-unit", choices=METRES, help="of the file (default: cm in BVH)")
+    group.add_argument("--to-unit", choices=METRES, help="unit of the file (default: cm in BVH)")
     group.add_argument(
         "--to-up", choices=("y", "z"), help="up axis of the file (default: y in BVH)"
     )
     group.add_argument(
-        "--rotation-order", choices=ROTATION_ORDERS, default="zyx", help="of BVH (default: zyx)"
+        "--rotation-order", choices=ROTATION_ORDERS, default="zyx", help="BVH (default: zyx)"
     )
-    group.add_argument("--rest-frame", action="store_true", help="BVH: first a frame at rest")
+    group.add_argument(
+        "--rest-frame", action="store_true", help="BVH: begin with a rest pose frame"
+    )
     group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
     )
 
 
 def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
-    """Return whether the whole motion is asked for, rather than one pose."""
+    """Return whether the whole motion is requested, rather than one pose."""
     suffix = output.suffix.lower() or "/"
     if arguments.kind is not None:
         kinds = [EXPORTERS[arguments.kind]]
@@ -88,7 +91,7 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
 
 
 def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionOptions:
-    """Return how motions are asked to be written."""
+    """Return the requested options of motion export."""
     digits = int(arguments.digits)
     if not 1 <= digits <= _MOST_DIGITS or digits != arguments.digits:
         raise ViewerError(f"--digits: expected 1 to {_MOST_DIGITS}, found {arguments.digits:g}")
@@ -110,14 +113,14 @@ def write_motions(
     skinning: Skinning,
     check: Callable[[list[Path]], None],
 ) -> list[str]:
-    """Write every actor's motion; return lines that say what was written and what was lost.
+    """Write every actor's motion; return lines about what was written and what was lost.
 
-    Where one pose is asked for, or nothing moves, a motion of one frame is written. People who are
-    in none of the frames are left out, and the others keep the names of their files. ``check`` is
-    called with all files before the first is written, and raises if one of them may not be.
+    If one pose is requested, or nothing moves, a motion of one frame is written. People absent
+    from all frames are left out, and the others keep their file names. ``check`` is called with
+    all files before the first is written, and raises if one of them must not be replaced.
 
-    Raises ViewerError if no actor has a motion that the format can hold, or nobody is in the
-      frames; nothing has been written then.
+    Raises ViewerError if no actor has a motion that the format can hold, or everybody is absent
+      from the frames; nothing has been written then.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
@@ -133,19 +136,17 @@ def write_motions(
         parts.append(_Part(actor, animation, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
-        raise RigError(f"nobody is there in {parts[0].span}: there is nothing to write")
+        raise RigError(f"everybody is absent in {parts[0].span}: there is nothing to write")
     lines = _write(there, output, key, options, check) + _untracked_lines(there, key)
     away = [part for part in parts if not part.present.any()]
-    lines += [
-        f"{printable(p.animation.name)}: not there in {p.span}, and not written" for p in away
-    ]
+    lines += [f"{printable(p.animation.name)}: absent in {p.span}, not written" for p in away]
     return [*lines, *[pose_line(arguments)] * is_pose, *left_out_lines(scene, actors)]
 
 
 def _whole_animation(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
 ) -> tuple[SampledAnimation | SampledPoints, str]:
-    """Return the frames of an actor that are asked for, and what is up in them."""
+    """Return the requested frames of an actor, and their up axis."""
     frames, fills = _frames(arguments, actor), bool(arguments.fill_gaps)
     if not isinstance(actor.clip, PointClip):
         return animation_for(key, options, scene, actor, arguments.fps, frames, fills)
@@ -157,7 +158,7 @@ def _whole_animation(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """What is written of one actor: its frames, the axis that is up in them, and their file."""
+    """Frames of one actor, their up axis, and the file they are written to."""
 
     actor: Actor
     animation: SampledAnimation | SampledPoints
@@ -187,7 +188,7 @@ def _write(
     options: MotionOptions,
     check: Callable[[list[Path]], None],
 ) -> list[str]:
-    """Write the motions of whoever is there; return what the exporters say."""
+    """Write the motions of the people present; return the exporters' messages."""
     if key == "easymocap":
         return _write_capture(parts, output, options)
     files = [
@@ -198,7 +199,7 @@ def _write(
     with all_or_none(files):
         for part in parts:
             options.world_up = part.up
-            with raising():  # until it is written
+            with raising():
                 lines += _write_one(part, key, options)
     return lines
 
@@ -212,7 +213,7 @@ def _write_one(part: _Part, key: str, options: MotionOptions) -> list[str]:
 
 
 def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[str]:
-    """Write everybody into one folder."""
+    """Write all people into one folder."""
     from viewer.export.easymocap import export_animations
 
     ups = sorted({part.up for part in parts})
@@ -226,7 +227,7 @@ def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> 
 
 
 def _untracked_lines(parts: list[_Part], key: str) -> list[str]:
-    """Say which files hold people without a track."""
+    """Return a message about files of people without a track."""
     names = [
         printable(part.path.name) if key != "easymocap" else person_label(part.actor.person)
         for part in parts
@@ -234,33 +235,33 @@ def _untracked_lines(parts: list[_Part], key: str) -> list[str]:
     ]
     if not names:
         return []
-    return [f"{', '.join(names)}: without a track, perhaps somebody else in each frame"]
+    return [f"{', '.join(names)}: without a track, possibly a different person in each frame"]
 
 
 def left_out_lines(scene: Scene, written: list[Actor]) -> list[str]:
-    """Say what is not written: figures that nothing moves, and captured points beside bodies."""
+    """Return messages about what is not written: still figures, and keypoints next to bodies."""
     left = [actor for actor in scene.actors if actor not in written]
     still = [printable(a.name) for a in left if a.clip is None]
     points = [printable(a.name) for a in left if isinstance(a.clip, PointClip)]
-    why = "nothing moves it" if any(a.clip is not None for a in written) else "it has no joints"
+    why = "it has no motion" if any(a.clip is not None for a in written) else "it has no joints"
     lines = [f"{name}: {why}, so it is not written" for name in still]
     if points:
         names = ", ".join(points)
-        folder = "open the keypoints3d folder alone"
-        lines.append(f"keypoints beside bodies are not written ({names}): {folder}")
+        folder = "open only the keypoints3d folder"
+        lines.append(f"keypoints next to bodies are not written ({names}): {folder}")
     return lines
 
 
 def pose_or_point_actors(scene: Scene) -> list[Actor]:
-    """Return the actors that are written as they are posed: captured points only if alone."""
+    """Return the actors whose current pose is written: captured points only if there is no body."""
     figures = [actor for actor in scene.actors if not isinstance(actor.clip, PointClip)]
     return figures or list(scene.actors)
 
 
 def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) -> list[Actor]:
-    """Return the actors whose motion, or pose as a motion of one frame, is written.
+    """Return the actors whose motion is written, or whose pose is, as a motion of one frame.
 
-    Raises RigError if there is neither.
+    Raises RigError if there are none.
     """
     if asks_one_pose(arguments, output, scene):
         return posed_actors(scene)
@@ -275,12 +276,12 @@ def moving_actors(scene: Scene) -> list[Actor]:
     moving = [actor for actor in scene.actors if actor.clip is not None]
     bodies = [actor for actor in moving if not isinstance(actor.clip, PointClip)]
     if not moving:
-        raise RigError("no file moves anything: a motion cannot be written")
+        raise RigError("no file has a motion: a motion cannot be written")
     return bodies or moving
 
 
 def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
-    """Return the exporter asked for, or the first that suits the suffix and the figures."""
+    """Return the requested exporter, or the first one for the suffix and the figures."""
     found, actors = motion_exporters(output), written_actors(arguments, output, scene)
     if isinstance(actors[0].clip, PointClip):
         if _OF_POINTS not in found or arguments.kind not in (None, _OF_POINTS):
@@ -295,7 +296,7 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
 
 
 def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
-    """Return the range asked for of a motion, from 0: its first frame and the one behind it."""
+    """Return the requested range, counted from 0: its first frame and the one after its last."""
     if arguments.frames is None:
         return None
     found = parse_range(arguments.frames)
@@ -305,7 +306,7 @@ def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | Non
 
 
 def check_kind(arguments: argparse.Namespace, output: Path) -> None:
-    """Refuse a name whose suffix the exporter that is asked for does not write."""
+    """Refuse a file name whose suffix the requested exporter does not write."""
     if arguments.kind is None:
         return
     known, suffix = EXPORTERS[arguments.kind].suffixes, output.suffix.lower() or "/"
@@ -317,29 +318,29 @@ def check_kind(arguments: argparse.Namespace, output: Path) -> None:
 
 
 def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
-    """Hold the name of numbered files to what can be numbered.
+    """Check the name of numbered files.
 
-    Raises ViewerError if the format holds a whole motion, or the names would all be the same.
+    Raises ViewerError if one file holds the whole motion, or all names would be the same.
     """
     suffix = output.suffix.lower()
     if "{frame" not in output.name and not (arguments.frames and suffix in _ONE_A_FRAME):
         return
     if suffix not in _ONE_A_FRAME:
         raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected {', '.join(_ONE_A_FRAME)} for one file a frame, "
+            f"{printable(output, 300)}: expected {', '.join(_ONE_A_FRAME)} for one file per frame, "
             f"found {suffix or 'a folder'}"
         )
     check_frame_field(output)
 
 
 def check_frame_field(output: Path) -> None:
-    """Refuse names of numbered files that would all be the same, or that cannot be formed."""
+    """Refuse a name of numbered files without a valid frame field."""
     try:
         first, second = (output.name.format(frame=frame) for frame in (0, 1))
     except (ValueError, KeyError, IndexError, AttributeError):
         first = second = ""
     if first == second:
         raise ViewerError(
-            f"{printable(output, 300)}: expected a name with {{frame}}, as in walk_{{frame:05}}"
-            f"{output.suffix}, for one file a frame"
+            f"{printable(output, 300)}: expected a name with {{frame}}, such as walk_{{frame:05}}"
+            f"{output.suffix}, for one file per frame"
         )

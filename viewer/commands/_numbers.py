@@ -1,4 +1,4 @@
-"""Numbers on the command line."""
+"""Parsing of numbers on the command line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 
 
 def number(text: str) -> float:
-    """Return a finite number; argparse words the refusal."""
+    """Return a finite number; argparse prefixes the error with the option."""
     value = float(text)
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"expected a finite number, found {text}")

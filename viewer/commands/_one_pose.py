@@ -1,4 +1,4 @@
-"""One pose in formats that hold motions: when it is asked for, and what its frame is called."""
+"""Export of one pose to motion formats: when it is requested, and its frame number."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def check_frame_options(arguments: argparse.Namespace) -> None:
 
 
 def asks_one_pose(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
-    """Return whether one pose of joints is to be written: at a frame or time, or nothing moves."""
+    """Return whether one pose of joints is written: at a frame or time, or without motion."""
     if arguments.frames is not None or all(actor.pose is None for actor in scene.actors):
         return False
     is_still = not _moving(scene) and "{frame" not in output.name
@@ -36,16 +36,16 @@ def asks_one_pose(arguments: argparse.Namespace, output: Path, scene: Scene) -> 
 
 
 def posed_actors(scene: Scene) -> list[Actor]:
-    """Return the actors whose pose is written: those that move, or all that can if none does."""
+    """Return the actors whose pose is written: those with a motion, else all with a skeleton."""
     return _moving(scene) or [actor for actor in scene.actors if actor.pose is not None]
 
 
 def animation_of_pose(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
 ) -> tuple[SampledAnimation, str]:
-    """Return an actor's current pose as an animation, and its up axis, as an exporter wants it.
+    """Return an actor's current pose as a sampled animation, and its up axis, for an exporter.
 
-    The frame is called as ``--frame`` counts; between two frames it is the one that is shown.
+    The frame has the number that ``--frame`` uses; between two frames it is the one displayed.
     """
     frames = numbering_of(scene.actors, arguments.fps)
     time = frames.start if scene.time is None else scene.time
@@ -55,12 +55,12 @@ def animation_of_pose(
 
 
 def pose_line(arguments: argparse.Namespace) -> str:
-    """Return the line that says why there is only one frame."""
+    """Return the message that explains why there is only one frame."""
     if arguments.frame is not None:
         return f"one frame: the pose at frame {arguments.frame}"
     if arguments.time is not None:
         return f"one frame: the pose at {number_text(arguments.time)} s"
-    return "one frame: nothing moves, so the present pose was written"
+    return "one frame: nothing moves, so the current pose was written"
 
 
 def _at_one_time(arguments: argparse.Namespace) -> bool:

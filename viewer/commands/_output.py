@@ -1,4 +1,4 @@
-"""Where results go: suffixes, and what must never be replaced."""
+"""Output files: their suffixes, and the input files that must never be replaced."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from viewer.models import resolve
 from viewer.rig.scene import Scene
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
-"""Suffixes of pictures that can be written."""
+"""Suffixes of writable picture formats."""
 
 
 def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list[Path]:
-    """Return all files that are read: those that are named, and what reading them led to.
+    """Return all files that are read: the named ones, and those they refer to.
 
     ``arguments``: of a command that opens a scene.
-    ``scene``: what was opened; before that, only the names are known.
+    ``scene``: the opened scene; without it only the named files are returned.
     """
     model = [] if arguments.model is None else [resolve(arguments.model)]
     named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *model)]

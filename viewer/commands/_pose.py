@@ -1,4 +1,4 @@
-"""Options that shape and pose what was opened; shared by the commands that open files."""
+"""Options that shape and pose a scene, shared by the commands that open files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
 
-_FIGURE = "figure."  # label of the DOFs that a figure has as a whole
+_FIGURE = "figure."  # label of the DOFs of a figure as a whole
 
 
 def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,13 +39,13 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--pose",
         metavar="FILE|A,B,…",
-        help="a pose file (.json, .npz, .txt), or the model's own numbers",
+        help="a pose file (.json, .npz, .txt), or the numbers of the model's pose vector",
     )
     group.add_argument(
         "--shape",
         metavar="A,B,…|NAME=A,…",
-        help="shape coefficients (betas) of a body model, or weights of morphs, 1 for a target "
-        "reached; all from the first on, or some by name, as open=0.5,wide=1",
+        help="shape coefficients (betas) of a body model, or weights of morphs (1: the "
+        "full target); a list from the first on, or some by name, such as open=0.5,wide=1",
     )
     group.add_argument(
         "--expression", metavar="A,B,…", help="expression coefficients of a body model"
@@ -63,7 +63,7 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that choose how joints move the mesh."""
+    """Add the options of skinning."""
     group = parser.add_argument_group("skinning")
     group.add_argument(
         "--method",
@@ -78,23 +78,23 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
         type=number,
         default=0.5,
         metavar="F",
-        help="of --method mix: 0 for LBS alone, 1 for DQS alone (default: 0.5)",
+        help="blend factor of dual quaternions with --method mix, 0 to 1 (default: 0.5)",
     )
     group.add_argument(
         "--influences",
         type=int,
         default=0,
         metavar="N",
-        help="only each vertex's N strongest (default: all)",
+        help="use only each vertex's N strongest influences (default: all)",
     )
     group.add_argument(
-        "--normalize", action="store_true", help="scale each vertex's weights to a sum of 1"
+        "--normalize", action="store_true", help="normalise each vertex's weights to a sum of 1"
     )
     group.add_argument("--no-correctives", action="store_true", help="leave out pose correctives")
 
 
 def skinning_of(arguments: argparse.Namespace) -> Skinning:
-    """Return how joints are asked to move the mesh."""
+    """Return the requested skinning."""
     if not 0.0 <= arguments.blend_factor <= 1.0:
         raise ViewerError(f"--blend-factor: expected 0 to 1, found {arguments.blend_factor:g}")
     if arguments.influences < 0:
@@ -109,10 +109,10 @@ def skinning_of(arguments: argparse.Namespace) -> Skinning:
 
 
 def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:
-    """Shape and pose a scene as asked.
+    """Shape and pose a scene as requested.
 
-    Returns: what could not be taken over exactly, one line each.
-    Raises ViewerError if an option makes no sense for what was opened.
+    Returns: messages about what could not be applied exactly.
+    Raises ViewerError if an option does not apply to the scene.
     """
     apply_time(scene, arguments)
     notes: list[str | Diagnostic] = []
@@ -122,7 +122,7 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagno
         record, source = _pose(arguments.pose)
         notes += [] if source is None else source.diagnostics.warnings
         notes += _apply_record("--pose", record, scene, source)
-    # What is asked for here counts more than what a pose file says.
+    # Options take precedence over a pose file.
     if arguments.shape is not None:
         notes += _apply_shape(scene, arguments.shape)
     expression = _numbers("--expression", arguments.expression)
@@ -135,16 +135,16 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagno
 
 
 def pose_files(arguments: argparse.Namespace) -> list[str]:
-    """Return the pose file that is asked for: an input that must not be written over."""
+    """Return the requested pose file: an input that must not be overwritten."""
     return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
 
 
 def _pose(text: str) -> tuple[PoseRecord, Source | None]:
-    """Return the pose that a file or the numbers themselves hold, and the file."""
+    """Return the pose given as numbers or read from a file, and the file."""
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
-    # A list of people begins as any list does: here it is a pose that is no object.
+    # A JSON list is detected as people; read as a pose, it is refused for being no object.
     is_list = not source.is_folder and detect(source) == "easymocap"
     record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):
@@ -159,7 +159,7 @@ def _is_numbers(text: str) -> bool:
 def _numbers(option: str, text: str | None) -> Floats | None:
     if text is None:
         return None
-    # A comma at the end is forgiven; two in a row would shift what follows.
+    # A trailing comma is accepted; two in a row would shift the following numbers.
     words = re.split(r"\s*,\s*|\s+", text.strip().removesuffix(",").rstrip())
     try:
         return np.array([number(word) for word in words])
@@ -172,7 +172,7 @@ def _numbers(option: str, text: str | None) -> Floats | None:
 def _apply_record(
     option: str, record: PoseRecord, scene: Scene, source: Source | None = None
 ) -> list[Diagnostic]:
-    """Apply a record, which may be from a file, to the first actor that takes it."""
+    """Apply a record, possibly from a file, to the first actor that accepts it."""
     problem: RigError | None = None
     for actor in scene.actors:
         if actor.pose is not None:
@@ -186,7 +186,7 @@ def _apply_record(
 
 
 def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
-    """Set shapes by name, or all from the first on; figures without shapes may have morphs."""
+    """Set shape weights by name or from the first on; figures without shapes may have morphs."""
     if is_named(text):
         actor, record = named_record(scene, text)
         return apply_record(record, actor.figure, actor.require_pose())
@@ -227,8 +227,8 @@ def _mirror(scene: Scene) -> None:
 def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
     """Set DOFs given as ``NAME.X=VALUE``, on the first actor that has such a joint.
 
-    Returns: what was clamped, and which of several figures was posed.
-    Raises ViewerError if the text, the joint or the value is wrong.
+    Returns: messages about clamped values, and about which of several figures was posed.
+    Raises ViewerError if the text, the joint or the value is invalid.
     """
     notes: list[str] = []
     for setting in settings:
@@ -259,7 +259,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
 
 
 def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
-    """Move or scale the first posed figure as a whole; return whether the label says so."""
+    """Move or scale the first posed figure as a whole; return whether the label asks for it."""
     part = label[len(_FIGURE) :].lower()
     actor = next((actor for actor in scene.actors if actor.pose is not None), None)
     if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:
@@ -289,13 +289,13 @@ def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
                 joint = label.rpartition(".")[0]
                 near += [error] if near_names(joint, joint_labels(skeleton)) else []
     if not found:
-        # Of several figures the one is spoken of that has such a joint, or nearly.
+        # Of several figures, report the one with the nearest joint name.
         problem = next(iter([*near, *problems]), "no file has a skeleton")
         raise ViewerError(f"--dof: {problem}")
     note = []
     if len(found) > 1:
         first = printable(found[0][0].figure.name)
-        note = [f"{len(found)} figures have {label}; the first, {first}, is posed"]
+        note = [f"{len(found)} figures have {label}; the first one, {first}, is posed"]
     return (*found[0], note)
 
 

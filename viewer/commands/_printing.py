@@ -1,4 +1,4 @@
-"""Tables and coloured lines of commands; colours appear at a terminal alone."""
+"""Tables and coloured lines; colours appear only in a terminal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TextIO
 def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> None:
     """Print one line.
 
-    ``*parts``: texts one behind the other, some with a style as rich has it, such as ``"red"``.
-    ``file``: standard output if omitted. Where it is no terminal, it gets the plain text.
+    ``*parts``: consecutive texts, some with a rich style such as ``"red"``.
+    ``file``: standard output if omitted; plain text if it is not a terminal.
     """
     stream = sys.stdout if file is None else file
     if stream is None or not stream.isatty():
@@ -25,10 +25,10 @@ def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> Non
 
 
 def table_lines(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> list[str]:
-    """Lay out cells in columns as wide as they need.
+    """Lay out cells in columns as wide as their contents.
 
-    ``rows``: all of one length.
-    ``right``: columns whose cells stand at their right.
+    ``rows``: all of the same length.
+    ``right``: columns that are right-aligned.
 
     >>> table_lines([["", "joints"], ["walk", "0.5"]], right=[1])
     ['      joints', 'walk     0.5']
@@ -42,7 +42,7 @@ def table_lines(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> l
         table.add_column(justify="right" if column in right else "left", no_wrap=True)
     for row in rows:
         table.add_row(*map(Text, row))
-    # Wide enough for any row, so that nothing is cut.
+    # Wide enough for any row, so that nothing is truncated.
     width = sum(max(len(cell) for cell in column) * 2 + 2 for column in zip(*rows, strict=True))
     text = StringIO()
     Console(file=text, width=width + 1, color_system=None, legacy_windows=False).print(table)

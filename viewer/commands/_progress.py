@@ -1,4 +1,4 @@
-"""Progress bars at a terminal, for work that takes longer than a second."""
+"""Progress bars in a terminal, for work that takes longer than a second."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from viewer.errors import printable
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-_FIRST, _EVERY = 0.7, 0.2  # seconds before the bar appears, and between its changes
+_FIRST, _EVERY = 0.7, 0.2  # seconds before the bar appears, and between updates
 
 
 class Progress:
-    """Shows how far something is; silent where nobody looks, and when it is quick.
+    """Progress bar; silent without a terminal and for quick work.
 
-    ``title``: what is being done.
-    ``total``: how many steps there are.
+    ``title``: name of the work.
+    ``total``: number of steps.
     """
 
     def __init__(self, title: str, total: int) -> None:
@@ -27,7 +27,7 @@ class Progress:
         self._bar: Bar | None = None
 
     def show(self, done: int) -> None:
-        """Tell that so many steps are done."""
+        """Update the bar to a number of completed steps."""
         now = time.monotonic()
         if now < self._due or not sys.stderr.isatty() or done <= 0:
             return
@@ -49,7 +49,7 @@ class Progress:
 
 
 def _bar() -> Bar:
-    """Return a bar that nothing but ``show`` redraws: no thread, and no stream is replaced."""
+    """Return a bar that only ``show`` redraws: without a thread or redirected streams."""
     from rich import progress
     from rich.console import Console
 

@@ -1,4 +1,4 @@
-"""Options of scalar quantities: which number is shown, over which range, with what beside it."""
+"""Options of scalar quantities: which one is shown, its range, isolines and legend."""
 
 from __future__ import annotations
 
@@ -34,29 +34,29 @@ _WHOLE = ("discrete", "categorical")
 
 
 def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
-    """Add the options that show numbers as colours."""
+    """Add the options of scalar quantities."""
     group.add_argument(
         "--scalar",
-        type=_view_name,
+        type=_quantity_name,
         metavar="NAME[:JOINT]",
-        help=f"show a number of each vertex as a colour: weight:JOINT, {', '.join([*SCALARS][1:])}",
+        help=f"show a scalar quantity as colours: weight:JOINT, {', '.join([*SCALARS][1:])}",
     )
     group.add_argument(
         "--scalar-range",
         metavar="A:B",
-        help="what the ends of the colours stand for, in the legend's unit (default: all that "
-        "there is); write --scalar-range=-20:20 if A is below 0",
+        help="range of the colour map, in the legend's unit (default: that of the values); write "
+        "--scalar-range=-20:20 if A is below 0",
     )
     group.add_argument(
         "--isolines",
         action=argparse.BooleanOptionalAction,
         help="lines at every tenth of the range (default: for weights)",
     )
-    group.add_argument("--legend", action="store_true", help="say in the picture what colours mean")
+    group.add_argument("--legend", action="store_true", help="draw a legend of the colours")
 
 
-def _view_name(text: str) -> str:
-    """Return the name of a scalar quantity; argparse words the refusal."""
+def _quantity_name(text: str) -> str:
+    """Return the name of a scalar quantity; argparse prefixes the error with the option."""
     try:
         split_name(text)
     except RigError as problem:
@@ -65,22 +65,21 @@ def _view_name(text: str) -> str:
 
 
 def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
-    """Set what is asked for of a scalar quantity.
+    """Set the requested options of a scalar quantity.
 
-    Raises ViewerError if options need a view and there is none, or a range makes no sense.
+    Raises ViewerError if options need a scalar quantity and none is given, or the range is
+    invalid.
     """
     if arguments.scalar:
         options.shading, options.scalar = "scalar", arguments.scalar
     for name in ("legend", "scalar_range", "isolines"):
         if getattr(arguments, name) not in (None, False) and options.shading != "scalar":
             option = f"--{name.replace('_', '-')}"
-            raise ViewerError(f"{option}: expected --scalar NAME, whose colours it is about")
+            raise ViewerError(f"{option}: expected --scalar NAME, to which it applies")
     options.legend, options.isolines = arguments.legend, arguments.isolines
     if arguments.scalar_range is not None:
         if find_quantity(options.scalar).kind in _WHOLE:
-            raise ViewerError(
-                f"--scalar-range: {options.scalar} has a colour for each whole number"
-            )
+            raise ViewerError(f"--scalar-range: {options.scalar} has one colour per integer")
         options.scalar_range = _parse_range(arguments.scalar_range)
 
 
@@ -99,9 +98,9 @@ def _parse_range(text: str) -> tuple[float, float]:
 
 
 def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Choose a joint or field for a view that names none; return one line about a joint.
+    """Choose a joint or field for a quantity that names none; return a message about the joint.
 
-    That is the joint with the most influence, or the first field that is not 0 everywhere.
+    The choice is the joint with the most influence, or the first field that is not 0 everywhere.
     """
     key, about = split_name(options.scalar)
     if options.shading != "scalar" or about:
@@ -114,10 +113,10 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return one line if no figure has what a scalar quantity shows.
+    """Return a message if no figure has the data of the scalar quantity.
 
-    Raises ViewerError if the view is about a joint or field that no figure has; the message has
-      near names.
+    Raises ViewerError if the quantity names a joint or field that no figure has; the message
+      suggests similar names.
     """
     if options.shading != "scalar" or not scene.actors:
         return []
@@ -135,7 +134,7 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def _refuse_name(figures: list[Figure], name: str) -> None:
-    """Raise if a view is about a joint or field that no figure has, though some have others."""
+    """Raise if a quantity names a joint or field that no figure has, though some have others."""
     key, about = split_name(name)
     option = f"--scalar {printable(name, 60)}"
     problems, known = [], []
@@ -148,7 +147,7 @@ def _refuse_name(figures: list[Figure], name: str) -> None:
                 labels = () if figure.skeleton is None else joint_labels(figure.skeleton)
                 problems.append((not near_names(about, labels), str(problem)))
     if problems:
-        # Of several figures the one is spoken of that has such a joint, or nearly.
+        # Of several figures, report the one with the nearest joint name.
         raise ViewerError(f"{option}: {min(problems, key=lambda pair: pair[0])[1]}")
     if SCALARS[key].about == "field" and known:
         hint = name_hint(about, known)
@@ -156,7 +155,7 @@ def _refuse_name(figures: list[Figure], name: str) -> None:
 
 
 def scalar_text(scene: Scene, options: DisplayOptions) -> str:
-    """Return what the numbers shown are, for the line that names the picture."""
+    """Return the name and range of the displayed numbers, for the line about the picture."""
     if options.shading != "scalar" or options.show == "skeleton":
         return ""
     name, view = options.scalar, find_quantity(options.scalar)
@@ -182,6 +181,6 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
 
 
 def _n_different(name: str, scene: Scene, values: list[Floats]) -> str:
-    """Return how many joints or parts are seen, of how many: ``"22 of 24"``."""
+    """Return how many joints or parts are visible, of how many: ``"22 of 24"``."""
     found = len(np.unique(np.concatenate([numbers[numbers >= 0] for numbers in values])))
     return f"{found} of {max(len(categories(name, actor.figure)) for actor in scene.actors)}"

@@ -1,4 +1,4 @@
-"""Options that say what is opened and how it is posed; shared by the commands that open files."""
+"""Options that choose the files to open and their pose, shared by several commands."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
-"""Keypoint layouts that share their number of points with another."""
+"""Keypoint layouts with the same number of points as another one."""
 
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # names in a message
@@ -35,7 +35,7 @@ _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
 def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
-    """Add FILES and the options that pose what they hold; see ``add_file_arguments``."""
+    """Add FILES and the options that pose them; see ``add_file_arguments``."""
     add_file_arguments(parser, default)
     add_capture_arguments(parser)
     add_frame_arguments(parser)
@@ -43,10 +43,10 @@ def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT
 
 
 def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
-    """Add FILES and the options that say where they are.
+    """Add FILES and the options that locate them.
 
     ``parser``: of a command.
-    ``default``: what is opened without files, for the help; empty if that is refused.
+    ``default``: name of the default without files, for the help; empty if files are required.
     """
     group = parser.add_argument_group("files")
     group.add_argument(
@@ -54,13 +54,11 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         nargs="*",
         metavar="FILES",
         help=f"files ({', '.join(SUFFIXES)}), folders of PIG or EasyMocap, names of body models in "
-        "the model folder, as smplx:neutral, a texture picture; see viewer help formats"
+        "the model folder, such as smplx:neutral, a texture image; see viewer help formats"
         f"{f' (default: {default})' if default else ''}",
     )
-    group.add_argument("--body", action="store_true", help="open the bundled human body too")
-    group.add_argument(
-        "--model-path", metavar="FOLDER", help="where body models are; remembered from then on"
-    )
+    group.add_argument("--body", action="store_true", help="also open the bundled human body")
+    group.add_argument("--model-path", metavar="FOLDER", help="folder of body models; remembered")
     group.add_argument(
         "--max-size",
         default="2G",
@@ -70,38 +68,40 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
 
 
 def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say how captures and BVH are taken."""
+    """Add the options that control how captures and BVH are read."""
     group = parser.add_argument_group("captures and BVH")
     group.add_argument(
         "--model",
         metavar="FIGURE",
-        help="draw captured bodies with this model, and let BVH drive it (default: one among "
-        "FILES, for captured bodies else the bundled one)",
+        help="body model for captured bodies, or driven by BVH (default: one among FILES, else "
+        "the bundled one for captured bodies)",
     )
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="the axis that points up in captures and BVH"
     )
-    group.add_argument("--unit", choices=METRES, help="unit of lengths in BVH (default: judged)")
+    group.add_argument("--unit", choices=METRES, help="unit of lengths in BVH (default: estimated)")
     group.add_argument(
         "--layout",
         choices=LAYOUTS,
-        help="what captured keypoints are where their number leaves a choice",
+        help="layout of captured keypoints, if their number is ambiguous",
     )
     group.add_argument(
         "--legacy-expression",
         action="store_true",
-        help="expressions drive SMPL-X columns 10 to 19, as EasyMocap has it",
+        help="apply expressions to SMPL-X columns 10 to 19, as EasyMocap does",
     )
     group.add_argument(
-        "--beside", action="store_true", help="a BVH stands beside figures instead of driving one"
+        "--beside",
+        action="store_true",
+        help="show a BVH next to the figures instead of driving one",
     )
     group.add_argument(
-        "--fill-gaps", action="store_true", help="show captures in their gaps too, in between"
+        "--fill-gaps", action="store_true", help="interpolate over the gaps of captures"
     )
 
 
 def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
-    """Return how motions are asked to be taken."""
+    """Return the requested options of reading motions."""
     model = None if arguments.model is None else resolve(arguments.model)
     return MotionSettings(
         model=None if model is None else Path(model),
@@ -116,7 +116,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
 
 
 def size_limit(arguments: argparse.Namespace) -> int:
-    """Return the size, in bytes, above which files are refused."""
+    """Return the file size limit in bytes."""
     return _parse_bytes(arguments.max_size)
 
 
@@ -128,7 +128,7 @@ def _parse_bytes(text: str) -> int:
 
 
 def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
-    """Return what is opened: the files as given or found by name, and the bundled body."""
+    """Return the files to open: as given or found by name, and the bundled body."""
     files: list[str | Path] = [resolve(file) for file in arguments.files]
     if arguments.body:
         files.append(bundled_body())
@@ -136,7 +136,7 @@ def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
 
 
 def open_scene(arguments: argparse.Namespace) -> Scene:
-    """Load the files whole, print what their readers noticed, and pose them as asked."""
+    """Load the files completely, print their readers' warnings, and pose them as requested."""
     scene, builders = begin_scene(arguments)
     for builder in builders:
         finish(builder, scene)
@@ -145,7 +145,7 @@ def open_scene(arguments: argparse.Namespace) -> Scene:
 
 
 def finish(builder: Builder, scene: Scene) -> None:
-    """Read a capture to its end, with progress at a terminal, and print what was noticed."""
+    """Read a capture to its end, with a progress bar in a terminal, and print warnings."""
     notes: list[Diagnostic] = []
     with Progress(f"reading {builder.capture.name}", builder.capture.n_frames) as progress:
         while not builder.is_done:
@@ -153,12 +153,12 @@ def finish(builder: Builder, scene: Scene) -> None:
             scene.actors += new
             notes += said
             progress.show(builder.n_read)
-    scene.diagnostics = (*scene.diagnostics, *notes)  # the window and its pictures show them too
+    scene.diagnostics = (*scene.diagnostics, *notes)  # shown in the window too
     print_warnings(notes)
 
 
 def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
-    """Load what is needed for a first picture, and print what was noticed; not posed yet."""
+    """Load what is needed for a first picture, not posed yet, and print warnings."""
     if arguments.model_path is not None:
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)
@@ -175,7 +175,7 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
 
 
 def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
-    """Name the models that can be opened by name, if it was a name that was not found."""
+    """Add the names of available models, if the problem is an unknown name."""
     folder = load_model_folder()
     missing = [file for file in files if Path(file) == problem.path and not problem.path.exists()]
     if not missing or folder is None or len(problem.path.parts) != 1:
@@ -188,17 +188,17 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
 
 
 def _announce(files: Sequence[str | Path]) -> None:
-    """Tell a person at a terminal about reading that takes longer than a second."""
+    """Print a message in a terminal about files that take longer than a second to read."""
     if not sys.stderr.isatty():
         return
     for file in files:
-        with contextlib.suppress(OSError, ValueError):  # the reader will say what is wrong
+        with contextlib.suppress(OSError, ValueError):  # reported by the reader
             size = Path(file).stat().st_size
             if size > _SLOW_BYTES:
                 print(f"reading {printable(file)} ({size / 1e6:.0f} MB) …", file=sys.stderr)
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
-    """Print one line each to the error stream."""
+    """Print one line per warning to the error stream."""
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""``viewer render`` of more than one frame: numbered pictures, videos, contact sheets."""
+"""Numbered pictures, videos and contact sheets of ``viewer render``."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ _MOST_CELLS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for, checked as far as it can be before anything is opened.
+    """Requested output, checked as far as possible before anything is opened.
 
     Attributes
     ----------
     kind : "pictures", "video" or "sheet"
-        One file each, one file that moves, or one picture of all.
+        One file per frame, one video file, or one picture of all frames.
     output : Path
-        As given, with ``{frame}`` for pictures.
+        As given; includes ``{frame}`` for pictures.
     range : Range or None
-        Which frames; None for the whole motion.
+        Range of frames; None for the whole motion.
     turntable : Turntable or None
-        How the camera turns.
+        Rotation of the camera; None if it does not rotate.
     is_certain : bool
-        False for a GIF that is a still picture if nothing moves.
+        False for a GIF, which is a still picture if nothing moves.
     """
 
     kind: str
@@ -59,40 +59,45 @@ class Request:
 
 
 def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of pictures in motion."""
+    """Add the options of videos, numbered pictures and contact sheets."""
     group = parser.add_argument_group("videos, numbered pictures, contact sheets")
     group.add_argument(
         "--turntable",
         nargs="?",
         const="",
         metavar="SECONDS|DEGREESdeg",
-        help="turn the camera once around, in so many seconds, or by so many degrees",
+        help="rotate the camera once, in the given seconds, or by the given degrees",
     )
     group.add_argument(
         "--contact-sheet",
         type=int,
         metavar="N",
-        help="one picture of N frames spread over the motion, numbered",
+        help="one picture of N numbered frames, evenly spaced over the motion",
     )
     group.add_argument(
-        "--speed", type=number, metavar="S", help="of videos: 0.5 is half as fast, -1 backwards"
+        "--speed",
+        type=number,
+        metavar="S",
+        help="playback speed of videos: 0.5 is half as fast, -1 backwards",
     )
     group.add_argument(
         "--follow",
         metavar="NAME",
-        help="the camera goes with an actor or joint: fox, head, or fox/head; of captured people, "
-        "by their numbers, 1 or 1:pelvis",
+        help="follow an actor or joint with the camera: fox, head, or fox/head; captured people "
+        "by number: 1 or 1:pelvis",
     )
     group.add_argument(
-        "--quality", type=number, metavar="Q", help="of .mp4 and .webm: 0 to 100 (default 75)"
+        "--quality",
+        type=number,
+        metavar="Q",
+        help="quality of .mp4 and .webm: 0 to 100 (default: 75)",
     )
 
 
 def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
-    """Return what is asked for if it is more than one still picture.
+    """Return the requested output if it is more than one still picture.
 
-    Raises ViewerError if options do not go together, or the name of numbered pictures has no
-      number.
+    Raises ViewerError if options conflict, or the name of numbered pictures has no frame field.
     """
     frames = None if arguments.frames is None else parse_range(arguments.frames)
     turntable = None if arguments.turntable is None else parse_turntable(arguments.turntable)
@@ -107,7 +112,7 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
 
 
 def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
-    """Return what a name and options stand for, and whether it is certain; "" for a still."""
+    """Return the kind of output, and whether it is certain; "" for a still picture."""
     asks = arguments.frames is not None or arguments.turntable is not None
     if arguments.contact_sheet is not None:
         return "sheet", True
@@ -124,7 +129,7 @@ def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
 
 def _check_options(arguments: argparse.Namespace, kind: str) -> None:
     if kind and arguments.panels:
-        raise ViewerError("--panels: draws one picture; videos and sequences have no panels")
+        raise ViewerError("--panels: applies to one picture only, not to videos or sequences")
     if arguments.frames is not None:
         for option in ("frame", "time"):
             if getattr(arguments, option) is not None:
@@ -133,9 +138,9 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
         raise ViewerError("--follow: expected a video, contact sheet or numbered pictures")
     for option in ("speed", "quality"):
         if getattr(arguments, option) is not None and kind != "video":
-            raise ViewerError(f"--{option}: only videos have one: {', '.join(VIDEOS)}")
+            raise ViewerError(f"--{option}: applies to videos only: {', '.join(VIDEOS)}")
     if arguments.quality is not None and Path(arguments.output).suffix.lower() == ".gif":
-        raise ViewerError("--quality: a GIF has one quality; .mp4 and .webm have more")
+        raise ViewerError("--quality: applies to .mp4 and .webm, not to a GIF")
     speed = arguments.speed
     if speed is not None and not 1e-3 <= abs(speed) <= 1e3:
         raise ViewerError(f"--speed: expected 0.001 to 1000 or their negatives, found {speed:g}")
@@ -143,11 +148,13 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
     if cells is not None and not 1 <= cells <= _MOST_CELLS:
         raise ViewerError(f"--contact-sheet: expected 1 to {_MOST_CELLS} frames, found {cells}")
     if kind == "sheet" and Path(arguments.output).suffix.lower() in (".mp4", ".webm"):
-        raise ViewerError("--contact-sheet: is a picture, as .png; found the name of a video")
+        raise ViewerError(
+            "--contact-sheet: expected the name of a picture, such as .png, found a video"
+        )
 
 
 def _check_name(name: str) -> None:
-    """Hold the name of numbered pictures to one kind of field: ``{frame}``, ``{frame:05}``."""
+    """Check the frame field of a name: ``{frame}`` or ``{frame:05}``."""
     try:
         fields = [part for part in string.Formatter().parse(name) if part[1] is not None]
     except ValueError:
@@ -158,7 +165,7 @@ def _check_name(name: str) -> None:
     )
     if not is_good:
         raise ViewerError(
-            "--output: expected {frame} or {frame:05} in the name of numbered pictures, as "
+            "--output: expected {frame} or {frame:05} in the name of numbered pictures, as in "
             f'frame_{{frame:05}}.png, found "{printable(name)}"'
         )
 
@@ -168,8 +175,8 @@ def _check_picture(output: Path) -> None:
     suffix = output.suffix.lower()
     if suffix in VIDEOS and suffix not in PICTURES:
         raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) for one file a "
-            f"frame, found {suffix}"
+            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) for one file "
+            f"per frame, found {suffix}"
         )
 
 
@@ -180,11 +187,10 @@ def draw_sequence(
     options: DisplayOptions,
     size: tuple[int, int],
 ) -> str:
-    """Draw and write all frames; return the line that says what is where.
+    """Draw and write all frames; return a line about the written files.
 
-    Raises ViewerError if nothing moves, options make no sense for what was opened, or drawing
-      fails.
-    Raises OutputError if a file is there already, or cannot be written.
+    Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
+    Raises OutputError if a file exists already, or cannot be written.
     """
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
@@ -204,11 +210,13 @@ def draw_sequence(
             cells = f"cells of a contact sheet of {size[0]} x {size[1]} pixels"
             check_size(offscreen.context, frame_size, cells)
         steps = record(recording, offscreen.renderer, sink)
-        # Closed while the context is still there, whatever happens.
+        # Closed while the context still exists, even after an error.
         with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
             for progress in steps:
                 line.show(progress.done)
-                if progress.done < progress.total:  # afterwards the sink may be done any moment
+                if (
+                    progress.done < progress.total
+                ):  # afterwards the file may be complete at any moment
                     poll()
         print_warnings(offscreen.renderer.notes)
     return _summary(request, shots, outputs, frame_size, sink)
@@ -249,7 +257,7 @@ def _recording(
     options: DisplayOptions,
     size: tuple[int, int],
 ) -> Recording:
-    """Return what is recorded, its camera fitted to the whole motion."""
+    """Return the recording, its camera framing the whole motion."""
     from viewer.rendering.camera import Camera
     from viewer.rendering.framing import find_follow, fit_turning, frame_motion
     from viewer.rendering.recorder import Recording
@@ -273,23 +281,23 @@ def _recording(
 
 
 def _follow_notes(scene: Scene, arguments: argparse.Namespace) -> list[str]:
-    """Say whom the camera follows where a name may mean several."""
+    """Return a message about the followed actor if a name is ambiguous."""
     from viewer.rendering.framing import follow_candidates
 
     name = arguments.follow
     actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
-    # A person's body and keypoints are the same.
+    # A person's body and keypoints count as one.
     others = [
         actor for actor in actors[1:] if actor.person is None or actor.person != actors[0].person
     ]
     if not others:
         return []
-    # Whoever has no number stands for himself.
+    # Actors without a number are all different.
     count = len({-1 - i if a.person is None else a.person for i, a in enumerate(actors)})
     person = others[0].person
     how = "" if person is None else f" (--follow {person}:{printable(name, 60)} follows another)"
     return [
-        f"--follow {printable(name, 60)}: {count} have it; the first, "
+        f"--follow {printable(name, 60)}: {count} match; the first one, "
         f"{printable(actors[0].name, 60)}, is followed{how}"
     ]
 
@@ -306,7 +314,7 @@ def _summary(
     pixels = f"{size[0]} x {size[1]}"
     weight = f"{sink.n_bytes / 1e6:.2f} MB"
     if request.kind == "video":
-        seconds, rate = count / shots.rate, f"{shots.rate:g} frames a second{shots.remark}"
+        seconds, rate = count / shots.rate, f"{shots.rate:g} frames per second{shots.remark}"
         return f"{name}: {frames}, {seconds:.3g} s, {pixels}, {rate}, {weight}"
     if request.kind == "sheet":
         return f"{name}: {frames} of {pixels}, {weight}"

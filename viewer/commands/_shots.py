@@ -1,4 +1,4 @@
-"""Which times of a motion are drawn, and how the camera turns meanwhile."""
+"""Times of a motion to draw, and the camera's rotation meanwhile."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from viewer.commands._sequence import Request
 
 _MOST_FRAMES = 1_000_000
-_TURN_SECONDS = 6.0  # of a turntable of something that does not move
+_TURN_SECONDS = 6.0  # of a turntable of a still scene
 _FULL = 360.0  # degrees
 
 
 @dataclass(frozen=True, slots=True)
 class Turntable:
-    """How far the camera turns, in degrees, and in how many seconds; None for the motion's."""
+    """Rotation of the camera in degrees, and its duration in seconds; None for the motion's."""
 
     degrees: float
     seconds: float | None
@@ -34,26 +34,26 @@ class Turntable:
 
 @dataclass(slots=True, eq=False)
 class Shots:
-    """What is drawn.
+    """Frames to draw.
 
     Attributes
     ----------
     times : (F,)
-        Seconds of the scene's clock.
+        Scene times in seconds.
     numbers : list of F int
-        What the frames are called in file names and contact sheets.
+        Frame numbers in file names and contact sheets.
     rate : float
-        Frames a second of the result.
+        Frames per second of the result.
     moves : bool
-        Whether motions pose the figures.
+        Whether the figures are posed by motions.
     turn : float
-        Degrees that the camera turns over all frames.
+        Rotation of the camera over all frames, in degrees.
     seconds : float
-        How long it takes to see all frames.
+        Duration of all frames.
     remark : str
-        What is to be said of the rate, after it; may be empty.
+        Remark about the frame rate, or an empty string.
     notes : list of str
-        What is not as one might expect.
+        Messages about unexpected results.
     """
 
     times: Floats
@@ -67,7 +67,7 @@ class Shots:
 
 
 def parse_turntable(text: str) -> Turntable:
-    """Return what ``6``, ``6s``, ``90deg`` or nothing stands for.
+    """Parse ``6``, ``6s``, ``90deg`` or an empty text.
 
     >>> parse_turntable(""), parse_turntable("4s"), parse_turntable("-90deg")
     (Turntable(degrees=360.0, seconds=None), Turntable(degrees=360.0, seconds=4.0), \
@@ -87,17 +87,17 @@ Turntable(degrees=-90.0, seconds=None))
 
 
 def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> Shots:
-    """Return what is drawn of a scene.
+    """Return the frames to draw of a scene.
 
-    Raises ViewerError if nothing moves, or there are no or too many frames.
+    Raises ViewerError if nothing moves, or there are no frames or too many.
     """
     is_still = arguments.frame is not None or arguments.time is not None
     moves = not is_still and any(actor.clip is not None for actor in scene.actors)
     if not moves and request.turntable is None:
-        found = "a single frame is asked for" if is_still else "no file is a clip"
-        raise ViewerError(f"nothing moves: {found} (--turntable turns the camera)")
+        found = "a single frame is requested" if is_still else "no file has a motion"
+        raise ViewerError(f"nothing moves: {found} (--turntable rotates the camera)")
     if not moves and request.range is not None:
-        raise ViewerError("--frames: no file is a clip")
+        raise ViewerError("--frames: no file has a motion")
     numbering = numbering_of(scene.actors, arguments.fps)
     rates = _rates(request, arguments, numbering.rate)
     notes = [*rates.notes]
@@ -111,7 +111,7 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
     if request.kind == "sheet":
         places = _spread(places, arguments.contact_sheet, moves)
         notes += _too_few(len(places), arguments.contact_sheet)
-    # What goes round for longer than the motion lasts shows its frames again.
+    # A rotation longer than the motion repeats its frames.
     is_counted = moves and (request.turntable is None or request.turntable.seconds is None)
     first = numbering.first if is_counted else 0
     numbers = np.rint(places).astype(int) if is_counted else np.arange(len(places))
@@ -123,7 +123,7 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
 
 @dataclass(frozen=True, slots=True)
 class _Rates:
-    """Frames a second: of the motion that is played in real time, and of what is drawn."""
+    """Frames per second: of the motion played in real time, and of the drawn frames."""
 
     played: float
     drawn: float
@@ -132,31 +132,31 @@ class _Rates:
 
 
 def _rates(request: Request, arguments: argparse.Namespace, counted: float) -> _Rates:
-    """Return how fast frames follow each other; videos that skip frames keep the motion's pace."""
+    """Return the frame rates; videos that skip frames keep the motion's speed."""
     step = 1 if request.range is None else request.range.step
     skips = step > 1 and request.kind == "video" and arguments.fps is None
-    # A frame is shown as long as those that were skipped would have been.
+    # A frame is also shown for the time of the skipped frames.
     played = counted / step if skips else counted
     is_gif = request.kind == "video" and request.output.suffix.lower() == ".gif"
     drawn = min(played, MOST_GIF_RATE) if is_gif else played
     notes: tuple[str, ...] = ()
     if drawn < played:
         notes = (
-            f"GIFs show at most {drawn:g} frames a second: drawn at {drawn:g}, not {played:g}",
+            f"GIFs show at most {drawn:g} frames per second: drawn at {drawn:g}, not {played:g}",
         )
-    remark = f" (one of {step} frames, at the motion's own pace; --fps sets it)" if skips else ""
+    remark = f" (one of {step} frames, at the motion's own speed; --fps sets it)" if skips else ""
     return _Rates(played, drawn, remark, notes)
 
 
 def _places(
     request: Request, arguments: argparse.Namespace, numbering: Numbering, rates: _Rates
 ) -> tuple[Floats, list[str]]:
-    """Return the frames that are drawn, from 0 at the start, not always whole; and notes."""
+    """Return the frames to draw, counted from 0 at the start, possibly fractional, and messages."""
     start, stop = numbering.span(request.range)
     total, first = numbering.count, numbering.first
     behind = f"frames {first + max(total, start)} to {first + stop - 1}"
-    notes = [f"--frames: {behind} are behind the motion's end"] if stop > total else []
-    # Frames of the motion from one drawn frame to the next.
+    notes = [f"--frames: {behind} are after the motion's end"] if stop > total else []
+    # Step between drawn frames, in frames of the motion.
     step = 1 if request.range is None else request.range.step
     pace = step * (arguments.speed or 1.0) * rates.played / rates.drawn
     length = stop - start
@@ -165,7 +165,7 @@ def _places(
     if seconds is None:
         count = _count(math.floor((length - 1) / abs(pace) + 1e-9) + 1)
         return begin + np.arange(count) * pace, notes
-    # The motion begins again until the camera is all the way round.
+    # The motion loops until the camera has completed its rotation.
     run = begin - start + np.arange(_count(seconds * rates.drawn)) * pace
     return start + np.minimum(np.mod(run, length), length - 1), notes
 
@@ -178,7 +178,7 @@ def _count(frames: float) -> int:
 
 
 def _spread(places: Floats, count: int, moves: bool) -> Floats:
-    """Choose some frames, the first and the last among them."""
+    """Choose evenly spaced frames, including the first and the last."""
     if not moves:
         return np.zeros(count)
     chosen = np.unique(np.rint(np.linspace(0, len(places) - 1, count)).astype(int))
@@ -186,7 +186,7 @@ def _spread(places: Floats, count: int, moves: bool) -> Floats:
 
 
 def _too_few(found: int, wanted: int) -> list[str]:
-    """Say that there are fewer frames than cells; none is shown twice."""
+    """Return a message if there are fewer frames than cells; none is shown twice."""
     if found == wanted:
         return []
     frames = "is 1 frame" if found == 1 else f"are {found} frames"
@@ -194,7 +194,7 @@ def _too_few(found: int, wanted: int) -> list[str]:
 
 
 def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:
-    """Return which options shape or pose figures that the motion then shapes or poses anew."""
+    """Return messages about shape and pose options that the motion overrides."""
     from viewer.rig.motion.sampled_clip import SampledClip
 
     names = ["pose", "dof", "mirror"]
@@ -202,4 +202,4 @@ def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     if any(clip.shape_weights is not None for clip in clips):
         names += ["shape", "expression"]
     given = [name for name in names if getattr(arguments, name)]
-    return [f"--{name}: only figures without a motion keep it" for name in given]
+    return [f"--{name}: applies only to figures without a motion" for name in given]

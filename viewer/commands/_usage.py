@@ -1,4 +1,4 @@
-"""Usage errors: one line each, unknown names first and with the nearest one that exists."""
+"""Usage errors: one line each, unknown names first and with the nearest known name."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 _NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
-_WORD = re.compile(r"[^\W\d_]+")  # as commands are; files mostly have a suffix or a folder
+_WORD = re.compile(r"[^\W\d_]+")  # like a command; files mostly have a suffix or a folder
 _LONGEST = 60  # letters of a word in a message
 
 
 class Parser(argparse.ArgumentParser):
-    """Reports a usage error in one line, like every other error."""
+    """Argument parser that reports a usage error in one line, like every other error."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise instead of leaving the program; see ``argparse``."""
+        """Raise ViewerError instead of exiting as ``argparse`` does."""
         raise ViewerError(f"{message} ({self.prog} --help lists the options)")
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
-        """Print the help, or raise where ``argparse`` ignores that it cannot be printed.
+        """Print the help, or raise if it cannot be printed, which ``argparse`` ignores.
 
-        It would also print it as an error instead of into an output that is closed.
+        ``argparse`` would also print to the error stream if the output is closed.
         """
         print(self.format_help(), end="", file=file)
         if sys.stdout is not None:
-            sys.stdout.flush()  # argparse leaves the program next
+            sys.stdout.flush()  # argparse exits next
 
     def check_options(self, arguments: Iterable[str]) -> None:
         """Refuse an unknown option.
 
-        ``argparse`` would first ask for what is missing, which may well be what was mistyped.
+        ``argparse`` would first report a missing argument, possibly the mistyped one.
 
         ``arguments``: those before ``--``.
         Raises ViewerError with the nearest options.
@@ -50,18 +50,18 @@ class Parser(argparse.ArgumentParser):
         known = self._option_string_actions  # it has no public name
         for argument in arguments:
             name = argument.partition("=")[0]
-            # To argparse, words with blanks are no options, and "-" is a file.
+            # argparse treats arguments with spaces as values, and "-" as a file.
             if len(name) < 2 or name[0] != "-" or " " in argument or _NUMBER.match(name):
                 continue
             if name[:2] in known or any(option.startswith(name) for option in known):
                 continue
-            # Dashes make all options alike.
+            # Leading dashes would make all options similar.
             bare = {option.lstrip("-"): option for option in known}
             near = question([bare[one] for one in near_names(name.lstrip("-"), bare)])
             self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Refuse a value that is none of an option's choices, with the nearest one."""
+        """Refuse a value that is not one of an option's choices; suggest the nearest."""
         if action.choices is None or value in action.choices:
             return
         choices = [str(choice) for choice in action.choices]
@@ -71,7 +71,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def command_parser(name: str) -> Parser:
-    """Return the parser of a command, with all of its options.
+    """Return the parser of a command with all its options.
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ def command_parser(name: str) -> Parser:
 
 
 def check_command(word: str) -> None:
-    """Refuse a word that is no file and nearly a command.
+    """Refuse a word that is no file but resembles a command.
 
-    ``word``: the first argument, where commands are.
+    ``word``: the first argument.
     Raises ViewerError with the nearest command.
     """
     if not _WORD.fullmatch(word) or os.path.lexists(resolve(word)):
@@ -100,7 +100,7 @@ def check_command(word: str) -> None:
 
 
 def require_files(arguments: argparse.Namespace, command: str) -> None:
-    """Refuse a command without files where nobody can mean the bundled figure.
+    """Refuse a command without files, for which the bundled figure is no useful default.
 
     Raises ViewerError if there are neither files nor ``--body``.
     """

@@ -1,4 +1,4 @@
-"""Options that aim the camera and choose what is shown; shared by the commands that draw."""
+"""Options of the camera and the display, shared by the commands that draw."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
-_SEEN = 0.5  # pixels of the camera's own pictures: smaller errors are not seen
+_VISIBLE = 0.5  # pixels of the camera's own pictures: smaller errors are invisible
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that aim the camera; what is not given fits the scene."""
+    """Add the options of the camera; by default it frames the scene."""
     group = parser.add_argument_group("camera")
     group.add_argument("--azimuth", type=number, metavar="A", help="degrees about the up axis")
     group.add_argument(
@@ -33,12 +33,15 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", *FRONTS),
         default="auto",
         metavar="AXIS",
-        help="the axis that the figures face, as --front=-z: the first view is from there "
-        "(default: auto, judged by the figures)",
+        help="the axis that the figures face, as in --front=-z, from which the first view looks "
+        "(default: auto, estimated from the figures)",
     )
     group.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
     group.add_argument(
-        "--distance", type=number, metavar="D", help="from the target, in units (default: fits)"
+        "--distance",
+        type=number,
+        metavar="D",
+        help="from the target, in scene units (default: frames the scene)",
     )
     group.add_argument("--orthographic", action="store_true", help="parallel projection")
     group.add_argument(
@@ -49,16 +52,16 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_display_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that choose what is shown and how."""
-    group = parser.add_argument_group("what is shown")
+    """Add the options of the display."""
+    group = parser.add_argument_group("display")
     group.add_argument(
         "--show",
         choices=SHOWN,
         default="skin",
-        help="what of the figures; binding is the skin where it was attached (default: skin)",
+        help="parts of the figures; binding is the skin in the bind pose (default: skin)",
     )
     group.add_argument(
-        "--shading", choices=SHADING, default="phong", help="how surfaces look (default: phong)"
+        "--shading", choices=SHADING, default="phong", help="shading of surfaces (default: phong)"
     )
     add_scalar_arguments(group)
     group.add_argument(
@@ -68,19 +71,19 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         help="gradient, transparent or a colour (default: gradient)",
     )
     group.add_argument(
-        "--samples", type=int, default=4, metavar="N", help="samples a pixel (default: 4)"
+        "--samples", type=int, default=4, metavar="N", help="samples per pixel (default: 4)"
     )
     for name, text in (
-        ("flat", "one normal per triangle"),
-        ("wireframe", "edges on top"),
-        ("normals", "vertex normals as lines"),
-        ("no-texture", "plain colour instead of the texture"),
+        ("flat", "use one normal per triangle"),
+        ("wireframe", "draw triangle edges"),
+        ("normals", "draw vertex normals"),
+        ("no-texture", "use plain colours instead of textures"),
         ("no-grid", "leave out the ground grid"),
-        ("keypoints", "a model's keypoints as markers"),
-        ("reduced", "the coarser mesh, if there is one"),
-        ("xray", "bones seen through the skin"),
-        ("joint-names", "the names of joints, as far as they do not cover each other"),
-        ("joint-axes", "the axes of joints: x red, y green, z blue"),
+        ("keypoints", "draw a model's keypoints"),
+        ("reduced", "draw the coarser mesh, if there is one"),
+        ("xray", "draw bones visible through the skin"),
+        ("joint-names", "label joints, where labels do not overlap"),
+        ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
     ):
         group.add_argument(f"--{name}", action="store_true", help=text)
     group.add_argument(
@@ -106,7 +109,7 @@ def parse_size(text: str) -> tuple[int, int]:
 def camera_of(
     arguments: argparse.Namespace, scene: Scene, points: Floats, size: tuple[int, int]
 ) -> Camera:
-    """Return the camera asked for; its distance fits the points unless it is given."""
+    """Return the requested camera; it frames the points unless its distance is given."""
     if arguments.view is not None:
         camera = camera_from_view(_find_view(scene, arguments.view), size, scene.up)
         camera.front = front_azimuth(_front_of(arguments, scene), scene.up)
@@ -133,13 +136,13 @@ def camera_of(
 
 
 def _front_of(arguments: argparse.Namespace, scene: Scene) -> Front:
-    """Return the front asked for, or else the one that the figures show."""
+    """Return the requested front, or the one estimated from the figures."""
     front: Front = arguments.front
     if front == "auto":
         return guess_front(scene)
     if front not in front_axes(scene.up):
         axes = ", ".join(front_axes(scene.up))
-        raise ViewerError(f"--front: {scene.up} is up here: expected {axes}, found {front}")
+        raise ViewerError(f"--front: expected {axes} (the up axis is {scene.up}), found {front}")
     return front
 
 
@@ -155,7 +158,7 @@ def _find_view(scene: Scene, text: str) -> CameraView:
 
 
 def display_of(arguments: argparse.Namespace) -> DisplayOptions:
-    """Return the display options asked for."""
+    """Return the requested display options."""
     if arguments.background not in BACKGROUNDS:
         parse_color(arguments.background)
     if arguments.samples < 1:
@@ -182,25 +185,24 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
 
 
 def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
-    """Return what looking through a calibrated camera leaves out, if it is to be seen: one line.
+    """Return a message about a calibrated camera's visible lens distortion, which is not drawn.
 
-    Raises ViewerError if there is no such camera, or its files do not say how large its pictures
-      are.
+    Raises ViewerError if there is no such camera, or its files lack the size of its pictures.
     """
     if arguments.view is None:
         return []
     view = _find_view(scene, arguments.view)
     error = distortion_error(view)
-    if error < _SEEN:
+    if error < _VISIBLE:
         return []
     name = printable(view.name, 40)
-    return [f"camera {name}: its lens bends pictures by up to {error:.1f} pixels, not drawn here"]
+    return [f"camera {name}: its lens distortion of up to {error:.1f} pixels is not drawn"]
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
-    """Set the body parts that are left out, by name or index, of the first figure that has any.
+    """Hide body parts, given by name or index, of the first figure that has any.
 
-    Raises ViewerError if no figure has a part of this name; the message lists those there are.
+    Raises ViewerError if no figure has a part of this name; the message lists the known ones.
     """
     if not arguments.hide_part:
         return
@@ -218,7 +220,7 @@ def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOpti
 
 
 def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return what was asked to be shown and no figure has, one line each."""
+    """Return messages about requested items that no figure has."""
     figures = [actor.figure for actor in scene.actors]
     notes = scalar_notes(scene, options)
     if options.reduced and not any(figure.reduced for figure in figures):
@@ -229,11 +231,11 @@ def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def _joint_notes(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return what of joints was asked for and is not to be seen, one line each."""
+    """Return messages about requested joint marks that are not visible."""
     has_one = any(actor.figure.skeleton is not None for actor in scene.actors)
     if has_one and options.show != "binding":
         return []
-    why = "in binding space there are no joints" if has_one else "no figure has a skeleton"
+    why = "there are no joints in binding space" if has_one else "no figure has a skeleton"
     names = "xray", "joint_names", "joint_axes"
     asked = [name for name in names if getattr(options, name)]
     return [f"--{name.replace('_', '-')}: {why}" for name in asked]

@@ -1,4 +1,4 @@
-"""Print a script that completes commands, options and file names in a shell."""
+"""Shell completion of commands, options and file names."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ _SHELLS = ("bash", "zsh", "tcsh")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("shell", choices=_SHELLS, help="whose script to print, see below")
+    parser.add_argument(
+        "shell", choices=_SHELLS, help="the shell; see below for where to put its script"
+    )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = (
         "bash: viewer completion bash > ~/.local/share/bash-completion/completions/viewer\n"
@@ -34,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def command_line() -> argparse.ArgumentParser:
-    """Return the whole command line as one parser, with what is completed by names of files."""
+    """Return the whole command line as one parser; file arguments are marked for completion."""
     import shtab
 
     whole = Parser(prog="viewer", description="See, check and produce skinned characters.")

@@ -1,4 +1,4 @@
-"""Write poses and motions into files for other programs."""
+"""Conversion of figures, poses and motions to other formats."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _known_suffixes() -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write poses or motions, and say what was written and what was lost."""
+    """Write poses or motions; print what was written and what was lost."""
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
-    """Refuse what can be refused before anything is read."""
+    """Refuse invalid outputs before anything is read."""
     check_frame_options(arguments)
     require_stdout(output)
     if is_stdout(output) and not output.suffix:
@@ -94,7 +94,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
-        return  # which files these are shows when the motion has been read
+        return  # the files are known only when the motion has been read
     is_pose = all(kind.writes_pose for kind in kinds)
     files = files_written(output) if is_pose else [output]
     check_targets(files, inputs_of(arguments), arguments.force)
@@ -107,16 +107,16 @@ def _write_poses(
     places = dict(zip(shown, motion_paths(output, shown), strict=True))
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
-        raise RigError("nobody is there at that time: there is nothing to write")
+        raise RigError("everybody is absent at that time: there is nothing to write")
     files = [file for actor in actors for file in files_written(places[actor])]
     check_targets(files, inputs_of(arguments, scene), arguments.force)
     lines = []
     with all_or_none(files):
         for actor in actors:
-            with raising():  # until it is written
+            with raising():
                 lines += export(upright_actor(scene, actor), places[actor], skinning)
     away = [actor for actor in shown if not actor.is_present]
-    lines += [f"{printable(a.name)}: not there at that time, and not written" for a in away]
+    lines += [f"{printable(a.name)}: absent at that time, not written" for a in away]
     return lines + left_out_lines(scene, shown)
 
 

@@ -1,4 +1,4 @@
-"""Hold figures or motions against a reference: a grader's command."""
+"""Comparison of figures or motions with a reference."""
 
 from __future__ import annotations
 
@@ -42,16 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "reference",
         metavar="REFERENCE",
-        help="a file, several joined by + (arm.skel+arm.skin), or a folder with a rig in it",
+        help="a file, several joined by + (arm.skel+arm.skin), or a folder that contains a rig",
     )
-    files.add_argument("files", nargs="+", metavar="OTHER", help="what is held against it")
+    files.add_argument(
+        "files", nargs="+", metavar="OTHER", help="a file or folder to compare with it"
+    )
     files.add_argument(
         "--with",
         dest="common",
         action="append",
         default=[],
         metavar="FILE",
-        help="opened with the reference and with each other: the .skel of .anim files, say",
+        help="also open this file with every input, such as the .skel of .anim files",
     )
     files.add_argument("--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH")
     files.add_argument("--unit", choices=METRES, help="unit of lengths in BVH")
@@ -67,12 +69,12 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=8,
         metavar="N",
-        help="test poses for figures without motion, within the limits (default: 8)",
+        help="test poses within the joint limits, for figures without motion (default: 8)",
     )
     group.add_argument(
         "--frames",
         metavar="A:B",
-        help="frames A to B - 1 of motions, as the reference numbers them (default: all)",
+        help="frames A to B - 1 of motions, by the reference's numbers (default: all)",
     )
 
 
@@ -82,25 +84,25 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=float,
         metavar="X",
-        help="exit with 1 if anything differs by more: lengths as a share of the reference's size, "
-        "angles in radians, weights as they are",
+        help="exit with 1 if anything differs by more: lengths as a fraction of the reference's "
+        "size, angles in radians, weights as stored",
     )
     group.add_argument("--json", action="store_true", help="print everything as JSON")
     group.add_argument(
         "-o",
         "--output",
         metavar="FILE",
-        help="a picture of the reference, coloured by distance where it is largest; of several "
-        "comparisons a sheet with one scale",
+        help="picture of the reference, coloured by distance, in the worst pose; several "
+        "comparisons make a sheet with a common scale",
     )
     group.add_argument("--force", action="store_true", help="replace an existing picture")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Compare, say what differs, and return whether it is more than allowed."""
+    """Compare, print the differences, and return 1 if any exceeds the tolerance."""
     tolerance = arguments.tolerance
     if tolerance is not None and not (tolerance >= 0.0 and math.isfinite(tolerance)):
-        raise ViewerError(f"--tolerance: expected a number from 0, found {tolerance:g}")
+        raise ViewerError(f"--tolerance: expected 0 or more, found {tolerance:g}")
     if not 0 <= arguments.poses <= 10_000:
         raise ViewerError(f"--poses: expected 0 to 10000, found {arguments.poses}")
     frames = _frames(arguments.frames)
@@ -135,7 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _checked_output(arguments: argparse.Namespace) -> Path | None:
-    """Refuse a picture that cannot be written before anything is compared."""
+    """Refuse an invalid output picture before anything is compared."""
     if arguments.output is None:
         return None
     output = Path(arguments.output)
@@ -150,7 +152,7 @@ def _checked_output(arguments: argparse.Namespace) -> Path | None:
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
-    """Return the files that are named; what is not there is refused when it is opened."""
+    """Return the named files; missing ones are reported when they are opened."""
     found = [Path(file) for file in arguments.common]
     for text in (arguments.reference, *arguments.files):
         with contextlib.suppress(ViewerError):
@@ -188,7 +190,7 @@ def _compared(
     is_choice = len(reference.actors) > 1 or len(other.actors) > 1
     found: list[tuple[Actor, Difference]] = []
     for first, second in pairing.pairs:
-        # The reference is posed on the way, and must start alike for everybody.
+        # Comparing poses the reference, which must start in the same pose for each input.
         with Progress(f"comparing {Path(name).name}", 1) as progress:
 
             def report(done: int, count: int, progress: Progress = progress) -> None:
@@ -198,7 +200,7 @@ def _compared(
             posed = first.copy()
             difference = compare(posed, second, skinning, n_poses, frames, report)
         if is_choice and first.figure.name != second.figure.name:
-            note = f"held against {printable(second.name, 60)}"
+            note = f"compared with {printable(second.name, 60)}"
             difference = replace(difference, notes=(note, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
@@ -207,7 +209,7 @@ def _compared(
 
 
 def _lone(name: str, pairing: Pairing) -> tuple[str, ...]:
-    """Say what only one side has, and which."""
+    """Return messages about actors and motions on one side only."""
     sides = (("the reference", pairing.first), (printable(name, 300), pairing.second))
     return tuple(f"only in {side}: {printable(one, 60)}" for side, lone in sides for one in lone)
 

@@ -1,4 +1,4 @@
-"""Say what this machine offers: packages, OpenGL, EGL, display; with the cure for what it lacks."""
+"""Report on this machine: packages, OpenGL, EGL and display, with cures for what is missing."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report: what was looked at, whether it is fine, what was found, the cure."""
+    """One line of the report: subject, state, what was found, and a cure."""
 
     subject: str
     state: str  # "ok", "note" or "missing"
@@ -46,25 +46,25 @@ class Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options: there are none."""
+    """Add the command's options; it has none."""
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the report; 4 if nothing can be drawn here."""
+    """Print the report; return 4 if drawing is impossible."""
     code = 0
     for finding in examine():
         found = f"{finding.subject:<12}{printable(finding.found, 300)}"
         print_line((f"{finding.state:<8}", _STYLES[finding.state]), found)
         if finding.cure:
             print_line(f"{'':<20}-> {printable(finding.cure, 400)}")
-        sys.stdout.flush()  # the next ones may take seconds
+        sys.stdout.flush()  # the next finding may take seconds
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
     return code
 
 
 def examine() -> Iterator[Finding]:
-    """Yield findings one by one, quick ones first."""
+    """Yield findings as they are made, quick ones first."""
     system = f"{platform.system()} {platform.release()} {platform.machine()}"
     yield Finding(
         "viewer", "ok", f"{viewer.__version__}, Python {sys.version.split()[0]}, {system}"
@@ -90,7 +90,7 @@ def _examine_packages() -> Iterator[Finding]:
 
 
 def _examine_devices() -> Iterator[Finding]:
-    """Report every EGL device by itself: `--gpu N` chooses among them."""
+    """Report every EGL device; `--gpu N` chooses one."""
     if not sys.platform.startswith("linux"):
         return
     from viewer.rendering.gpu.context import device_count, headless_context, unreadable_devices
@@ -106,7 +106,9 @@ def _examine_devices() -> Iterator[Finding]:
             yield Finding(f"EGL {index}", "note", str(problem))
     for node in unreadable_devices():
         cure = f"sudo usermod -aG render {os.environ.get('USER', '$USER')}, then log in again"
-        yield Finding("graphics", "note", f"{node} exists but you may not open it", cure)
+        yield Finding(
+            "graphics", "note", f"{node} exists but you lack the permission to open it", cure
+        )
 
 
 def _examine_drawing() -> Iterator[Finding]:
@@ -123,11 +125,12 @@ def _examine_drawing() -> Iterator[Finding]:
         "limits",
         "ok",
         f"textures {info['GL_MAX_TEXTURE_SIZE']}, pictures "
-        f"{min(info['GL_MAX_VIEWPORT_DIMS'])} pixels a side, {context.max_samples} samples a pixel",
+        f"{min(info['GL_MAX_VIEWPORT_DIMS'])} pixels per side, "
+        f"{context.max_samples} samples per pixel",
     )
     if is_software(context):
-        cure = "a graphics card needs its driver, and in a container access to /dev/dri"
-        yield Finding("graphics", "note", "drawing is done in software", cure)
+        cure = "install the graphics driver, and give containers access to /dev/dri"
+        yield Finding("graphics", "note", "rendering is done in software", cure)
     context.release()
 
 
@@ -147,8 +150,8 @@ def _examine_display() -> Iterator[Finding]:
 
 
 def _examine_window() -> Finding:
-    """Open a window in a process of its own: a broken driver may take that one down, not us."""
-    cure = "update the graphics driver, or draw in software: LIBGL_ALWAYS_SOFTWARE=1 viewer"
+    """Open a window in a separate process, since a broken driver may crash it."""
+    cure = "update the graphics driver, or render in software: LIBGL_ALWAYS_SOFTWARE=1 viewer"
     script = "from viewer.app.window import probe; print(probe())"
     command = [sys.executable, "-c", script]
     try:
@@ -168,5 +171,5 @@ def _examine_state_folder() -> Finding:
     existing = next((path for path in (folder, *folder.parents) if path.exists()), Path("/"))
     if os.access(existing, os.W_OK):
         return Finding("settings", "ok", str(folder))
-    cure = "set XDG_STATE_HOME to a folder that you may write to"
-    return Finding("settings", "note", f"{folder} cannot be written: nothing is remembered", cure)
+    cure = "set XDG_STATE_HOME to a writable folder"
+    return Finding("settings", "note", f"{folder} is not writable: settings are not saved", cure)

@@ -1,4 +1,4 @@
-"""Show a page of the manual in the terminal."""
+"""Pages of the manual in the terminal."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ def _topics() -> str:
 
 
 def _print_page(text: str) -> None:
-    """Print Markdown: laid out at a terminal, as it is into files and pipes."""
+    """Print Markdown: formatted in a terminal, verbatim to files and pipes."""
     if sys.stdout is None or not sys.stdout.isatty():
         print(text, end="")
         return
-    # Imported late: rich takes longer than everything else that this command does.
+    # Imported late: importing rich takes longer than the rest of this command.
     from rich.console import Console
     from rich.markdown import Markdown
     from rich.theme import Theme
 
-    # The default's black background stands out on any terminal that is not black.
+    # The default style has a black background, which is ugly on light terminals.
     console = Console(theme=Theme({"markdown.code": "bold cyan"}))
     with console.capture() as page:
         console.print(Markdown(text, hyperlinks=False))
-    # Printed by us, so that a write that fails is reported as everywhere else.
+    # Printed here, so that a failed write is reported like any other.
     print(page.get(), end="")

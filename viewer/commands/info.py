@@ -1,4 +1,4 @@
-"""Say what is in files: joints, DOFs, limits, vertices, triangles, influences, warnings."""
+"""Description of files: joints, DOFs, limits, vertices, triangles, influences, warnings."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     add_scene_arguments(parser, default="")
     add_skinning_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="everything, for programs")
+    parser.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what the files hold."""
+    """Print the contents of the files."""
     require_files(arguments, "info")
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
@@ -50,14 +50,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
-    """Return everything ``info`` tells, ready for JSON; lengths in figure units, angles in rad.
+    """Return the contents of a scene as JSON data; lengths in figure units, angles in radians.
 
     Parameters
     ----------
     scene : Scene
-        Figures and poses.
+        The figures and their poses.
     skinning : Skinning, optional
-        How joints move the meshes.
+        The skinning method and its options.
     """
     how = skinning or Skinning()
     return {
@@ -71,7 +71,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
 
 
 def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
-    """Return what there is to say of an actor; its box is in the scene, where ``up`` is up."""
+    """Return the description of an actor; its box is in scene space, with up axis ``up``."""
     figure = actor.figure
     points = actor_points(actor) if actor.is_present else np.zeros((0, 3))
     box = bounding_box(points) if len(points) else None
@@ -197,7 +197,7 @@ def _lines(actor: dict[str, Any]) -> list[str]:
 
 def _box_text(actor: dict[str, Any]) -> str:
     if actor["box"] is None:
-        return "none: nothing is seen" if actor["present"] else "none: not there at this time"
+        return "none: nothing is visible" if actor["present"] else "none: absent at this time"
     low, high = actor["box"]
     return f"{_point(low)} to {_point(high)}, size {actor['size']:.6g}"
 
@@ -235,7 +235,7 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
     lines = [
         f"  mesh       {counted(mesh['vertices'], 'vertex')}, "
         f"{counted(mesh['triangles'], 'triangle')} "
-        f"({mesh['degenerate_triangles']} without area), "
+        f"({mesh['degenerate_triangles']} degenerate), "
         f"{'with' if mesh['has_uvs'] else 'without'} texture coordinates"
     ]
     for material in mesh["materials"]:
@@ -251,7 +251,7 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
     sums = skin["weight_sums"]
     lines = [
         f"  skin       {skin['bindings']} bindings, {skin['influences']} influences, "
-        f"mean {skin['mean_influences']:.3g} a vertex",
+        f"mean {skin['mean_influences']:.3g} per vertex",
         f"    vertices by number of influences   {histogram}",
     ]
     if sums:

@@ -1,4 +1,4 @@
-"""Check rigs and motions: what is wrong, where, and what to do about it."""
+"""Checks of rigs and motions: what is wrong, where, and what to do about it."""
 
 from __future__ import annotations
 
@@ -46,8 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file_arguments(parser, default="")
     add_capture_arguments(parser)
     group = parser.add_argument_group("checks")
-    group.add_argument("--json", action="store_true", help="everything, for programs")
-    group.add_argument("--codes", action="store_true", help="list all codes, and check nothing")
+    group.add_argument("--json", action="store_true", help="print everything as JSON")
+    group.add_argument(
+        "--codes", action="store_true", help="list all codes without checking anything"
+    )
     group.add_argument(
         "--fail-on",
         choices=[*reversed(SEVERITIES), "never"],
@@ -55,54 +57,54 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="exit with 1 if there is a finding of this severity or worse (default: error)",
     )
     group.add_argument(
-        "--ignore", default="", metavar="CODE,…", help="findings that are left out: W006,M005"
+        "--ignore", default="", metavar="CODE,…", help="codes to ignore, such as W006,M005"
     )
     _add_limits(group)
 
 
 def _add_limits(group: argparse._ArgumentGroup) -> None:
-    """Add what only the person who asks can know of motions."""
+    """Add the limits of motions that files cannot tell."""
     group.add_argument(
         "--max-speed",
         type=number,
         metavar="S",
-        help="of joints and keypoints, figure units a second (default: 15 times its size)",
+        help="speed limit of joints and keypoints, in figure units per second (default: 15 sizes)",
     )
     group.add_argument(
         "--max-turn",
         type=number,
         default=MAX_TURN,
         metavar="DEGREES",
-        help=f"that a joint may turn in a second (default: {MAX_TURN:g})",
+        help=f"speed limit of joint rotations, per second (default: {MAX_TURN:g})",
     )
     group.add_argument(
         "--confidence",
         type=number,
         default=0.3,
         metavar="C",
-        help="of captured keypoints: less is low, and reported of those that are low in more than "
-        "5 %% of the frames that see them (default: 0.3)",
+        help="confidence of captured keypoints below which it is low; keypoints with low "
+        "confidence in more than 5 %% of their frames are reported (default: 0.3)",
     )
     group.add_argument(
         "--ground",
         type=_ground,
         default="auto",
         metavar="HEIGHT|auto|none",
-        help="of the scene, that no foot goes below by more than 1 %% of the figure's height "
-        "(17 mm for a person); auto: where feet rest longest, or none, and feet are not checked "
+        help="height of the ground, for feet more than 1 %% of the figure's height below it (17 mm "
+        "for a person); auto: where feet rest longest; none: feet are not checked "
         "(default: auto)",
     )
     group.add_argument(
         "--fps",
         type=rate,
         metavar="N",
-        help="frames a second of captures, and by which clips of keys are counted (default: 30)",
+        help="frames per second of captures, and for sampling keyframed clips (default: 30)",
     )
-    group.add_argument("--hands", choices=("mean", "flat"), help="what hand poses of 0 mean")
+    group.add_argument("--hands", choices=("mean", "flat"), help="the hands at pose parameters 0")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the findings, the worst first; 1 if one is as bad as ``--fail-on``."""
+    """Print the findings, worst first; return 1 if any is as severe as ``--fail-on``."""
     if arguments.codes:
         print("\n".join(_code_lines()))
         return 0

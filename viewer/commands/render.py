@@ -1,4 +1,4 @@
-"""Draw files into a picture, without display or window."""
+"""Rendering to pictures and videos, without display or window."""
 
 from __future__ import annotations
 
@@ -64,18 +64,18 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="FILE",
         help="a picture (.png, .jpg, …), a video (.mp4, .webm, .gif), or numbered pictures, "
-        "as frame_{frame:05}.png",
+        "such as frame_{frame:05}.png",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
     group.add_argument(
         "--size", default="1280x720", metavar="WxH", help="in pixels (default: 1280x720)"
     )
-    group.add_argument("--panels", action="store_true", help="draw the whole interface too")
+    group.add_argument("--panels", action="store_true", help="draw the window's panels too")
     group.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw the picture or pictures, write them, and say where they are."""
+    """Draw the pictures, write them, and print their names."""
     size = parse_size(arguments.size)
     output = Path(arguments.output)
     _check_suffix(arguments, output)
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = display_of(arguments)
     _check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
-        print_warnings([f"{printable(output)}: this format knows no transparency"])
+        print_warnings([f"{printable(output)}: this format has no transparency"])
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
     print_warnings(choose_subject(scene, options))
@@ -99,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_device(device: int | None) -> None:
-    """Refuse a graphics device that is not there, before anything is read."""
+    """Refuse a missing graphics device before anything is read."""
     if device is not None:
         from viewer.rendering.gpu.context import check_device
 
@@ -129,14 +129,14 @@ def _draw_still(
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
-    """Refuse a suffix that neither pictures nor videos have."""
+    """Refuse a suffix of neither pictures nor videos."""
     suffix = output.suffix.lower()
     try:
         is_ours = output.is_file() or not output.exists()
     except (OSError, ValueError):
-        return  # check_targets says what is wrong
+        return  # reported by check_targets
     if suffix not in ("", *PICTURES, *VIDEOS) and is_ours:
-        # That it is an input is worse, and said first.
+        # Overwriting an input is worse, so it is reported first.
         check_targets([output], inputs_of(arguments), force=True)
         raise UnsupportedFormatError(
             f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) or a video "
@@ -152,7 +152,7 @@ def draw_scene(
     box: Floats,
     device: int | None = None,
 ) -> Bytes:
-    """Return the scene's pixels, (H, W, 4) uint8; what the driver could not do is printed."""
+    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed."""
     from viewer.rendering.offscreen import Offscreen
 
     with deferred(), Offscreen(device) as offscreen:

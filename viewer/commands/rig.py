@@ -1,4 +1,4 @@
-"""Give an unrigged mesh the rig of a figure."""
+"""Rig transfer from a figure to an unrigged mesh."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.commands._carried_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
+from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError, printable
 from viewer.export._rigged_files import files_of, write_rigged
@@ -40,7 +40,7 @@ from viewer.streams import require_stdout, summary_stream
 __all__ = ["add_arguments", "run"]
 
 _BUNDLED = ("body", "fox")
-_SMOOTHING = 10  # rounds, where --smooth gives no number
+_SMOOTHING = 10  # iterations, if --smooth has no number
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files",
         nargs="+",
         metavar="TARGET",
-        help=f"the mesh: {', '.join(MESHES)}; and its texture picture",
+        help=f"the mesh: {', '.join(MESHES)}; and its texture image",
     )
     parser.add_argument(
         "--from",
@@ -57,15 +57,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="the rigged figure: any that opens, a model's name, body (default) or fox; several "
-        "files of one figure or with a motion by repeating this",
+        help="the rigged figure: any file, a model's name, body (default) or fox; repeat it for "
+        "further files of the figure or its motion",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help=".skel (with .skin, .obj, .json), or .npz"
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     add_clip_argument(parser)
-    parser.add_argument("--view", action="store_true", help="open a window on the result")
+    parser.add_argument("--view", action="store_true", help="open the result in a window")
     _add_method_arguments(parser)
     _add_alignment_arguments(parser)
     add_frame_arguments(parser)
@@ -74,13 +74,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--template-pose",
         dest="pose",
         metavar="FILE|A,B,…",
-        help="the template's pose, roughly that of the target: the same as --pose, of the template",
+        help="the template's pose, roughly that of the target, given as for --pose",
     )
     parser.add_argument(
         "--template-frame",
         type=int,
         metavar="N",
-        help="a frame of the template's motion, as --frame counts them",
+        help="a frame of the template's motion, numbered as for --frame",
     )
     parser.set_defaults(fill_gaps=False)
 
@@ -94,14 +94,14 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
         type=number,
         default=0.05,
         metavar="X",
-        help="of the target's size, up to which a vertex matches (default: 0.05)",
+        help="distance up to which a vertex matches, relative to the target's size (default: 0.05)",
     )
     group.add_argument(
         "--max-angle",
         type=number,
         default=30.0,
         metavar="DEG",
-        help="between the surfaces, up to which a vertex matches (default: 30)",
+        help="angle between normals up to which a vertex matches (default: 30)",
     )
     group.add_argument(
         "--smooth",
@@ -110,51 +110,51 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
         const=_SMOOTHING,
         default=0,
         metavar="N",
-        help=f"even out weights that were filled in, N rounds ({_SMOOTHING} without a number)",
+        help=f"smooth inpainted weights, N iterations ({_SMOOTHING} without a number)",
     )
     group.add_argument(
-        "--max-influences", type=int, metavar="N", help="keep each vertex's N strongest"
+        "--max-influences", type=int, metavar="N", help="keep each vertex's N strongest influences"
     )
     group.add_argument(
         "--joints",
         choices=JOINTS,
         default="carried",
-        help="moved as the surface around them, or with the alignment alone (default: carried)",
+        help="joints follow the surface around them, or the alignment only (default: carried)",
     )
     group.add_argument(
         "--no-fit",
         action="store_true",
-        help="keep the template's pose and proportions as they are, even if turning its joints "
-        "and resizing its limbs would lay it onto the mesh much better",
+        help="keep the template's pose and proportions, even if rotating its joints and scaling "
+        "its limbs would align it with the mesh much better",
     )
     group.add_argument(
-        "--no-correctives", action="store_true", help="leave out the template's pose correctives"
+        "--no-correctives", action="store_true", help="omit the template's pose correctives"
     )
 
 
 def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("alignment")
-    group.add_argument("--up", choices=AXES, help="of the target (default: searched)")
-    group.add_argument("--facing", choices=AXES, help="of the target (default: searched)")
+    group.add_argument("--up", choices=AXES, help="up axis of the target (default: searched)")
+    group.add_argument("--facing", choices=AXES, help="front of the target (default: searched)")
     group.add_argument(
         "--scale",
         choices=SCALES,
         default="uniform",
-        help="of the template: one, one along each axis, or none (default: uniform)",
+        help="scale of the template: one, one per axis, or none (default: uniform)",
     )
     group.add_argument(
         "--landmarks",
         metavar="FILE",
-        help="three or more pairs, a line each: a joint or three numbers of the posed template, "
-        "and three numbers of the target",
+        help="file with three or more pairs of points, one per line: a joint or position of the "
+        "posed template, and a position on the target",
     )
     group.add_argument(
-        "--no-refine", action="store_true", help="take landmarks or the search as they are"
+        "--no-refine", action="store_true", help="skip the refinement of the alignment"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Rig the mesh, say how it went, write it, and show it if asked."""
+    """Rig the mesh, print a report, write it, and show it if requested."""
     output = None if arguments.output is None else Path(arguments.output)
     inputs = _inputs(arguments)
     if output is not None:
@@ -177,7 +177,7 @@ def run(arguments: argparse.Namespace) -> int:
             name=target.name,
         )
     stream = sys.stdout if output is None else summary_stream(output)
-    _tell(rigged, stream)
+    _print_report(rigged, stream)
     if output is not None:
         with all_or_none(files):
             lines = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
@@ -195,7 +195,7 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
-    """Return the mesh that is to be rigged; one that has a rig already as it is posed."""
+    """Return the mesh to rig; a mesh with a rig in its current pose."""
     scene = load(*map(resolve, arguments.files))
     inputs += scene.files
     print_warnings(scene.diagnostics)
@@ -206,13 +206,13 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
     figure = actor.figure
     if not figure.is_attached:
         return figure
-    print_warnings([f"{printable(figure.name, 60)} has a rig already, which is not used"])
+    print_warnings([f"{printable(figure.name, 60)} already has a rig, which is ignored"])
     positions, normals = deform(figure, actor.pose)
     return Figure(figure.name, replace(figure.require_mesh(), positions=positions, normals=normals))
 
 
 def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
-    """Return the figure whose rig is carried over, posed and shaped as asked."""
+    """Return the figure whose rig is transferred, posed and shaped as requested."""
     scene = load(*_files(arguments), motion=MotionSettings(frame_rate=arguments.fps))
     inputs += scene.files
     _check_frame(scene, arguments)
@@ -222,16 +222,16 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
         raise RigError("--from: expected a figure with mesh, skeleton and skin, found none")
     if len(attached) > 1:
         name = printable(attached[0].name, 60)
-        print_warnings([f"--from: {len(attached)} figures; the first, {name}, is the template"])
+        print_warnings([f"--from: {len(attached)} figures; the first one, {name}, is the template"])
     if not attached[0].is_present:
-        raise RigError("--from: expected a frame with the template in it, found a gap")
+        raise RigError("--from: expected a frame of the template, found a gap")
     return attached[0]
 
 
 def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
-    """Take over --template-frame, and refuse a frame or time of a template that has no motion.
+    """Apply --template-frame, and refuse a frame or time for a template without motion.
 
-    Raises ViewerError if there is nothing to take the frame from, or two frames are given.
+    Raises ViewerError if the template has no motion, or two frames are given.
     """
     if arguments.template_frame is not None:
         if arguments.frame is not None:
@@ -242,8 +242,8 @@ def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
     if all(actor.clip is None for actor in scene.actors):
         option = "--time" if arguments.frame is None else arguments.frame_option
         raise ViewerError(
-            f"{option}: expected a template with a motion, found none; give the motion's file by "
-            "another --from, as --from body --from walk.npz"
+            f"{option}: expected a template with a motion, found none; add the motion's file with "
+            "another --from, as in --from body --from walk.npz"
         )
 
 
@@ -267,7 +267,7 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
     if not arguments.max_distance >= 0.0:
         raise ViewerError(f"--max-distance: expected 0 or more, found {arguments.max_distance:g}")
     if arguments.smooth < 0:
-        raise ViewerError(f"--smooth: expected 0 or more rounds, found {arguments.smooth}")
+        raise ViewerError(f"--smooth: expected 0 or more iterations, found {arguments.smooth}")
     if arguments.max_influences is not None and arguments.max_influences < 1:
         raise ViewerError(f"--max-influences: expected 1 or more, found {arguments.max_influences}")
 
@@ -275,7 +275,7 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
 def _settings(
     arguments: argparse.Namespace, template: Actor, output: Path | None
 ) -> TransferSettings:
-    """Return what is asked for; the course rig's format has no place for correctives."""
+    """Return the requested settings; the course rig's format cannot hold correctives."""
     landmarks = None
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)
@@ -308,15 +308,15 @@ def _settings(
     )
 
 
-def _tell(rigged: Rigged, stream: TextIO) -> None:
-    """Print what was found, and warnings where errors go."""
+def _print_report(rigged: Rigged, stream: TextIO) -> None:
+    """Print the report, and warnings to the error stream."""
     print_warnings(line for line in rigged.lines if line.severity == "warning")
     notes = [str(line) for line in rigged.lines if line.severity == "note"]
     print("\n".join(notes), file=stream)
 
 
 def _show(rigged: Rigged, target: Figure) -> None:
-    """Open a window on the result, with the target hidden in the same place."""
+    """Open the result in a window, with the target hidden in the same place."""
     from viewer.app.window import show
 
     result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))

@@ -1,4 +1,4 @@
-"""Open files in a window; without a display, draw them into a picture in the current folder."""
+"""Display of files in a window, or in a picture if there is no display."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from viewer.rig.scene import Scene, scene_points
 __all__ = ["add_arguments", "run"]
 
 SIZE = (1280, 720)
-"""Of the picture that is drawn where no window can be opened."""
+"""Size of the picture that is drawn if no window can be opened."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,8 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = "%(prog)s [FILES ...] [options]"
     add_file_arguments(parser)
     group = parser.add_argument_group("window")
-    group.add_argument("--play", action="store_true", help="let motions play at once")
-    group.add_argument("--scale", type=_scale, metavar="S", help="size of the interface, as 1.5")
+    group.add_argument("--play", action="store_true", help="play motions at once")
+    group.add_argument(
+        "--scale", type=_scale, metavar="S", help="scale of the interface, such as 1.5"
+    )
     add_capture_arguments(parser)
     add_frame_arguments(parser)
     add_pose_arguments(parser)
@@ -67,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene, builders = begin_scene(arguments)
     if arguments.time is not None or arguments.frame is not None:
         for builder in builders:
-            finish(builder, scene)  # who is there at that time is not known before
+            finish(builder, scene)  # who is present at that time is known only now
     print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))

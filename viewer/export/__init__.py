@@ -1,4 +1,4 @@
-"""Exporters: a posed figure into a file that other programs read; one module each."""
+"""Exporters of posed figures and motions to files of other programs, one module each."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Exporter:
-    """What menus must know before an exporter's module is imported.
+    """Properties of an exporter that menus need before its module is imported.
 
     Attributes
     ----------
     title : str
-        For menus.
+        Label in menus.
     suffixes : tuple of str
-        With their dots; ``"/"`` stands for a folder.
+        With leading dots; ``"/"`` stands for a folder.
     writes_pose : bool
         Whether its module has ``export(actor, path, skinning)``.
     writes_motion : bool
         Whether its module has ``export_animation(animation, path, options)``.
     keeps_world : bool
-        Whether it writes a motion as its own world has it, even where people hang head down.
+        Whether it keeps the up axis of a motion's own world, even if that is upside down.
     """
 
     title: str
@@ -59,7 +59,7 @@ EXPORTERS = {
     "obj": Exporter("Wavefront OBJ: the posed mesh", (".obj",), writes_motion=True),
     "ply": Exporter("PLY: the posed mesh", (".ply",)),
     "npz": Exporter("NumPy arrays: posed vertices and joints", (".npz",), writes_motion=True),
-    "pose": Exporter("pose: joints by name and own numbers", (".json", ".txt")),
+    "pose": Exporter("pose: joints by name and the pose vector", (".json", ".txt")),
     "rig": Exporter("course rig: .skel and .skin", (".skel", ".skin")),
     "anim": Exporter(
         "clip: keys of a course rig", (".anim",), writes_pose=False, writes_motion=True
@@ -102,16 +102,16 @@ def exporter_for(path: str | Path) -> str:
 
 
 def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> list[str]:
-    """Write an actor as it is posed; its placement in the scene is left out.
+    """Write an actor in its current pose; its placement in the scene is omitted.
 
     Parameters
     ----------
     actor : Actor
         Figure and pose.
     path : str or Path
-        Its suffix chooses the exporter; files of that name are replaced.
+        The suffix chooses the exporter; existing files are replaced.
     skinning : Skinning, optional
-        How joints move the mesh.
+        Skinning method and options.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     UnsupportedFormatError
         If no exporter has this suffix.
     RigError
-        If the figure lacks what the format is made of.
+    If the figure lacks the data that the format needs.
     OutputError
         If a file cannot be written.
     """
@@ -152,7 +152,7 @@ def motion_exporters(path: str | Path) -> list[str]:
 def suited_exporter(path: str | Path, figure: Figure) -> str:
     """Return the exporter that writes a figure's motion to a file of this suffix.
 
-    Arrays of bodies of the SMPL family are written as AMASS has them.
+    Arrays of bodies of the SMPL family are written in AMASS's layout.
 
     Raises
     ------
@@ -170,18 +170,18 @@ def suited_exporter(path: str | Path, figure: Figure) -> str:
 def export_animation(
     animation: SampledAnimation, path: str | Path, key: str, options: MotionOptions
 ) -> list[str]:
-    """Write a motion; the actor's placement in the scene is left out.
+    """Write a motion; the actor's placement in the scene is omitted.
 
     Parameters
     ----------
     animation : SampledAnimation
         A figure in many poses.
     path : str or Path
-        Files of that name are replaced; all of an export's files appear, or none.
+        Existing files are replaced; either all files of an export are written, or none.
     key : str
-        Of ``EXPORTERS``, see ``motion_exporters``.
+        A key of ``EXPORTERS``, see ``motion_exporters``.
     options : MotionOptions
-        How.
+        Options of the export.
 
     Returns
     -------
@@ -191,7 +191,7 @@ def export_animation(
     Raises
     ------
     RigError
-        If the figure or motion lacks what the format is made of.
+        If the figure or motion lacks the data that the format needs.
     OutputError
         If a file cannot be written.
     """
@@ -209,17 +209,17 @@ def animation_for(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Sample an actor's clip as an exporter wants it, and return what is up in it.
+    """Sample an actor's clip for an exporter, and return it with its up axis.
 
-    What comes from a capture goes back as it was, unless another up axis is asked for; other
-    formats want people who stand.
+    Captures are written back in their own world, unless another up axis is requested; other
+    formats expect upright people.
 
     Parameters
     ----------
     key : str
-        Of ``EXPORTERS``.
+        A key of ``EXPORTERS``.
     options : MotionOptions
-        Whether an up axis is asked for.
+        Whether an up axis is requested.
     scene, actor, rate, frames, interpolate
         As for ``viewer.rig.motion.sampled_animation.upright_animation``.
     """
@@ -228,7 +228,7 @@ def animation_for(
 
 
 def files_written(path: str | Path) -> list[Path]:
-    """Return all files that an export to ``path`` writes: a rig is two, and so is a ``.gltf``.
+    """Return all files that an export to ``path`` writes: two for a rig or a ``.gltf``.
 
     Raises
     ------
@@ -244,16 +244,16 @@ def files_written(path: str | Path) -> list[Path]:
 
 
 def require_mesh(actor: Actor, what: str) -> None:
-    """Refuse a figure without a mesh in words that name the format."""
+    """Refuse a figure without a mesh; the message names the format."""
     if actor.figure.mesh is None:
         raise RigError(f"figure {actor.figure.name} has no mesh to write as {what}")
 
 
 class _CallableModule(ModuleType):
-    """Lets ``viewer.export(actor, path)`` work whoever imported this package first.
+    """Module type that makes ``viewer.export(actor, path)`` work regardless of import order.
 
-    Python binds a package's name in its parent when it is imported, over the function of the
-    same name that ``viewer`` offers.
+    On import, Python binds a package's name in its parent, replacing the function of the same
+    name in ``viewer``.
     """
 
     def __call__(

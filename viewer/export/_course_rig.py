@@ -1,4 +1,4 @@
-"""A skeleton as ``.skel`` holds it: joints depth-first, three rotations each, a moving root."""
+"""Skeleton in ``.skel`` form: depth-first joints with three rotations each, a moving root."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ _CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has no
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
-    """Return the skeleton in the form of the course files, posed as its own rest.
+    """Return the skeleton in the form of the course files, with the pose as its rest pose.
 
-    ``skeleton``: without rest rotations and scales; the figure's scale is part of its lengths
-      already.
+    ``skeleton``: without rest rotations and scales; its lengths already include the figure's
+      scale.
     ``pose``: becomes the file's pose; the figure's translation goes to the roots' offsets.
     Returns ``skeleton``: joints in depth-first order.
     Returns ``order`` (J,) int32: the old index of each new joint.
-    Raises RigError if a joint has what the format cannot hold.
+    Raises RigError if a joint has properties that the format cannot hold.
     """
     _check(skeleton, pose)
     order = depth_first(skeleton.parents)
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     above = skeleton.parents[order]
-    scale = pose.figure_scale  # of the skeleton already
+    scale = pose.figure_scale  # already applied to the skeleton
     offsets = (skeleton.rest_translations + scale * pose.translations)[order]
     offsets[above < 0] += pose.figure_translation
     rows = _rotation_rows(skeleton)[order].ravel()
@@ -63,7 +63,7 @@ def _check(skeleton: Skeleton, pose: Pose) -> None:
 
 
 def _rotation_rows(skeleton: Skeleton) -> Ints:
-    """Return each joint's rows about x, y and z, -1 for one that it lacks: (J, 3)."""
+    """Return each joint's DOF rows about x, y and z, -1 if missing: (J, 3)."""
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
     turns = np.flatnonzero(skeleton.dof_kinds >= 3)
     for row in turns.tolist():
@@ -78,7 +78,7 @@ def _rotation_rows(skeleton: Skeleton) -> Ints:
 
 
 def _root_shift(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return how far DOFs move the first joint; others must not translate."""
+    """Return the translation of the first joint by DOFs; other joints must not translate."""
     shift = np.zeros(3)
     for row in np.flatnonzero(skeleton.dof_kinds < 3).tolist():
         joint = int(skeleton.dof_joints[row])

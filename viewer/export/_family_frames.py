@@ -1,4 +1,4 @@
-"""An animation of a body of the SMPL family, as the family's own parameters."""
+"""Animations of bodies of the SMPL family, as the family's own parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.number_text import number_text
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, WORDS
 
-_OWN_SHAPE = "stature"  # SMPL's shapes have numbers, those of the bundled body names
+_OWN_SHAPE = "stature"  # SMPL's shapes are numbered, those of the bundled body are named
 _NEGLIGIBLE = 1e-6  # metres, and parts of a scale of 1
 
 
@@ -30,7 +30,7 @@ class FamilyFrames:
     Attributes
     ----------
     member : Member
-        Which model of the family.
+        Model of the family.
     vectors : (F, J, 3)
         Rotation vectors in the member's own order, angles up to pi.
     translations : (F, 3)
@@ -38,7 +38,7 @@ class FamilyFrames:
     roots : (F, 3) or (1, 3)
         J0, the rest position of the root, metres.
     shape, expression : (F, S) or (1, S)
-        Coefficients; one row where they never change.
+        Coefficients; one row if they never change.
     """
 
     member: Member
@@ -67,9 +67,9 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
     """Return the member of the family whose joints a figure has.
 
     ``figure``: with a skeleton.
-    ``what``: what is written, for the message.
-    ``roots``: what the root may be called: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
-    Raises RigError if it has others, or more, or fewer, or if its unit is not known.
+    ``what``: name of the output, for the message.
+    ``roots``: allowed names of the root: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
+    Raises RigError if its joints are those of no member, or if its unit is unknown.
     """
     names = () if figure.skeleton is None else figure.skeleton.names
     member = FAMILY.get(len(names))
@@ -90,14 +90,14 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
 def check_unit(options: MotionOptions, title: str) -> None:
     """Refuse units other than metres.
 
-    Raises RigError if another one is asked for.
+    Raises RigError if another unit is requested.
     """
     if options.unit not in ("", "m"):
         raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
 
 
 def up_axis(options: MotionOptions) -> str:
-    """Return the axis that points up in the file: that of the scene unless another is asked for.
+    """Return the up axis of the file: that of the scene unless another is requested.
 
     Raises RigError if it is neither y nor z; that of the scene may point down.
     """
@@ -114,15 +114,15 @@ def family_frames(
 ) -> tuple[FamilyFrames, list[str]]:
     """Return an animation as parameters of the family.
 
-    The root joint is at t + J0, so that t is how far it is from its place at rest. With another up
-    axis the world turns by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
+    The root joint is at t + J0, so t is its displacement from the rest position. A different up
+    axis rotates the world by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
 
     ``animation``: gives the figure, whose unit is known.
-    ``frames``: its frames, where a row that is not present means nothing.
-    ``member``: as ``member_of_figure`` found it.
-    ``options``: its up axes count.
-    Returns ``frames``: one row a frame.
-    Returns ``notes``: what the family has no parameters for, and how much that is.
+    ``frames``: its frames; rows that are not present are undefined.
+    ``member``: from ``member_of_figure``.
+    ``options``: only the up axes are used.
+    Returns ``frames``: one row per frame.
+    Returns ``notes``: messages about what the family has no parameters for, and how large it is.
     Raises RigError if a number of a present frame is not finite.
     """
     figure, skeleton = animation.figure, animation.figure.require_skeleton()
@@ -138,7 +138,9 @@ def family_frames(
         turn = np.array([angle, 0.0, 0.0])
         rotations = rotations.copy()
         rotations[:, 0] = multiply(rotation_vector_to_quaternion(turn), rotations[:, 0])
-        matrix = np.round(rotation_vector_to_matrix(turn))  # a quarter turn has no fractions
+        matrix = np.round(
+            rotation_vector_to_matrix(turn)
+        )  # a rotation by 90 degrees has integer entries
         translations = (translations + roots) @ matrix.T - roots
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
     columns = {
@@ -173,7 +175,7 @@ def _vectors(quaternions: Floats) -> Floats:
 
 
 def _own_shapes(figure: Figure) -> list[str]:
-    """Say so if shapes and rest pelvis are those of a body of our own."""
+    """Return a message if shapes and rest pelvis are those of the bundled body."""
     if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
         return []
     return [
@@ -183,7 +185,7 @@ def _own_shapes(figure: Figure) -> list[str]:
 
 
 def _bare_skeleton(figure: Figure, root: Floats) -> list[str]:
-    """Say in which unit a skeleton was, and where its root rests, which models have elsewhere."""
+    """Return messages about a skeleton's unit, and about its root, which differs from a model's."""
     notes = []
     if figure.unit != "m":
         notes.append(f"lengths were {WORDS[figure.unit]}, and are written as metres")

@@ -1,4 +1,4 @@
-"""Motions of the SMPL family that were written, read back as poses of the figure they came from."""
+"""Poses of the original figure, read back from written motions of the SMPL family."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from viewer.rig.units import METRES
 def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
     """Return the poses that a file holds for an animation's figure, in its own world and unit.
 
-    ``motion``: what was read, metres.
-    ``animation``: what was written.
-    ``options``: which axis is up in the animation, and in the file.
+    ``motion``: the read motion, in metres.
+    ``animation``: the written animation.
+    ``options``: gives the up axes of the animation and the file.
     """
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
@@ -36,23 +36,25 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Motion
     if up_axis(options) == options.world_up:
         return found
     angle = -np.pi / 2 if up_axis(options) == "z" else np.pi / 2
-    return _turned(found, animation, np.array([angle, 0.0, 0.0]))
+    return _rotated(found, animation, np.array([angle, 0.0, 0.0]))
 
 
-def _turned(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
-    """Return frames with the world turned: R' = Q R, T' = Q (p + T) - p, the root at rest at p."""
+def _rotated(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
+    """Return frames with the world rotated: R' = Q R, T' = Q (p + T) - p, the root at rest at p."""
     rotations = frames.rotations.copy()
     rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
     root = rest_translations_of(animation.figure, frames.shape_weights)[:, 0]
-    turned = np.round(rotation_vector_to_matrix(vector))  # a quarter turn has no fractions
+    turned = np.round(
+        rotation_vector_to_matrix(vector)
+    )  # a rotation by 90 degrees has integer entries
     places = (root + frames.figure_translations) @ turned.T - root
     return replace(frames, rotations=rotations, figure_translations=places)
 
 
 class Records:
-    """The records of one person in EasyMocap's frames, taken from their text.
+    """The records of one person in EasyMocap's frames, parsed from their text.
 
-    ``member``: whose joints they turn.
+    ``member``: the body model.
     """
 
     def __init__(self, member: Member) -> None:
@@ -60,7 +62,7 @@ class Records:
         self._rows: list[dict[str, Any]] = []
 
     def motion(self, rate: float) -> BodyMotion:
-        """Return all frames that were added."""
+        """Return the motion of all added frames."""
         turned = self._array("poses").reshape(len(self._rows), -1, 3)
         turned[:, 0] = self._array("Rh")
         has_expression = "expression" in self._rows[0]
@@ -76,7 +78,7 @@ class Records:
         )
 
     def add(self, text: str) -> None:
-        """Add the record of one more frame."""
+        """Add the record of the next frame."""
         self._rows.append(json.loads(text))
 
     def _array(self, key: str) -> Floats:

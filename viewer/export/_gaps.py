@@ -1,4 +1,4 @@
-"""Missing frames of a motion, for formats that know none: bridged, or cut out."""
+"""Missing frames of a motion, for formats without gaps: interpolated, held, or split."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _FILLING = {
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:
-    """Return where runs of True begin and end: first index, and the one behind the last."""
+    """Return the runs of True: first index, and the one after the last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def gaps_text(present: Bools, first_frame: int) -> str:
-    """Return which frames are missing, in words: ``"frames 3 to 5, 9"``."""
+    """Return the missing frames as text: ``"frames 3 to 5, 9"``."""
     found = [
         f"{a + first_frame}" if b == a + 1 else f"{a + first_frame} to {b - 1 + first_frame}"
         for a, b in runs(~present)
@@ -43,9 +43,9 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
     """Return frames without gaps.
 
     ``frames``: at least one of them present.
-    ``interpolate``: true: rotations on the shorter arc, all else in a straight line, between the
-      frames around a gap. False: the frame before it. Before the first and after the last frame,
-      that one.
+    ``interpolate``: if true, interpolate between the frames around a gap, rotations along the
+      shorter arc and all else linearly; if false, hold the frame before it. Gaps at the ends hold
+      the first or last frame.
     """
     if frames.present.all():
         return frames
@@ -72,16 +72,16 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
 
 
 def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]:
-    """Return the frames for formats that can leave some out: filled only if that is asked for.
+    """Return the frames for formats that allow gaps: interpolated or held only on request.
 
     ``frames``: with gaps or without.
-    ``gaps``: a key of ``GAPS``, or empty. Where each frame stands alone, split frames are those
-      there.
-    ``first_frame``: what the first frame is called.
-    Returns ``frames``: the same if they are not filled.
-    Returns ``note``: what was done, as ``"missing frames 3 to 5: the last pose is held"``; empty if
-      nothing was.
-    Raises RigError if it is no such way.
+    ``gaps``: a key of ``GAPS``, or empty. If every frame has its own file, ``split`` keeps the
+      gaps.
+    ``first_frame``: number of the first frame.
+    Returns ``frames``: unchanged if the gaps are kept.
+    Returns ``note``: a message such as ``"missing frames 3 to 5: the last pose is held"``, or an
+      empty string.
+    Raises RigError if ``gaps`` is not a key of ``GAPS``.
     """
     if gaps not in ("", *GAPS):
         raise RigError(f'way to close gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')

@@ -1,4 +1,4 @@
-"""Names of the files that hold motions: of several actors, of parts, of single frames."""
+"""File names of exported motions: of several actors, of parts, of single frames."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 
-_WITHOUT_SPLITS = ("npz",)  # exporters that write one file, gaps or not
+_WITHOUT_SPLITS = ("npz",)  # exporters that write one file despite gaps
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
     """Return the file of each actor: people by their number, others counted from 2 on.
 
-    ``output``: what was asked for; its suffix is kept. One actor alone gets this file.
+    ``output``: the requested file; its suffix is kept. A single actor gets this file.
     ``actors``: in the order of the scene.
-    Returns: as many, all different.
+    Returns: one path per actor, all different.
     """
     if len(actors) == 1:
         return [output]
@@ -37,7 +37,7 @@ def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
 
 
 def split_paths(path: Path, count: int) -> list[Path]:
-    """Return the files of a motion that is cut at its gaps: ``name-1.bvh``, ``name-2.bvh`` ….
+    """Return the files of a motion that is split at its gaps: ``name-1.bvh``, ``name-2.bvh`` ….
 
     >>> [file.name for file in split_paths(Path("walk.bvh"), 2)]
     ['walk-1.bvh', 'walk-2.bvh']
@@ -48,9 +48,9 @@ def split_paths(path: Path, count: int) -> list[Path]:
 
 
 def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
-    """Return the file of each frame, whose number replaces ``{frame}`` in the name.
+    """Return the file of each frame; its number replaces ``{frame}`` in the name.
 
-    Raises OutputError if two frames would have one file.
+    Raises OutputError if two frames would have the same file.
     """
     files = [path.with_name(path.name.format(frame=int(frame))) for frame in frames]
     if len(set(files)) < len(files):
@@ -61,7 +61,7 @@ def numbered_paths(path: Path, frames: Iterable[int]) -> list[Path]:
 def animation_files(
     animation: SampledAnimation | SampledPoints, path: Path, key: str, options: MotionOptions
 ) -> list[Path]:
-    """Return all files that ``export_animation`` writes under names that were asked for.
+    """Return all files that ``export_animation`` writes for a requested name.
 
     ``animation``: a motion.
     ``path``: a file, for numbered ones with ``{frame}``.

@@ -1,4 +1,4 @@
-"""What exporters of motions can be asked for; each takes what concerns its format."""
+"""Options of motion export; each exporter uses those of its format."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ GAPS = {
     "interpolate": "rotations on the shorter arc between the frames around",
     "split": "one file for each run of frames",
 }
-"""What is written for missing frames."""
+"""Handling of missing frames."""
 
-_CLOSED = "hold"  # the way of formats that know no missing frames
+_CLOSED = "hold"  # the default of formats without missing frames
 
 
 @dataclass(slots=True)
 class MotionOptions:
-    """How a motion is written.
+    """Options of writing a motion.
 
     Attributes
     ----------
@@ -32,17 +32,17 @@ class MotionOptions:
     rotation_order : str
         One of ``ROTATION_ORDERS``.
     gaps : str
-        A key of ``GAPS``; empty for the format's default: missing frames are left out where the
-        format can do so, and held where it cannot.
+        A key of ``GAPS``; empty for the format's default: missing frames are omitted if the
+        format allows it, and held otherwise.
     rest_frame : bool
         Put the rest pose before the first frame.
     digits : int
         Decimals of text formats.
     world_up : "y", "z", "-y" or "-z"
-        The axis that points up in the world of the animation; the last two only for exporters that
-        keep that world.
+        The up axis of the animation's world; the last two only for exporters that keep that
+        world.
     skinning : Skinning
-        How joints move the mesh, where vertices are written.
+        Skinning method and options, if vertices are written.
     """
 
     unit: str = ""
@@ -56,5 +56,5 @@ class MotionOptions:
 
     @property
     def closing(self) -> str:
-        """How gaps are closed in formats that know no missing frames: a key of ``GAPS``."""
+        """Handling of gaps in formats without missing frames: a key of ``GAPS``."""
         return self.gaps or _CLOSED

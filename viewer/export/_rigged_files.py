@@ -1,4 +1,4 @@
-"""What is written of a mesh that got a rig: a course rig with mesh and pose, or one ``.npz``."""
+"""Files of a newly rigged mesh: a course rig with mesh and pose, or one ``.npz``."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, figure_pose
 
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin")
-"""Those that ``files_of`` knows."""
+"""Suffixes that ``files_of`` accepts."""
 
 _RIG = (".skel", ".skin", ".obj", ".json")
 
 
 def files_of(output: Path) -> list[Path]:
-    """Return all files that one output stands for.
+    """Return all files that belong to one output.
 
-    Raises UnsupportedFormatError if its suffix is none of ``.skel``, ``.skin`` and ``.npz``.
+    Raises UnsupportedFormatError if its suffix is not one of ``.skel``, ``.skin`` and ``.npz``.
     """
     suffix = output.suffix.lower()
     if suffix == ".npz":
@@ -42,14 +42,14 @@ def files_of(output: Path) -> list[Path]:
 
 
 def write_rigged(rigged: Rigged, output: Path) -> list[str]:
-    """Write a rigged mesh, all of its files or none.
+    """Write all files of a rigged mesh, or none.
 
-    ``rigged``: the result.
+    ``rigged``: the result of the rig transfer.
     ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
       coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives, see
-      ``without_correctives``. ``.npz``: all of it in one file.
-    Returns: what was written, and what a format cannot hold.
-    Raises RigError if the skeleton has what ``.skel`` cannot hold.
+      ``without_correctives``. ``.npz``: everything in one file.
+    Returns: messages about what was written, and about what a format cannot hold.
+    Raises RigError if ``.skel`` cannot hold the skeleton.
     Raises UnsupportedFormatError as ``files_of``.
     Raises OutputError if a file cannot be written.
     """
@@ -76,9 +76,9 @@ def write_rigged(rigged: Rigged, output: Path) -> list[str]:
 
 
 def without_correctives(rigged: Rigged) -> Figure:
-    """Return the figure without pose correctives that still gives the target in its pose.
+    """Return the figure without pose correctives that still matches the target in its pose.
 
-    What they add in that pose goes into the rest mesh: V + B(pose).
+    Their offsets in that pose are added to the rest mesh: V + B(pose).
     """
     figure = rigged.figure
     correctives, mesh, skeleton = figure.correctives, figure.mesh, figure.skeleton
@@ -91,7 +91,7 @@ def without_correctives(rigged: Rigged) -> Figure:
 
 
 def _arrays(rigged: Rigged) -> dict[str, NDArray[Any]]:
-    """Return what a program may want to know beside the figure itself."""
+    """Return the data about the rig transfer that accompanies the figure."""
     pose = rigged.pose
     found = rigged.alignment
     placed = found.similarity.matrix if found else np.linalg.inv(rigged.placement)

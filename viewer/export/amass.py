@@ -1,4 +1,4 @@
-"""Write the motion of a body of the SMPL family as AMASS has it.
+"""Exporter of AMASS files: motions of bodies of the SMPL family.
 
 ::
 
@@ -6,7 +6,7 @@
     surface_model_type   num_betas   mocap_framerate   mocap_frame_rate   up   present (N,)
 
 ``trans`` is transl of V = R (X - J0) + J0 + transl, ``poses`` are rotation vectors in the model's
-own order. ``up`` and ``present``, which is there if frames were missing, are our own.
+own order. ``up`` and ``present``, which is present if frames are missing, are extensions.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from viewer.rig.motion.sampled_animation import SampledAnimation
 
 __all__ = ["export_animation"]
 
-_FEWEST = 16  # shape numbers that readers of AMASS ask for
+_FEWEST = 16  # shape coefficients that readers of AMASS require
 _TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
-    """Write a motion, its world as it is unless another up axis is asked for.
+    """Write a motion in its own world unless another up axis is requested.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             length = "1 frame" if stop - start == 1 else f"{stop - start} frames"
             written.append(
                 f"{printable(file, 300)}: {length} of {member.title} at "
-                f"{animation.frame_rate:g} a second, {up} up"
+                f"{animation.frame_rate:g} per second, {up} up"
             )
     lost = []
     for file, span in zip(paths, spans, strict=True):

@@ -1,4 +1,4 @@
-"""Write motions of course rigs as ``.anim``: the clip's own keys, or a key per frame."""
+"""Exporter of ``.anim`` files: motions of course rigs, as their own keys or a key per frame."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ __all__ = ["export_animation"]
 
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
 _BLOCK = 4096  # frames measured at a time
-_SAME = 1e-9  # of a frame, or of a length: less is no difference
+_SAME = 1e-9  # of a frame, or of a length: smaller differences are ignored
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
     """Write a motion as a clip of keys, see ``viewer.export.export_animation``.
 
-    A keyed clip whose frames are all asked for is written with its own keys, exactly. Any other
-    motion gets a key per frame at the seconds it has; between them straight or smooth curves,
-    whichever keep the joints nearer to the motion.
+    A keyframed clip whose frames are all requested is written exactly, with its own keys. Any
+    other motion gets a key per frame, with linear or smooth tangents, whichever keep the joints
+    nearer to the motion.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def _export_frames(
 def _losses(
     animation: SampledAnimation, source: Source, span: tuple[int, int], options: MotionOptions
 ) -> list[str]:
-    """Read a file back, and say how far it is off on the frames, and between them.
+    """Read a file back and return messages about its errors on the frames and between them.
 
     Between them captures are compared half-way, and on frames of their own.
     """
@@ -171,14 +171,14 @@ def _dofs(animation: SampledAnimation, skeleton: Skeleton, frames: Frames) -> Fl
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(frames.rotations)
     angles = euler_angles(within, "zyx")
-    # Angles that run on without jumps might run out of limits.
+    # Unwrapped angles could exceed the limits.
     is_free = np.isinf(skeleton.dof_limits[3:]).all(axis=1).reshape(-1, 3).all(axis=1)
     angles[:, is_free] = unrolled(angles, "zyx")[:, is_free]
     dofs = np.zeros((frames.n_frames, skeleton.n_dofs))
     dofs[:, 3:] = angles[..., ::-1].reshape(frames.n_frames, -1)
     dofs[:, :3] = frames.translations[:, 0]
     if isinstance(animation.motion, Clip):
-        # Its own numbers instead of angles that make the same rotations.
+        # The clip's own angles instead of equivalent ones.
         targets, values = evaluate_all(animation.motion, frames.times)
         dofs[:, targets] = values
     dofs = np.clip(dofs, *skeleton.dof_limits.T)
@@ -213,7 +213,7 @@ def _summary(path: Path, clip: Clip) -> str:
 
 
 def _left_out(figure: Figure, frames: Frames) -> list[str]:
-    """Say what a clip cannot hold."""
+    """Return messages about everything that a clip cannot hold."""
     notes, there = [], frames.present
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:

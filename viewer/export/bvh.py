@@ -1,4 +1,4 @@
-"""Write motions as ``.bvh``: a skeleton without rotations at rest, and its joints' channels."""
+"""Exporter of ``.bvh`` files: a skeleton without rest rotations, and its joints' channels."""
 
 from __future__ import annotations
 
@@ -38,15 +38,14 @@ _LISTED = 8  # joints in a note
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
-    """Write a motion, read it back, and say how far its joints and a skin on them are off.
+    """Write a motion, read it back, and report the errors of its joints and of a skin on them.
 
     Offsets are those of the shape in the first frame that is present. The root has offset 0 and
     its place in its channels, so that readers that add and readers that replace offsets agree.
-    Angles run on without jumps.
+    Angles are unwrapped.
 
-    A file holds no mesh. What is said of vertices is how far those of the figure as it moves here
-    are from those of its own skin, in the shape of the bones, on the joints of the file; both are
-    blended linearly.
+    A file holds no mesh. The reported error of vertices is the distance between the figure's skin
+    and the same skin, in the shape of the bones, driven by the file's joints; both use LBS.
 
     Parameters
     ----------
@@ -191,7 +190,7 @@ class _Writer:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the joints are called in the file."""
+        """Names of the joints in the file."""
         return plain_names(self.figure.require_skeleton().names)
 
     @property
@@ -220,7 +219,7 @@ class _Writer:
         ).encode("ascii")
 
     def losses(self, path: Path, text: bytes, reference: int, span: tuple[int, int]) -> list[str]:
-        """Read a file's text back, and say how far joints and vertices are from the motion."""
+        """Read a file's text back, and return messages about its differences from the motion."""
         animation, how = self.animation, self.options.skinning
         names = self.names[-animation.figure.require_skeleton().n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
@@ -239,7 +238,7 @@ class _Writer:
         span = span if stop - start > 1 else f"1 frame ({first})"
         return (
             f"{printable(path, 300)}: {counted(len(self.names), 'joint')}, {rest}{span} at "
-            f"{self.animation.frame_rate:g} a second, "
+            f"{self.animation.frame_rate:g} per second, "
             f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
         )
 
@@ -247,7 +246,7 @@ class _Writer:
 def _remarks(
     animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
 ) -> list[str]:
-    """Say what was changed or left out."""
+    """Return messages about everything changed or omitted."""
     frames, notes = animation.frames, []
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:

@@ -1,12 +1,12 @@
-"""Write the motions of bodies of the SMPL family as an EasyMocap folder.
+"""Exporter of EasyMocap folders: motions of bodies of the SMPL family.
 
 ::
 
     out/smpl/000000.json    [{"id", "Rh" [[3]], "Th" [[3]], "poses" [[3 J]], "shapes" [[S]],
                               "expression" [[E]]}, …]
 
-``Rh`` and ``Th`` place the body about the model's origin, so the first three ``poses`` are 0. Who
-is missing in a frame is missing in its file.
+``Rh`` and ``Th`` place the body about the model's origin, so the first three ``poses`` are 0. A
+person absent from a frame is absent from its file.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def export_animations(
     count = "1 frame" if stop - first == 1 else f"{stop - first} frames"
     return [
         f"{printable(path / _FOLDER, 300)}: {count} of {who}, {up_axis(options)} up; "
-        f"EasyMocap keeps no frame rate: it is {animations[0].frame_rate:g} a second",
+        f"EasyMocap keeps no frame rate: it is {animations[0].frame_rate:g} per second",
         *(line for person in people for line in person.losses(path / _FOLDER, options)),
         *notes,
     ]

@@ -1,4 +1,4 @@
-"""Write figures as glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
+"""Exporter of glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
 
 Facts are those of the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are
 metres, y is up. Data stay as they are: a node above the figure turns what has z up, and scales
@@ -109,7 +109,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     saved = _files(list(zip(paths, documents, strict=True)))
     for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
         motion = _frames_text(animation.first_frame + start, stop - start)
-        rate = f"at {animation.frame_rate:g} a second"
+        rate = f"at {animation.frame_rate:g} per second"
         size = f"{len(data[file])} bytes"
         notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]
         notes += _beside(data, file)

@@ -1,4 +1,4 @@
-"""Write a posed figure as named arrays, for programs in Python.
+"""Exporter of ``.npz`` files: posed figures, motions and points as named arrays.
 
 ::
 
@@ -180,4 +180,4 @@ def _point_arrays(
 def _count(present: Bools, rate: float) -> str:
     missing = int((~present).sum())
     gaps = f"; {missing} of them missing, NaN" if missing else ""
-    return f"{len(present)} frames at {rate:g} a second{gaps}"
+    return f"{len(present)} frames at {rate:g} per second{gaps}"

@@ -1,4 +1,4 @@
-"""Write a posed mesh as Wavefront ``.obj``, with a ``.mtl`` and picture if it has a texture.
+"""Exporter of Wavefront ``.obj`` files, with a ``.mtl`` and image if the mesh is textured.
 
 Vertices keep the file's numbering: along seams a face refers to several ``vt`` for one ``v``.
 """
@@ -72,7 +72,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             written += export(Actor(animation.figure, pose), file, options.skinning)
     missing = poses.n_frames - len(files)
     if not files:
-        return [f"{printable(path, 300)}: nobody is there in these frames, nothing was written"]
+        return [f"{printable(path, 300)}: everybody is absent in these frames, nothing was written"]
     name = printable(path, 300)
     gaps = f"; {missing} frames are missing in the motion, and have no file" if missing else ""
     span = f"{len(files)} files, {files[0].name} to {files[-1].name}"
@@ -111,7 +111,7 @@ def _materials(mesh: Mesh, path: Path) -> dict[Path, bytes]:
     """Return the pictures and, last, the ``.mtl`` that names them; nothing without a picture."""
     files: dict[Path, bytes] = {}
     parts = [f"newmtl {_PLAIN}\nKd 1 1 1\n"]
-    stem = path.stem[:80]  # long ones would be cut behind the number
+    stem = path.stem[:80]  # longer names would be truncated after the number
     for index, material in enumerate(mesh.materials if mesh.uvs is not None else ()):
         parts.append(f"newmtl material{index}\nKd 1 1 1\n")
         if material.image is not None:

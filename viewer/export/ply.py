@@ -1,4 +1,4 @@
-"""Write a posed mesh as binary ``.ply``; texture coordinates belong to the triangles' corners."""
+"""Exporter of binary ``.ply`` files, with texture coordinates per triangle corner."""
 
 from __future__ import annotations
 

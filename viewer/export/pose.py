@@ -1,4 +1,4 @@
-"""Write the pose alone, by joint names (``.json``) or as the model's own numbers (``.txt``)."""
+"""Exporter of poses, by joint names (``.json``) or as the model's pose vector (``.txt``)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write any figure as a course rig: a ``.skel`` and a ``.skin`` beside each other."""
+"""Exporter of course rigs: a ``.skel`` and a ``.skin`` for any figure."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["export"]
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
-    """Write skeleton and skin, read them back, and say how far the posed mesh is off.
+    """Write skeleton and skin, read them back, and report the error of the posed mesh.
 
     The shape becomes the rest mesh, the pose the skeleton's own; the figure's translation goes
     to the root's offset.
@@ -55,7 +55,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
-    """Return what is written: the pictures too, which the writer puts where they are named."""
+    """Return all written files, including images, which the writer puts where they are named."""
     if rig.mesh is None:
         return [skel]
     pictures = [material.texture for material in rig.mesh.materials if material.image is not None]
@@ -63,7 +63,7 @@ def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
 
 
 def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.ndarray | None]:
-    """Return what the two files hold of a shaped figure, and the vertex of each split one."""
+    """Return the figure as the two files hold it, and the original vertex of each split one."""
     skeleton, mesh, skin = figure.require_skeleton(), figure.mesh, figure.skin
     posed, order = course_skeleton(skeleton, pose)
     if mesh is None:
@@ -104,7 +104,7 @@ def scaled(figure: Figure, factor: float) -> Figure:
 
 
 def _lost(figure: Figure, pose: Pose) -> list[str]:
-    """Say in words what the formats have no place for."""
+    """Return a message about everything that the formats cannot hold."""
     lost = []
     if figure.blend_shapes is not None:
         lost.append(f"{figure.n_shapes} shape directions (the present shape is kept)")
@@ -126,7 +126,7 @@ def _lost(figure: Figure, pose: Pose) -> list[str]:
 def _error(
     actor: Actor, files: list[Source], sources: np.ndarray | None, skinning: Skinning
 ) -> list[str]:
-    """Read the files back, pose them as they say, and compare with the figure as it is posed."""
+    """Read the files back, and compare their pose with the posed figure."""
     figure, pose = actor.figure, actor.require_pose()
     skeleton = read(files[0])
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None

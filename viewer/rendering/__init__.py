@@ -1,1 +1,1 @@
-"""Drawing with OpenGL 3.3 through moderngl: the same code for a window and without one."""
+"""Drawing with OpenGL 3.3 through moderngl, with or without a window."""

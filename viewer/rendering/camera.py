@@ -39,20 +39,20 @@ VIEWS = {
 }
 """Azimuth from the front, and inclination, in degrees; "left" looks at a left hand's side."""
 
-_USUAL_AZIMUTH = 35.0  # from the front, at first
+_USUAL_AZIMUTH = 35.0  # initial angle from the front
 
-_MARGIN = 1.08  # room around a fitted figure
-_SMALLEST = 1e-9  # distance of a camera that fits nothing
+_MARGIN = 1.08  # margin around a framed figure
+_SMALLEST = 1e-9  # distance of a camera that frames nothing
 
 
 @dataclass(slots=True)
 class Camera:
-    """Where the picture is taken from.
+    """Position, orientation and projection of an orbit camera.
 
     Attributes
     ----------
     target : (3,)
-        The point it turns about, scene space.
+        The point that it orbits, scene space.
     distance : float
         From eye to target, scene units.
     azimuth, inclination : float
@@ -65,10 +65,10 @@ class Camera:
     up : "y" or "z"
         The scene's up axis.
     fixed : CameraView or None
-        A calibrated camera that is looked through: the matrices are then its own, and all else
-        says where the camera will be once this is None again.
+        A calibrated camera to look through: it provides the matrices, and the other fields
+        describe the camera after this is reset to None.
     front : float
-        Azimuth from which the front is seen: named views count from it.
+        Azimuth from which the front is seen; named views are relative to it.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
@@ -82,7 +82,7 @@ class Camera:
     front: float = 0.0
 
     def copy(self) -> Camera:
-        """Return a camera that shares nothing with this one."""
+        """Return an independent copy."""
         return Camera(
             self.target.copy(),
             self.distance,
@@ -97,7 +97,7 @@ class Camera:
 
     @property
     def is_parallel(self) -> bool:
-        """Whether it projects along parallels: a calibrated camera never does."""
+        """Whether the projection is parallel; that of a calibrated camera never is."""
         return self.orthographic and self.fixed is None
 
     def view_matrix(self) -> Floats:
@@ -141,14 +141,14 @@ class Camera:
 
     @property
     def half_height(self) -> float:
-        """Half of what is seen vertically at the target, scene units."""
+        """Half the visible height at the target, scene units."""
         return self.distance * math.tan(math.radians(self.fov) / 2)
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Return the camera's right, up and backward axes in scene space, each (3,).
 
-    Up is the derivative of the backward axis by inclination, so it is defined at the poles too.
+    Up is the derivative of the backward axis by inclination, so it is also defined at the poles.
     """
     azimuth, inclination = math.radians(camera.azimuth), math.radians(camera.inclination)
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
@@ -157,13 +157,13 @@ def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     up = np.array([-sin_i * sin_a, cos_i, -sin_i * cos_a])
     backward = np.array([cos_i * sin_a, sin_i, cos_i * cos_a])
     if camera.up == "z":
-        # Turn y up into z up: (x, y, z) -> (x, -z, y).
+        # Rotate y up to z up: (x, y, z) -> (x, -z, y).
         right, up, backward = (np.array([a[0], -a[2], a[1]]) for a in (right, up, backward))
     return right, up, backward
 
 
 def front_azimuth(front: str, up: Literal["y", "z"]) -> float:
-    """Return the azimuth of a camera that sees a front, as ``"+x"``, from straight ahead: degrees.
+    """Return the azimuth, in degrees, of a camera that looks straight at a front such as ``"+x"``.
 
     >>> front_azimuth("+z", "y"), front_azimuth("+x", "z"), front_azimuth("-z", "y")
     (0.0, 90.0, 180.0)
@@ -176,20 +176,20 @@ def front_azimuth(front: str, up: Literal["y", "z"]) -> float:
 
 
 def facing_camera(front: str, up: Literal["y", "z"], orthographic: bool = False) -> Camera:
-    """Return a camera that looks at a front from a little to its left and above, not yet fitted."""
+    """Return a camera that views a front from slightly left and above, not framed yet."""
     ahead = front_azimuth(front, up)
     azimuth = _wrapped(ahead + _USUAL_AZIMUTH)
     return Camera(azimuth=azimuth, orthographic=orthographic, up=up, front=ahead)
 
 
 def look_from(camera: Camera, view: str) -> None:
-    """Turn to a named view, a key of ``VIEWS``."""
+    """Rotate to a named view, a key of ``VIEWS``."""
     azimuth, camera.inclination = VIEWS[view]
     camera.azimuth = _wrapped(camera.front + azimuth)
 
 
 def _wrapped(angle: float) -> float:
-    """Return an angle in degrees as -180 to 180; half a turn keeps its sign."""
+    """Return an angle in degrees wrapped to -180..180; half a revolution keeps its sign."""
     return angle if -180.0 <= angle <= 180.0 else (angle + 180.0) % 360.0 - 180.0
 
 
@@ -201,30 +201,30 @@ def eye(camera: Camera) -> Floats:
 def camera_from_view(
     view: CameraView, size: tuple[int, int], up: Literal["y", "z"], box: Floats | None = None
 ) -> Camera:
-    """Return a camera that looks through a calibrated one.
+    """Return a camera that takes its view from a calibrated one.
 
-    Setting its ``fixed`` to None leaves an orbit camera at the same place that looks along the same
-    axis, about as wide; it stands upright, and the picture's middle is on the axis.
+    With ``fixed`` reset to None it is an orbit camera at the same position with the same axis and
+    about the same field of view; it is upright, and the axis passes through the picture's centre.
 
     Parameters
     ----------
     view : CameraView
         In scene space.
     size : (int, int)
-        Width and height of what is drawn, pixels.
+        Width and height of the drawn picture, pixels.
     up : "y" or "z"
         The scene's up axis.
     box : (2, 3), optional
-        What will be orbited about, scene space; the origin if omitted.
+        Bounds of the objects to orbit, scene space; the origin if omitted.
 
     Raises
     ------
     RigError
-        If nothing says how large the camera's pictures are.
+        If the size of the camera's pictures is unknown.
     """
     width, height = picture_size(view)
     aspect = size[0] / size[1]
-    seen = max(height, width / aspect)  # the picture's rows, and what is seen above and below
+    seen = max(height, width / aspect)  # the picture's rows, and the margins above and below
     backward = -view.rotation[2]
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
@@ -245,31 +245,31 @@ def camera_from_view(
 
 
 def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:
-    """Aim at the middle of some points and step back until all are seen; direction stays.
+    """Frame some points: aim at their centre and step back until all are visible.
 
     Parameters
     ----------
     camera : Camera
         Changed in place: target and distance.
     points : (N, 3)
-        What to see, scene space.
+        Points to frame, scene space.
     aspect : float
-        Width / height of the picture.
+    Width / height of the picture.
     free_height : float
-        How much of the picture's height is to be used, about its middle; 0 to 1.
+        Fraction of the picture's height to use, about its centre; 0 to 1.
     """
     camera.target = bounding_box(points).mean(axis=0)
     across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
     tangent = math.tan(math.radians(camera.fov) / 2)
     wide, high = tangent * aspect / _MARGIN, tangent * min(free_height, 1.0 / _MARGIN)
     needed = np.maximum(np.abs(across) / wide, np.abs(upward) / high)
-    # Perspective makes what is near larger, so a near point needs the camera further away.
+    # Perspective enlarges near points, so they need a larger distance.
     distance = float((needed if camera.orthographic else needed + near).max(initial=0.0))
     camera.distance = distance if distance > _SMALLEST else 1.0
 
 
 def orbit(camera: Camera, azimuth: float, inclination: float) -> None:
-    """Turn about the target by angles in degrees; the poles are not crossed."""
+    """Rotate about the target by angles in degrees, without crossing the poles."""
     camera.azimuth = (camera.azimuth + azimuth + 180.0) % 360.0 - 180.0
     camera.inclination = min(max(camera.inclination + inclination, -90.0), 90.0)
 
@@ -291,9 +291,9 @@ def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
     factor : float
         New distance over old distance.
     x, y : float
-        The pointer from the middle of the picture, right and up, in picture heights.
+        Offset of the pointer from the picture's centre, right and up, in picture heights.
     """
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
-    factor = distance / camera.distance  # at the end of the range nothing moves any more
+    factor = distance / camera.distance  # no movement at the ends of the range
     pan(camera, x * (1.0 - factor), y * (1.0 - factor))
     camera.distance = distance

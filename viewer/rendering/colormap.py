@@ -1,4 +1,4 @@
-"""Colour maps of scalar quantities: even steps as the eye sees them, also with other eyes."""
+"""Colour maps of scalar quantities: perceptually uniform and safe for colour blindness."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.rig.arrays import Bytes, Floats
 __all__ = ["colormap", "diverging_map", "oklab"]
 
 # Anchors in OKLab (Ottosson 2020): lightness rises evenly from violet over red to yellow, so
-# the map reads in grey and to colour-blind eyes, like matplotlib's "inferno".
+# the map works in grey and for colour-blind people, like matplotlib's "inferno".
 _ANCHORS = np.array(
     [
         [0.24, 0.020, -0.075],
@@ -20,8 +20,8 @@ _ANCHORS = np.array(
         [0.96, -0.020, 0.130],
     ]
 )
-# From blue over white to red: lightness falls evenly to both sides, and the two hues stay apart
-# for people who do not tell red from green.
+# From blue over white to red: lightness falls evenly to both sides, and the two hues differ even
+# for red-green colour blindness.
 _DIVERGING = np.array(
     [
         [0.36, -0.020, -0.130],
@@ -76,6 +76,6 @@ def _pixels(anchors: Floats, places: Floats, count: int) -> Bytes:
 
 
 def oklab(colors: Floats) -> Floats:
-    """Return linear colours, (..., 3), in OKLab, where distances are as the eye sees them."""
+    """Return linear colours, (..., 3), in OKLab, where distances are perceptually uniform."""
     cones = np.cbrt(np.maximum(colors @ np.linalg.inv(_TO_LINEAR_RGB).T, 0.0))
     return cones @ np.linalg.inv(_FROM_OKLAB).T

@@ -1,4 +1,4 @@
-"""Aim a camera at a whole motion: what is seen in some of its frames, fitted at once."""
+"""Framing of a whole motion: a camera fitted to a selection of its frames."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ __all__ = [
     "outermost",
 ]
 
-_MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # looked at for fitting
+_MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # used for fitting
 _N_DIRECTIONS = 1000
 _BLOCK = 5_000  # points at a time: the table of products stays below 40 MB
-_N_VIEWS = 24  # of a turning camera, 15 degrees apart in a full turn
+_N_VIEWS = 24  # of a rotating camera, 15 degrees apart in a full rotation
 
 
 def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
-    """Return what the camera of a recording should fit, from up to 32 of its frames.
+    """Return the points that a recording's camera should frame, from up to 32 of its frames.
 
     Parameters
     ----------
@@ -44,10 +44,10 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     Returns
     -------
     points : (N, 3)
-        The outermost points of these frames, scene space; as seen from a camera that goes with
-        whom it follows.
+        The outermost points of these frames, scene space; relative to the followed actor if the
+        camera follows one.
     box : (2, 3)
-        Around all of them where they are: the recording's ``box``.
+        Bounds of all points in the scene: the recording's ``box``.
     """
     scene, follow, show = copied(recording.scene), recording.follow, recording.options.show
     clouds: list[Floats] = []
@@ -56,7 +56,7 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     for index in _looked_at(recording):
         pose_scene(scene, recording, float(recording.times[index]))
         if not any(actor.is_drawn for actor in scene.actors) and len(recording.times) > 1:
-            continue  # everybody is absent: nothing to fit
+            continue  # everybody is absent
         points = outermost(scene_points(scene, show))
         boxes.append(bounding_box(points))
         if follow is not None:
@@ -78,7 +78,7 @@ def _looked_at(recording: Recording) -> list[int]:
 
 
 def frames_looked_at(n_frames: int, most: int) -> list[int]:
-    """Return frames that stand for all, evenly spread from the first to the last.
+    """Return representative frames, evenly spaced from the first to the last.
 
     >>> frames_looked_at(7, 3)
     [0, 3, 6]
@@ -88,22 +88,22 @@ def frames_looked_at(n_frames: int, most: int) -> list[int]:
 
 
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
-    """Return the points that lie furthest along each of many directions.
+    """Return the extreme points along each of many directions.
 
-    The box around them is exact. What else a camera that is fitted to them may miss is well below
-    1 % of their size: 1000 directions are 7 degrees apart, and ``fit`` leaves 8 % of room.
+    Their bounding box is exact. A camera fitted to them misses well below 1 % of the size: 1000
+    directions are 7 degrees apart, and ``fit`` leaves a margin of 8 %.
 
     Parameters
     ----------
     points : (N, 3)
         At least one.
     n_directions : int
-        100 are 20 degrees apart: what is missed is below 2 %.
+        100 are 20 degrees apart, with an error below 2 %.
 
     Returns
     -------
     (M, 3)
-        Some of the points, at most 6 more than there are directions; all if they are not more.
+        A subset of at most ``n_directions + 6`` points; all if there are no more.
     """
     if len(points) <= n_directions:
         return points
@@ -128,7 +128,7 @@ def _directions(count: int) -> Floats:
 
 
 def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> None:
-    """Fit a camera so that it sees all points all the way round; see ``viewer.rendering.camera``.
+    """Fit a rotating camera so that all points stay visible; see ``viewer.rendering.camera``.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> N
     aspect : float
         Width / height of the picture.
     turn : float
-        Degrees by which it will turn about its target.
+        Rotation about the target in degrees.
     """
     first, widest = camera.azimuth, 0.0
     for share in np.linspace(0.0, 1.0, _N_VIEWS + 1) if turn else (0.0,):
@@ -150,19 +150,19 @@ def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> N
 
 
 def find_follow(scene: Scene, name: str) -> Follow:
-    """Return whom a camera follows.
+    """Return the actor or joint that a camera follows.
 
     Parameters
     ----------
     scene : Scene
-        Posed as it was when the camera was aimed.
+        In the pose at which the camera was aimed.
     name : str
         See ``follow_candidates``, of which the first is taken.
 
     Raises
     ------
     RigError
-        If nobody and nothing is called that.
+        If nothing has this name.
     """
     for index, joint in follow_candidates(scene, name):
         return _followed(scene, index, joint)
@@ -170,15 +170,15 @@ def find_follow(scene: Scene, name: str) -> Follow:
 
 
 def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
-    """Return all whom a name may mean: indices of actors, and of a joint or point of each.
+    """Return all candidates for a name: indices of actors, and of a joint or point of each.
 
     Parameters
     ----------
     scene : Scene
         With any number of actors.
     name : str
-        Of an actor, for its root joint or the middle of its points; or of a joint or captured
-        point; or a person's number; or somebody's joint, as ``fox/head`` or ``1:pelvis``.
+        Name of an actor, for its root joint or the centre of its points; of a joint or captured
+        point; a person's number; or the joint of an actor, such as ``fox/head`` or ``1:pelvis``.
     """
     wanted = name.lower()
     called = _called(scene)
@@ -186,7 +186,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
     found = [(index, roots[index]) for index, who in enumerate(called) if who[0] == wanted]
     found = found or _with_joint(scene, range(len(called)), wanted)
     found = found or [(index, roots[index]) for index, who in enumerate(called) if wanted in who]
-    # Joints may have a colon in their names, as mixamorig:Hips.
+    # Joint names may contain a colon, such as mixamorig:Hips.
     for place, sign in enumerate(wanted):
         if sign in "/:" and not found:
             whose = [index for index, who in enumerate(called) if wanted[:place] in who]
@@ -195,7 +195,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
 
 
 def _called(scene: Scene) -> list[tuple[str, ...]]:
-    """Return the names of each actor: of what was opened, of its figure, its person's number."""
+    """Return the names of each actor: its own, its figure's, its person's number."""
     names = []
     for actor in scene.actors:
         by_figure = replace(actor, called="").name
@@ -210,7 +210,7 @@ def _with_joint(scene: Scene, actors: Iterable[int], name: str) -> list[tuple[in
 
 
 def _hint(scene: Scene, name: str) -> str:
-    """Return the names that resemble one that was not found, or else all actors."""
+    """Return the names similar to an unknown one, or else all actors."""
     called = _called(scene)
     for place, sign in enumerate(name):
         whose = [i for i, who in enumerate(called) if sign in "/:" and name[:place].lower() in who]
@@ -219,7 +219,7 @@ def _hint(scene: Scene, name: str) -> str:
             return name_hint(name[place + 1 :], dict.fromkeys(joints))
     actors = [actor.name for actor in scene.actors]
     known = [*actors, *(joint for actor in scene.actors for joint in _part_names(actor))]
-    # Of somebody who is not there nobody's joint is meant, but joints may have a colon themselves.
+    # An unknown actor has no joints to suggest, but the colon may be part of a joint's name.
     if re.search("[/:]", name):
         known = [one for one in known if re.search("[/:]", one)]
     return did_you_mean(name, known) or f"actors: {', '.join(actors)}"

@@ -1,4 +1,4 @@
-"""Pictures without a window: a scene in, an array of pixels out."""
+"""Offscreen rendering: from a scene to an array of pixels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _thread = threading.local()
 
 
 class Offscreen:
-    """A context of its own that draws any number of scenes.
+    """A headless context that draws any number of scenes.
 
     The context is current only while it draws, so any thread may use it, one at a time; another
     context that was current must be made current again (``with context:``).
@@ -41,19 +41,20 @@ class Offscreen:
         self.context = headless_context(device)
         with self.context:
             self.renderer = Renderer(self.context)
-            self.context.info  # noqa: B018 - kept from now on, current or not
+            self.context.info  # noqa: B018 - cached, so that it is available without a current context
         if is_software(self.context):
             self.renderer.notes += [
-                f"drawing in software: {node} exists but you may not open it (group render)"
+                f"rendering in software: {node} exists but you lack the permission to open it "
+                "(group render)"
                 for node in unreadable_devices()
             ]
         self._target: Target | None = None
 
     def target(self, size: tuple[int, int], samples: int) -> Target:
-        """Return a target of this size, the last one if it fits."""
+        """Return a target of this size; reuse the last one if it matches."""
         target = self._target
         if target is None or (target.size, target.asked_samples) != (size, samples):
-            # The old one is still bound: moderngl binds it again after making another.
+            # The old one is still bound: moderngl rebinds it after creating another.
             self._target = Target(self.context, size, samples)
             if target is not None:
                 target.release()
@@ -76,7 +77,7 @@ class Offscreen:
             return target.read()
 
     def release(self) -> None:
-        """Free everything, the context too."""
+        """Free everything, including the context."""
         with self.context:
             if self._target is not None:
                 self._target.release()
@@ -91,28 +92,28 @@ class Offscreen:
 
 
 class _OfThread:
-    """A thread's own Offscreen: freed in that thread when it ends."""
+    """A thread's own Offscreen, freed when the thread ends."""
 
     def __init__(self) -> None:
         self.offscreen = Offscreen()
 
     def __del__(self) -> None:
-        # The end of the process frees everything, in an order of its own.
+        # At process exit everything is freed in an undefined order.
         if hasattr(self, "offscreen") and not sys.is_finalizing():
             self.offscreen.release()
 
 
 def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> Camera:
-    """Return a camera that sees the whole scene from the front, a little to its left and above.
+    """Return a camera that frames the whole scene from the front, slightly left and above.
 
     Parameters
     ----------
     scene : Scene
-        What to fit, and the up axis.
+        The scene to frame; gives the up axis.
     size : (int, int)
         Width and height of the picture.
     show : str
-        What of the figures is drawn, a key of ``SHOWN``.
+        Parts of the figures that are drawn, a key of ``SHOWN``.
     """
     camera = facing_camera(guess_front(scene), scene.up)
     fit(camera, scene_points(scene, show), size[0] / size[1])
@@ -127,19 +128,19 @@ def render(
 ) -> Bytes:
     """Draw a scene without a window.
 
-    The context is made on first use and kept, one per thread; ``Offscreen`` gives control.
+    The context is created on first use and cached, one per thread; ``Offscreen`` gives control.
     Afterwards no context is current in this thread.
 
     Parameters
     ----------
     scene : Scene
-        What to draw, as its actors are posed.
+        The scene, with its actors in their current poses.
     size : (int, int)
         Width and height in pixels.
     camera : Camera, optional
-        The point of view; fits the scene if omitted.
+        The point of view; frames the scene if omitted.
     options : DisplayOptions, optional
-        What is shown and how.
+        Display options.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How a scene is shown: plain data that the command line, the panels and the passes share."""
+"""Display options: plain data shared by the command line, the panels and the passes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SHOWN = {
     "both": "Skin and skeleton",
     "binding": "Skin in binding space",
 }
-"""What is drawn of a figure, with the name that menus show."""
+"""Parts of a figure that are drawn, with labels for menus."""
 
 BACKGROUNDS = ("gradient", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
@@ -29,8 +29,8 @@ class Light:
     Attributes
     ----------
     azimuth, inclination : float
-        Where it comes from, in degrees: about the up axis and above the horizon; relative to
-        the camera if the lights follow it, else to the scene.
+        Direction that it comes from, in degrees: about the up axis and above the horizon;
+        relative to the camera if the lights follow it, else to the scene.
     color : (r, g, b)
         Linear, 0 to 1.
     strength : float
@@ -45,7 +45,7 @@ class Light:
 
 @dataclass(slots=True)
 class Lights:
-    """Two coloured lights, the ambient light, and how surfaces shine.
+    """Two coloured lights, the ambient light, and the specular highlight.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Lights:
     specular, shininess : float
         Strength and exponent of the Blinn-Phong highlight.
     follow_camera : bool
-        Whether the directions turn with the camera.
+        Whether the directions rotate with the camera.
     """
 
     key: Light = field(default_factory=lambda: Light(-38.0, 38.0, (1.0, 0.80, 0.56), 1.0))
@@ -69,7 +69,7 @@ class Lights:
 
 @dataclass(slots=True)
 class DisplayOptions:
-    """Everything about a picture that is neither scene nor camera.
+    """All properties of a picture besides scene and camera.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class DisplayOptions:
         A key of ``viewer.rendering.gpu.program.SHADING``.
     flat, wireframe, normals, texture, grid, cull : bool
         One normal per triangle; edges on top; vertex normals as lines; the texture; the ground
-        grid; leave out triangles seen from behind.
+        grid; cull back faces.
     background : str
         ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
     skeleton_opacity : float
@@ -90,35 +90,35 @@ class DisplayOptions:
     lights : Lights
         The two lights.
     skinning : Skinning
-        How joints move the mesh.
+        Skinning method and options.
     scalar : str
-        What the shading ``"scalar"`` shows: a key of ``viewer.rig.scalars.SCALARS``, with a joint
-        behind a colon for a view of one (``"weight:left_knee"``, ``"weight:#4"``); without one the
-        selected joint is shown.
+        Quantity of the shading ``"scalar"``: a key of ``viewer.rig.scalars.SCALARS``, followed by
+        a colon and a joint for quantities of one joint (``"weight:left_knee"``,
+        ``"weight:#4"``); without it the selected joint is used.
     scalar_range : (float, float) or None
-        What the ends of its colour map stand for, in the unit of the legend; None for all that
-        there is, or nearly all of it in views with a robust range.
+        Range of the colour map, in the unit of the legend; None for the range of the values, or
+        of nearly all of them for quantities with a robust range.
     isolines : bool or None
-        Lines at every tenth of the range; None for those views where they are usual.
+        Lines at every tenth of the range; None for quantities that have them by default.
     legend : bool
-        Draw what the colours stand for into the picture.
+        Draw a legend of the colours into the picture.
     reduced : bool
         Draw the coarser mesh of figures that have one.
     keypoints : bool
         Draw the figure's keypoints as markers.
     hidden_parts : tuple of int
-        Body parts that are left out.
+        Hidden body parts.
     path_joints : tuple of (actor, joint)
-        Whose paths are drawn.
+        Joints whose motion paths are drawn.
     path_seconds : float
-        How far back and forth in time paths go; 0 for the whole motion.
+        Extent of motion paths before and after the current time; 0 for the whole motion.
     min_confidence : float
-        Captured keypoints that are less certain are left out.
+        Captured keypoints with less confidence are hidden.
     xray : bool
-        See bones through the skin, which is translucent unless its colours stand for numbers.
+        Show bones through the skin, which is translucent unless it shows a scalar quantity.
     joint_names, joint_axes : bool
-        Write the joints' names beside them, as far as they do not cover each other; draw the axes
-        of their spaces: x red, y green, z blue.
+        Label the joints, where labels do not overlap; draw the axes of their spaces:
+        x red, y green, z blue.
     """
 
     show: str = "skin"

@@ -1,4 +1,4 @@
-"""Colours that tell things apart: joints, body parts, counts."""
+"""Categorical colours of joints, body parts and counts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bytes, Floats, Ints
 __all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
 
 NOTHING = (52, 54, 58)
-"""Of what has no weight or no number, sRGB: a dark grey that no map contains."""
+"""Colour of missing weights or numbers, sRGB: a dark grey that no colour map contains."""
 
 # The first seven are Okabe and Ito's (2008); the others are those of a regular grid in sRGB that
 # lie farthest from all before them, in OKLab, for usual eyes and for eyes without long or middle
@@ -26,7 +26,7 @@ _DISTINCT = np.array(
     ]
 )  # fmt: skip
 _ROUNDS = (1.0, 0.55, 0.3)  # brightness: three of each colour
-_RELUCTANCE = 0.04  # in OKLab: so much farther must a darker colour be to be taken
+_RELUCTANCE = 0.04  # in OKLab: additional distance required of a darker colour
 
 # What eyes without long or middle cones see of linear colours (Machado et al. 2009, severity 1).
 _EYES = np.array(
@@ -44,7 +44,7 @@ _EYES = np.array(
         ],
     ]
 )
-_ENOUGH = 0.3  # in OKLab: colours further apart are not told apart any better
+_ENOUGH = 0.3  # in OKLab: larger distances do not improve the distinction
 
 
 def joint_palette(parents: Ints) -> Bytes:

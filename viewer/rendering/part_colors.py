@@ -1,4 +1,4 @@
-"""Colours that tell body parts apart."""
+"""Distinct colours of body parts."""
 
 from __future__ import annotations
 

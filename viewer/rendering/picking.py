@@ -1,4 +1,4 @@
-"""What is seen at a pixel: actors, joints, triangles and keypoints drawn as numbers."""
+"""Picking of actors, joints, triangles and keypoints at a pixel, by drawing their indices."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Pick:
 
 @dataclass(frozen=True, slots=True)
 class Passes:
-    """What picking shares with drawing."""
+    """Resources that picking shares with drawing."""
 
     programs: Programs
     meshes: MeshPass
@@ -80,7 +80,7 @@ _Found = Callable[[int, int, Floats], Pick]
 
 
 class PickPass:
-    """Draws numbers in place of colours, a few pixels of them, when somebody asks.
+    """Draws indices instead of colours into a few pixels, on request.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class PickPass:
         size: tuple[int, int],
         pixel: tuple[float, float],
     ) -> Pick | None:
-        """Return what is seen at a pixel, or nearest to it within three.
+        """Return the item at a pixel, or the nearest one within three pixels.
 
         Parameters
         ----------

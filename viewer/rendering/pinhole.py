@@ -1,4 +1,4 @@
-"""Calibrated cameras: the matrices by which OpenGL draws what such a camera recorded."""
+"""OpenGL matrices of calibrated cameras."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where points of the scene are in the picture, computed on the processor."""
+"""Projection of scene points into the picture, computed on the processor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many frames of a scene in order: drawn, read back and handed on while the next are drawn.
+"""Recording of frames: drawn, read back and passed to a sink while the next are drawn.
 
 Three things happen at the same time. The driver draws a frame; this thread poses the next one; and
 the sink's workers encode those before, for which this thread lets go of Python's lock while it
@@ -87,7 +87,7 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Follow:
-    """Whom the camera goes with, at the distance and angle that it has.
+    """The actor or joint that the camera follows, keeping its distance and angle.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Follow:
 
 @dataclass(slots=True, eq=False)
 class Recording:
-    """What is recorded.
+    """Parameters of a recording.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class Recording:
     moves : bool
         Whether clips pose the actors; False keeps their poses, for a turntable of a still.
     interpolate : bool
-        Bridge the gaps of captures.
+        Interpolate over the gaps of captures.
     turn : float
         Degrees by which the camera turns about its target from the first frame to the one that
         would follow the last: 360 makes a seamless loop.
@@ -158,7 +158,7 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a recording is.
+    """Progress of a recording.
 
     Attributes
     ----------

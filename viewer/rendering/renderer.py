@@ -48,7 +48,7 @@ __all__ = ["Renderer"]
 
 
 class Renderer:
-    """Owns everything that drawing needs: programs, passes, and what was uploaded.
+    """Owner of everything that drawing needs: programs, passes and buffers.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Renderer:
     Attributes
     ----------
     notes : list of str
-        What the driver could not do as asked, one line each.
+        Messages about limitations of the driver, one line each.
     scalars : ScalarQuantities
         Range and legend of the scalar quantity drawn last.
     buffers : ActorBuffers
@@ -322,7 +322,7 @@ class Renderer:
         return self.buffers.posed_mesh(actor)
 
     def _note_samples(self, target: Target) -> None:
-        note = f"{target.asked_samples} samples a pixel asked for, {target.samples or 1} drawn"
+        note = f"{target.asked_samples} samples per pixel requested, {target.samples or 1} drawn"
         if target.asked_samples > max(target.samples, 1) and note not in self.notes:
             self.notes.append(note)
 

@@ -1,4 +1,4 @@
-"""How the numbers of a scalar quantity become colours."""
+"""Mapping from the numbers of a scalar quantity to colours."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name
 __all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typical_span"]
 
 TYPICAL = 0.99
-"""Share of the numbers other than 0 that a robust range holds at least."""
+"""Fraction of the numbers other than 0 that a robust range contains at least."""
 
 _NOTHING_LINEAR = tuple(float(channel) for channel in decode_srgb(np.array(NOTHING) / 255.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScalarLook:
-    """What the shader must know of a view.
+    """Parameters of the shader for a scalar quantity.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def shown_ends(
     ranges: Sequence[tuple[float, float]],
     options: DisplayOptions,
 ) -> tuple[float, float]:
-    """Return what the ends of the colour map stand for on all figures alike.
+    """Return the common range of the colour map for all figures.
 
     Parameters
     ----------

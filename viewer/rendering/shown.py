@@ -1,4 +1,4 @@
-"""What of a scene is drawn, and the posed meshes and instances that it needs."""
+"""Drawn parts of a scene, and the posed meshes and instances that they need."""
 
 from __future__ import annotations
 

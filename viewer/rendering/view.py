@@ -1,4 +1,4 @@
-"""What every pass needs of the camera: matrices in float64 until the last moment."""
+"""Camera matrices shared by all passes, kept in float64 until the upload."""
 
 from __future__ import annotations
 

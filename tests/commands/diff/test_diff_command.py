@@ -136,7 +136,7 @@ def test_a_partner_of_another_name_is_told(tmp_path, capsys):
     assert lines[1:4] == [
         f"  only in {other}: c (a skeleton)",
         "  a:",
-        "    note: held against b",
+        "    note: compared with b",
     ]
 
 
@@ -177,7 +177,7 @@ def test_heat_map_shows_where_the_difference_is(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", height="5")
     output = tmp_path / "heat.png"
     code, lines, _ = said(capsys, first, second, "--poses", "0", "-o", str(output))
-    assert code == 0 and lines[-1] == f"{output}: the largest distance of every vertex"
+    assert code == 0 and lines[-1] == f"{output}: the largest distance at each vertex"
     pixels = picture(output)
     assert pixels.shape == (960, 1280, 3)
     # The map goes from dark violet to bright yellow: only the one vertex that moved is bright.
@@ -192,7 +192,7 @@ def test_heat_maps_of_several_are_one_sheet(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", height="5")
     output = tmp_path / "heat.png"
     _, lines, _ = said(capsys, first, second, first, "--poses", "0", "-o", str(output))
-    assert lines[-1] == f"{output}: 2 heat maps with one scale"
+    assert lines[-1] == f"{output}: 2 heat maps with a common scale"
     # Nothing differs on the second: it is dark, beside the bright corner of the first.
     sheet = picture(output)
     bright = (sheet[:, :, 0] > 220) & (sheet[:, :, 2] < 160)
@@ -220,7 +220,7 @@ def test_folder_without_a_rig_is_refused(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--tolerance", "-1"), "--tolerance: expected a number from 0, found -1"),
+        (("--tolerance", "-1"), "--tolerance: expected 0 or more, found -1"),
         (("--poses", "-1"), "--poses: expected 0 to 10000, found -1"),
         (("--frames", "1:9:2"), "--frames: expected A:B without a step, found 1:9:2"),
     ],

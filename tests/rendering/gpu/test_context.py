@@ -62,7 +62,7 @@ def test_no_egl_device_names_the_cures(tmp_path):
         *result,
         code=4,
         message="EGL found 0 devices: in a container start it with "
-        "NVIDIA_DRIVER_CAPABILITIES=all, or install Mesa for drawing in software " + INSTALL,
+        "NVIDIA_DRIVER_CAPABILITIES=all, or install Mesa for software rendering " + INSTALL,
     )
 
 
@@ -195,7 +195,7 @@ def test_a_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
 def test_too_many_samples_are_drawn_with_what_there_is(tmp_path):
     result, output = viewer_render(tmp_path, "--samples", "4096")
     assert result.returncode == 0
-    assert result.stderr.startswith("warning: 4096 samples a pixel asked for, ")
+    assert result.stderr.startswith("warning: 4096 samples per pixel requested, ")
     assert result.stderr.count("\n") == 1
     assert output.is_file()
 
@@ -291,7 +291,8 @@ def test_graphics_card_that_may_not_be_opened_is_a_note(monkeypatch):
     monkeypatch.setattr("viewer.rendering.offscreen.unreadable_devices", lambda: nodes)
     with Offscreen() as offscreen:
         assert offscreen.renderer.notes == [
-            "drawing in software: /dev/dri/renderD128 exists but you may not open it (group render)"
+            "rendering in software: /dev/dri/renderD128 exists but you lack the permission to open "
+            "it (group render)"
         ]
 
 

@@ -1,4 +1,4 @@
-"""What ``viewer diff`` compares: files, files joined by "+", or folders with a rig in them."""
+"""Inputs of ``viewer diff``: files, files joined by "+", or folders that contain a rig."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from viewer.formats import FORMATS, Source, detect
 
 
 def input_files(text: str) -> list[Path]:
-    """Return the files that one argument stands for.
+    """Return the files that one argument refers to.
 
     ``text``: a file; several joined by ``+``; a folder of a known kind (PIG, EasyMocap); or any
-      folder with rig files, all of which are opened together, as for a submission.
-    Raises FormatError if it is a folder without a file that opens.
+      folder with rig files, all opened together, such as a submission.
+    Raises FormatError if it is a folder without a readable file.
 
     >>> input_files("arm.skel+arm.skin") == [Path("arm.skel"), Path("arm.skin")]
     True

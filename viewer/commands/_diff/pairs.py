@@ -1,4 +1,4 @@
-"""Who is held against whom in ``viewer diff``: by name, then by kind, then in order."""
+"""Pairing of actors and motions in ``viewer diff``: by name, then by kind, then in order."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from dataclasses import dataclass, replace
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
 
-_N_RANKS = 3  # of clips for an actor: of the right name, its own, any that is left
+# Of clips for an actor: matching name, the actor's own, any other.
+_N_RANKS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Pairing:
-    """Actors of two scenes, side by side.
+    """Paired actors of two scenes.
 
     Attributes
     ----------
     pairs : tuple of (Actor, Actor)
-        In the first scene's order; each with the motion that is compared.
+        In the first scene's order; each with the motion to compare.
     first, second : tuple of str
-        What has no partner, in words: actors, and motions that only an actor without one has.
+        Labels of everything unpaired: actors, and motions that belong to unpaired actors only.
     """
 
     pairs: tuple[tuple[Actor, Actor], ...]
@@ -28,7 +29,7 @@ class Pairing:
     second: tuple[str, ...] = ()
 
 
-# The first rule that holds counts, for all actors before the next one is looked at.
+# Each rule is tried for all actors before the next rule.
 _RULES: tuple[Callable[[Actor, Actor], bool], ...] = (
     lambda one, other: one.figure.name == other.figure.name and _kind(one) == _kind(other),
     lambda one, other: one.figure.name == other.figure.name,
@@ -38,15 +39,15 @@ _RULES: tuple[Callable[[Actor, Actor], bool], ...] = (
 
 
 def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
-    """Pair the actors of two scenes, and the motions of those that are paired.
+    """Pair the actors of two scenes, and the motions of paired actors.
 
-    People of captures are paired by their number. Actors of one name are paired first, of the
-    same kind if there are several; then those of one kind, attached figures with attached
-    figures; then what is left, in order. Clips of keys go to whatever skeleton they fit when
-    files are opened: the one of the partner's name counts, else the actor's own, else one that
-    an actor without partner was given.
+    People of captures are paired by their number. Actors of the same name are paired first, of
+    the same kind if there are several; then actors of the same kind, skinned figures with
+    skinned figures; then the rest, in order. Keyframed clips are assigned to any skeleton they
+    fit when files are opened, so the clip with the partner's clip name takes precedence, then the
+    actor's own, then one assigned to an unpaired actor.
 
-    ``first``, ``second``: of the reference and of what is held against it; left as they are.
+    ``first``, ``second``: actors of the reference and of the other scene; not modified.
     """
     found: dict[int, int] = {}
     taken: set[int] = set()
@@ -82,7 +83,7 @@ def _kind(actor: Actor) -> tuple[bool, bool, bool]:
 
 
 def _described(actor: Actor) -> str:
-    """Return an actor's name, and what it is if it is no figure with mesh and skeleton."""
+    """Return an actor's name, and its kind unless it has both mesh and skeleton."""
     kinds = {
         (True, False, False): " (a skeleton)",
         (False, True, False): " (a mesh)",
@@ -94,11 +95,11 @@ def _described(actor: Actor) -> str:
 def _with_clips(
     actors: Sequence[Actor], lone: Sequence[Actor], partners: Sequence[Motion | None]
 ) -> tuple[list[Actor], list[Clip]]:
-    """Return actors with the clips of keys that are compared, and the clips left over.
+    """Return actors with the keyframed clips to compare, and the remaining clips.
 
-    ``actors``: those with a partner.
-    ``lone``: those of the same scene without one: their clips may be meant for the others.
-    ``partners``: what moves each one's partner.
+    ``actors``: the paired ones.
+    ``lone``: the unpaired ones of the same scene; their clips may be meant for the others.
+    ``partners``: the motion of each one's partner.
     """
     pool = [actor.clip for actor in (*actors, *lone) if isinstance(actor.clip, Clip)]
     if not pool:
@@ -111,7 +112,7 @@ def _with_clips(
                 continue
             fitting = [c for c in pool if _rank(c, actor, partner) == rank and _suits(c, actor)]
             if fitting:
-                # Of clips of one name its own comes first.
+                # Among clips of the same name, the actor's own comes first.
                 dealt[index] = next((c for c in fitting if c is actor.clip), fitting[0])
                 pool.remove(dealt[index])
     found = [
@@ -122,7 +123,7 @@ def _with_clips(
 
 
 def _rank(clip: Clip, actor: Actor, partner: Motion | None) -> int:
-    """Return how well a clip is held against a partner's motion, from 0; ``_N_RANKS`` if not."""
+    """Return how well a clip matches a partner's motion, 0 is best; ``_N_RANKS`` if not at all."""
     if isinstance(partner, Clip) and clip.name == partner.name:
         return 0
     if clip is actor.clip:
@@ -135,7 +136,7 @@ def _suits(clip: Clip, actor: Actor) -> bool:
 
 
 def _moved_by(actor: Actor, clip: Clip | None) -> Actor:
-    """Return an actor with a clip, or in its own pose without one."""
+    """Return an actor with a clip, or in its current pose if there is none."""
     if clip is actor.clip:
         return actor
     return replace(actor, clip=clip, pose=figure_pose(actor.figure))

@@ -1,4 +1,4 @@
-"""The heat map of ``viewer diff``: where on the reference the others are how far off."""
+"""Heat maps of ``viewer diff``: the reference coloured by distance."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _COLORED = ("vertices", "surface, from the first")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heat:
-    """The reference with another's distances on it.
+    """The reference, coloured by its distance to another figure.
 
     Attributes
     ----------
     actors : tuple of Actor
-        Posed as where the largest distance is; with the field ``difference``.
+        In the pose with the largest distance; with the field ``difference``.
     most : float
         The largest distance, in the unit of the legend.
     """
@@ -37,9 +37,9 @@ class Heat:
 
 
 def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None:
-    """Return what can be coloured of a comparison; None if no mesh was compared.
+    """Return the heat map of a comparison; None if no mesh was compared.
 
-    ``name``: of what was compared, for the legend.
+    ``name``: of the compared files, for the legend.
     ``posed``: the reference's actors in their worst poses.
     """
     actors, most = [], 0.0
@@ -57,9 +57,9 @@ def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None
 
 
 def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
-    """Write one picture, of several comparisons with one scale as a sheet; say what it is.
+    """Write one picture, a sheet with a common scale if there are several; return a summary line.
 
-    Raises ViewerError if there is nothing to colour, or no room for so many.
+    Raises ViewerError if there is nothing to colour, or too many for one sheet.
     Raises OutputError if it cannot be written.
     """
     from viewer.media.picture_sinks import SheetSink
@@ -84,11 +84,11 @@ def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
             return _save_one(output, pixels)
         sink.write(number, pixels)
     sink.close()
-    return f"{printable(output)}: {len(heats)} heat maps with one scale"
+    return f"{printable(output)}: {len(heats)} heat maps with a common scale"
 
 
 def _save_one(output: Path, pixels: Bytes) -> str:
     from viewer.formats import save_image
 
     save_image(output, pixels)
-    return f"{printable(output)}: the largest distance of every vertex"
+    return f"{printable(output)}: the largest distance at each vertex"

@@ -1,4 +1,4 @@
-"""How ``viewer diff`` says what it found: lines, a table, or JSON."""
+"""Report of ``viewer diff``: text lines, a table, or JSON."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from viewer.rig.units import METRES
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One thing held against the reference.
+    """Comparison of one input with the reference.
 
     Attributes
     ----------
     name : str
-        As it was asked for.
+        The argument as given.
     differences : tuple of (str, Difference)
-        Of each actor, by the reference's name.
+        One per actor, with the actor's name in the reference.
     mismatches : tuple of str
-        Actors that only one has, and which.
+        Actors on one side only, and on which side.
     error : str
         Why it could not be opened; empty if it could.
     diagnostics : tuple of Diagnostic
-        What its readers noticed.
+        Warnings of its readers.
     """
 
     name: str
@@ -39,13 +39,13 @@ class Compared:
     diagnostics: tuple[Diagnostic, ...] = field(default=())
 
     def exceeds(self, tolerance: float) -> bool:
-        """Return whether anything differs by more, or could not be compared."""
+        """Return whether anything differs by more than the tolerance or was not compared."""
         parts = (difference.exceeds(tolerance) for _, difference in self.differences)
         return bool(self.error or self.mismatches or not self.differences) or any(parts)
 
 
 def amount(value: float, kind: str, difference: Difference) -> str:
-    """Return a number as people read it: lengths in millimetres or as a share of the size."""
+    """Return a number as text: lengths in millimetres or as a fraction of the size."""
     if kind == "angle":
         return f"{math.degrees(value):.4g}\N{DEGREE SIGN}"
     if kind == "weight":
@@ -57,7 +57,7 @@ def amount(value: float, kind: str, difference: Difference) -> str:
 
 
 def lines_of(compared: Compared, tolerance: float | None) -> list[str]:
-    """Return a comparison in full."""
+    """Return the lines of one comparison."""
     lines = [f"{printable(compared.name, 300)}:"]
     if compared.error:
         return [*lines, f"  could not be compared: {compared.error}"]
@@ -94,7 +94,7 @@ _COLUMNS = {
 
 
 def table_of(rows: Sequence[Compared], tolerance: float | None) -> list[str]:
-    """Return one line for each comparison, largest differences of all its actors."""
+    """Return one line per comparison: the largest differences over all its actors."""
     heads = ["", *_COLUMNS, "result"]
     table = [heads, *([printable(row.name, 60), *_cells(row, tolerance)] for row in rows)]
     return table_lines(table, right=range(1, len(heads) - 1))
@@ -109,7 +109,7 @@ def _cells(row: Compared, tolerance: float | None) -> list[str]:
             for measure in difference.measures
             if measure.name in names
         ]
-        # Each against its own reference's size: figures of one scene may have different units.
+        # Relative to each reference's own size: figures of one scene may have different units.
         worst = max(found, key=lambda pair: pair[0].relative(pair[1].size), default=None)
         cells.append("-" if worst is None else amount(worst[0].maximum, worst[0].kind, worst[1]))
     count = len(row.mismatches) + sum(len(d.mismatches) for _, d in row.differences)
@@ -122,7 +122,7 @@ def _cells(row: Compared, tolerance: float | None) -> list[str]:
 
 
 def json_text(reference: str, rows: Sequence[Compared], tolerance: float | None) -> str:
-    """Return everything as JSON; lengths in the reference's unit, angles in radians."""
+    """Return the whole report as JSON; lengths in the reference's unit, angles in radians."""
     content = {
         "reference": reference,
         "tolerance": tolerance,

@@ -1,4 +1,4 @@
-"""Rotations as three angles about given axes, and angles that run on without jumps."""
+"""Euler angles of rotations, and their unwrapping over time."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations
 
-_LOCKED = 1e-9  # cosine of the middle angle below which the outer two turn about one axis
+_LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide (gimbal lock)
 
 
 def euler_angles(matrices: Floats, order: str) -> Floats:
     """Return angles a, b, c with R = R_i(a) R_j(b) R_k(c), i, j, k being the axes of ``order``.
 
-    With e = 1 where i, j, k is a turn of x, y, z and -1 otherwise: R[j, k] = -e sin a cos b,
+    With e = 1 if i, j, k is a cyclic permutation of x, y, z, else -1: R[j, k] = -e sin a cos b,
     R[k, k] = cos a cos b, and R_i(a)^T R = R_j(b) R_k(c) gives b and c.
 
     ``matrices`` (..., 3, 3): rotations for column vectors.
@@ -24,7 +24,7 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
     sign = _sign(order)
     m = matrices
     locked = np.hypot(m[..., j, k], m[..., k, k]) < _LOCKED
-    # Where only a sum of the outer angles counts, the first one is 0: see unrolled.
+    # In gimbal lock only a sum of the outer angles is defined, so the first is 0: see unrolled.
     first = np.where(locked, 0.0, np.arctan2(-sign * m[..., j, k], m[..., k, k]))
     rest = np.swapaxes(axis_rotations(i, first), -1, -2) @ m
     second = np.arctan2(sign * rest[..., i, k], rest[..., k, k])
@@ -33,10 +33,10 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
 
 
 def unrolled(angles: Floats, order: str) -> Floats:
-    """Return the same rotations with angles that are nearest to those of the frame before.
+    """Return equivalent angles that are nearest to those of the previous frame.
 
-    (a, b, c) and (a + pi, pi - b, c + pi) are one rotation, and so is every full turn more.
-    Where the middle angle is a right one, the outer two are any with the same sum or difference.
+    (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation, and so are multiples of 2 pi
+    more. If the middle angle is +-pi / 2, only the sum or difference of the outer two is defined.
 
     ``angles`` (N, ..., 3): radians, by frames; as ``euler_angles`` gives them.
     ``order``: of the axes.
@@ -46,7 +46,7 @@ def unrolled(angles: Floats, order: str) -> Floats:
         return angles.copy()
     angles = _unlocked(angles, order)
     other = angles * [1.0, -1.0, 1.0] + np.pi
-    # From either form to the nearer one: the same cost from both, so the changes just add up.
+    # The cost of switching is the same from either form, so the switches accumulate.
     stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
     change = np.abs(_wrapped(other[1:] - angles[:-1])).sum(axis=-1)
     changed = np.logical_xor.accumulate(change < stay - 1e-9, axis=0)
@@ -60,9 +60,9 @@ def _wrapped(angles: Floats) -> Floats:
 
 
 def _unlocked(angles: Floats, order: str) -> Floats:
-    """Give locked frames the first angle of the frame before; the third makes up for it.
+    """Give frames in gimbal lock the first angle of the previous frame; the third compensates.
 
-    R_j(+-90 degrees) carries axis k to +-i (or -+i), so a + c or a - c is all that counts.
+    R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined.
     """
     locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
     if not locked.any():

@@ -1,10 +1,10 @@
-"""A sampled animation as BVH has it: offsets at rest without rotation, motions of each joint.
+"""A sampled animation in BVH form: offsets of an unrotated rest pose, and joint channels.
 
-With W the world rotations of a joint at rest and P its place there, x the file's axes to the
+With W the world rotation of a joint at rest and P its rest position, x the file's axes to the
 world's, e the figure's axes to the file's, R the local rotation of a frame, R_0 the one at rest::
 
-    offset    o_j = e (P_j - P_parent)                       nothing is turned at rest
-    rotation  Q_j = e W_parent R R_0^-1 W_parent^-1 e^-1     x in place of the first e at the root
+    offset    o_j = e (P_j - P_parent)                       no rotations at rest
+    rotation  Q_j = e W_parent R R_0^-1 W_parent^-1 e^-1     x replaces the first e at the root
     position  p_j = D_parent^-1 (place_j - place_parent)     D: product of Q from the root on
 
 A joint whose p is o in every frame needs no position channels.
@@ -25,12 +25,12 @@ from viewer.rig.motion.evaluation import Frames, frames_between, rest_translatio
 from viewer.rig.pose import rest_pose
 
 _BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
-_NOISE = 1e-9  # of the skeleton's size: what moves less does not move
+_NOISE = 1e-9  # of the skeleton's size: smaller motions count as none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Space:
-    """From a figure to a file.
+    """Transform from a figure's space to the file's.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Space:
     world : (3, 3)
         The world's axes to the file's, x.
     factor : float
-        Lengths in the file for one of the figure's.
+        Scale factor from the figure's lengths to the file's.
     """
 
     rest: Floats
@@ -49,7 +49,7 @@ class Space:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """What a file says of J joints in F frames, joints in the figure's order.
+    """Contents of a file: J joints, in the figure's order, in F frames.
 
     Attributes
     ----------
@@ -60,9 +60,9 @@ class Body:
     positions : (F, J, 3)
         Within the parent, offset included; of roots in the file's space.
     moves : (J,) bool
-        Whose positions differ from the offset.
+        Joints whose positions differ from the offset.
     places : (F, J, 3)
-        Where the joints are in the file's space.
+        Joint positions in the file's space.
     """
 
     offsets: Floats
@@ -81,11 +81,11 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
 
 
 def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
-    """Return what a file says of a figure's frames.
+    """Return the contents of a file for a figure's frames.
 
     ``figure``: unshaped; the frames hold the shape.
     ``frames``: all present.
-    ``reference``: the frame whose shape and scale all bones have; roots keep those of each frame.
+    ``reference``: the frame that defines shape and scale of all bones; roots keep each frame's own.
     ``order``: of the rotation channels.
     ``space``: to the file.
     """
@@ -124,7 +124,7 @@ def shape_at(frames: Frames, frame: int) -> Floats:
 
 
 def _places(figure: Figure, frames: Frames, weights: Floats, scale: float) -> Floats:
-    """Return joints in the world, bones of one shape and scale, roots where they are: (F, J, 3)."""
+    """Return joint positions in the world, for bones of fixed shape and scale: (F, J, 3)."""
     skeleton = figure.require_skeleton()
     fixed = replace(frames, shape_weights=weights, figure_scales=np.full(frames.n_frames, scale))
     places = world_frames(figure, fixed)[..., :3, 3]
@@ -165,7 +165,7 @@ def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
 
 
 def _fixed(offsets: Floats, positions: Floats, inner: Bools, noise: float) -> tuple[Floats, Bools]:
-    """Return offsets that hold what is shifted but still, and which joints move within theirs."""
+    """Return offsets that include constant translations, and which joints still move."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     moves = inner & ((high - low) > noise).any(axis=1)
     shifted = inner & ~moves & (np.abs(low - offsets) > noise).any(axis=1)

@@ -1,4 +1,4 @@
-"""Where the last joints of a skeleton end: by their vertices, their boxes, or the bone before."""
+"""End sites of leaf joints, estimated from vertices, boxes, or the parent bone."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.units import METRES
 
-_MOSTLY = 0.5  # a weight from which on a vertex belongs to a joint
-_FEW = 4  # vertices that say nothing of a joint's extent
-_TOO_SHORT = 0.1  # of the bone before: shorter ends are not believed
-_HALF = 0.5  # of the bone before: what is written without better knowledge
+_MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
+_FEW = 4  # vertices that are too few to measure a joint's extent
+_TOO_SHORT = 0.1  # of the parent bone: shorter ends are implausible
+_HALF = 0.5  # of the parent bone: length of an end without any other estimate
 _NO_SIZE = 0.1  # metres: the end of a skeleton without any bone
-_DEFAULT_END = 1.0  # ... whose unit is not known
+_DEFAULT_END = 1.0  # the same, if the unit is unknown
 
 
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
-    """Return how far the last joints reach at rest; none is 0.
+    """Return the offsets of end sites at rest; none is 0.
 
     ``figure``: shaped.
     ``rest`` (J, 4, 4): joint space to figure space in the rest pose.
@@ -46,7 +46,7 @@ def _bare_end(unit: str) -> float:
 
 
 def _last_bone(parents: Ints, rest: Floats, joint: int) -> Floats:
-    """Return the way to a joint from the nearest joint above it that is elsewhere."""
+    """Return the vector to a joint from its nearest ancestor at a different position."""
     above = int(parents[joint])
     while above >= 0:
         bone = rest[joint, :3, 3] - rest[above, :3, 3]
@@ -57,7 +57,7 @@ def _last_bone(parents: Ints, rest: Floats, joint: int) -> Floats:
 
 
 def _by_vertices(figure: Figure, rest: Floats, joint: int, bone: Floats) -> Floats | None:
-    """Return how far along the bone the joint's vertices reach."""
+    """Return the extent of the joint's vertices along the bone."""
     mesh, skin = figure.mesh, figure.skin
     if mesh is None or skin is None:
         return None

@@ -1,4 +1,4 @@
-"""A ``.bvh`` file that was written, read back as poses of the figure it was made from.
+"""Poses of the original figure, read back from a written ``.bvh`` file.
 
 With D the product of a file's rotations down to a joint, p its place there, and x, e, s as in
 ``_bvh_body``, a joint that rests with the matrix P is at::
@@ -38,20 +38,20 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BvhFile:
-    """A file as it was written.
+    """A written file.
 
     Attributes
     ----------
     path : Path
-        For messages of the reader.
+        Name in messages of the reader.
     text : bytes
-        What is in it.
+        Contents.
     names : sequence of J str
-        What the figure's joints are called in it.
+        Names of the figure's joints in the file.
     space : Space
         From the figure to the file.
     reference : int
-        The figure's frame whose shape and scale the file's bones have.
+        The figure's frame that defines shape and scale of the file's bones.
     ahead : int
         Index in the file of the figure's first frame; below 0 if the file begins later.
     """
@@ -65,10 +65,10 @@ class BvhFile:
 
 
 def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> Side:
-    """Return what a file says of a figure.
+    """Return the contents of a file as poses of a figure.
 
-    ``file``: what was written.
-    ``figure``: unshaped, as it moves here.
+    ``file``: the written file.
+    ``figure``: the original, unshaped.
     ``frames``: what was to be written. It gives the place of the whole figure, which comes after
       skinning and is not weighted.
     ``how``: whether pose correctives count.
@@ -99,7 +99,7 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
         world[..., :3, 3] -= shifts[:, None]
         turns = np.zeros((len(rows), 0))
         if body is not None and body.correctives is not None:
-            turns = _turns(figure, world / scale)
+            turns = _corrective_rotations(figure, world / scale)
         palette = anchored(world @ bound, np.full(len(rows), scale))
         return Poses(places, palette, shifts, np.zeros((1, 0)), turns)
 
@@ -116,8 +116,8 @@ def _bound(figure: Figure, weights: Floats) -> Floats:
     return bound
 
 
-def _turns(figure: Figure, world: Floats) -> Floats:
-    """Return what drives the correctives: R - I of every joint within its parent, (F, P)."""
+def _corrective_rotations(figure: Figure, world: Floats) -> Floats:
+    """Return the corrective weights: R - I of every joint within its parent, (F, P)."""
     turned = world[:, 1:, :3, :3]
     above = world[:, figure.require_skeleton().parents[1:], :3, :3]
     local = np.swapaxes(above, -1, -2) @ turned - np.eye(3)

@@ -1,4 +1,4 @@
-"""The text of a BVH file, as every reader that we know of takes it.
+"""Text of a BVH file, in the subset that all known readers accept.
 
 One item per line and "{" alone on its line (Blender counts lines), one ROOT, six channels on it and
 three on the others, positions first, the same rotation order everywhere, no exponents, LF.
@@ -13,7 +13,7 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
-_DEEPEST = 32  # tabs that a line begins with
+_DEEPEST = 32  # maximum indentation in tabs
 _SECONDS_DIGITS = 9  # of the frame time, at least: exact to 1e-8 of itself
 
 
@@ -28,7 +28,7 @@ def bvh_text(
     rows: tuple[Floats, Floats],
     digits: int,
 ) -> str:
-    """Return a whole file.
+    """Return the text of a whole file.
 
     ``names``: unique, of letters, digits and underscores.
     ``parents`` (J,): with one root, the first joint.
@@ -36,7 +36,7 @@ def bvh_text(
     ``ends``: offset of the End Site of every joint without children.
     ``moves`` (J,) bool: which joints have position channels.
     ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
-    ``rate``: frames a second.
+    ``rate``: frames per second.
     ``rows`` (F, J, 3), (F, J, 3): positions, and angles in degrees in that order.
     ``digits``: decimals.
     """

@@ -1,6 +1,6 @@
-"""A glTF 2.0 file in the making: its JSON, and the arrays and pictures that go into its buffer.
+"""Builder of a glTF 2.0 file: its JSON, and the arrays and images in its buffer.
 
-Facts are those of the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``.
+It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ _HEADER = 28  # bytes of a .glb that are neither JSON nor arrays
 
 
 class Document:
-    """What a file will hold; everything in it is told apart by index.
+    """Contents of a file; all objects are referred to by index.
 
-    ``name``: what errors call it.
+    ``name``: name in error messages.
 
     Attributes
     ----------
@@ -51,18 +51,18 @@ class Document:
         """Add an array; return its accessor.
 
         ``values`` (N, ...): unsigned integers as they are, floating-point numbers in single
-          precision; one row an element, N > 0.
+          precision; one row per element, N > 0.
         ``kind``: ``"SCALAR"``, ``"VEC3"`` ….
-        ``target``: ``VERTICES``, ``INDICES``, or 0 for what no mesh draws.
-        ``bounds``: give the least and greatest value of each component.
-        Raises RigError if a number is too large for single precision, or not one.
+        ``target``: ``VERTICES``, ``INDICES``, or 0 for data that no mesh draws.
+        ``bounds``: store the minimum and maximum of each component.
+        Raises RigError if a number is not finite or too large for single precision.
         """
         return self.arrays(values[None], kind, target, bounds)[0]
 
     def arrays(
         self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False
     ) -> list[int]:
-        """Add several arrays of one size, which lie behind one another; return their accessors.
+        """Add several consecutive arrays of equal size; return their accessors.
 
         ``values`` (A, N, ...): as for ``array``, A times.
         ``kind``, ``target``, ``bounds``: as for ``array``.
@@ -86,15 +86,15 @@ class Document:
         return accessors
 
     def picture(self, png: bytes, name: str) -> int:
-        """Add a picture, a PNG file as bytes; return its index in ``images``."""
+        """Add an image, the bytes of a PNG file; return its index in ``images``."""
         view = self._view(png, 0)
         image = {"name": text_of(name), "mimeType": "image/png", "bufferView": view}
         return self.add("images", image)
 
     def glb(self) -> bytes:
-        """Return the whole as one binary file.
+        """Return everything as one binary file.
 
-        Raises RigError if it is longer than such files can be.
+        Raises RigError if it exceeds the size limit of such files.
         """
         content = self._json({"byteLength": self._size})
         content += b" " * (-len(content) % _PADDING)
@@ -107,7 +107,7 @@ class Document:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
     def pair(self, buffer_name: str) -> tuple[bytes, bytes]:
-        """Return the JSON file, and the arrays for a file of that name beside it."""
+        """Return the JSON file, and the buffer for a file of that name next to it."""
         uri = quote(buffer_name.encode("utf-8", "surrogateescape"), safe="")
         return self._json({"uri": uri, "byteLength": self._size}), b"".join(self._parts)
 
@@ -139,5 +139,5 @@ class Document:
 
 
 def text_of(name: str) -> str:
-    """Return a name as Unicode text: half characters of broken file names become ``?``."""
+    """Return a name as Unicode text: surrogates of undecodable file names become ``?``."""
     return name.encode("utf-8", "replace").decode()

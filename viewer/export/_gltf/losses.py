@@ -1,4 +1,4 @@
-"""Parts of a figure that glTF cannot hold, and the differences of a file that was read back."""
+"""Parts of a figure that glTF cannot hold, and differences of a file that is read back."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from viewer.rig.skinning import METHODS, Skinning
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """A file as it was written, and where things are in it.
+    """A written file, and the indices of its contents.
 
     Attributes
     ----------
     path : Path
-        What it is called.
+        Its path.
     file : GltfFile
-        Its bytes, taken apart again.
+        Its parsed contents.
     tree : Tree
         Indices of the nodes.
     mesh_node : int or None
-        That of the mesh.
+        Index of the mesh's node.
     start : int
-        The figure's frame that comes first in it.
+        The figure's frame that is the first of the file.
     """
 
     path: Path
@@ -56,15 +56,15 @@ def gltf_losses(
     influences: Influences | None,
     first_frame: int | None,
 ) -> list[str]:
-    """Return lines with the largest distances between a figure as it is posed here and a file.
+    """Return lines with the largest distances between the posed figure and a file.
 
     ``written``: the file.
-    ``figure``: as it is, unshaped.
+    ``figure``: the original, unshaped.
     ``frames``: its poses.
-    ``rows`` (F,): those of them to compare.
-    ``how``: as asked for.
-    ``shape``, ``influences``: what was to be written.
-    ``first_frame``: what the first frame is called; None for a single pose.
+    ``rows`` (F,): the frames to compare.
+    ``how``: the requested skinning.
+    ``shape``, ``influences``: the written shape and skin.
+    ``first_frame``: number of the first frame; None for a single pose.
     """
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
@@ -91,7 +91,7 @@ def gltf_losses(
 
 
 def _split(side: Side, sources: Ints) -> Side:
-    """Return a side with its vertices as often as a file has them."""
+    """Return a side with its vertices duplicated as in a file."""
     whole = side.exact
     assert side.body is not None  # it has a mesh
     body = body_rows(side.body, sources)
@@ -103,9 +103,9 @@ def _split(side: Side, sources: Ints) -> Side:
 def _first_set(
     meant: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
 ) -> list[str]:
-    """Say how far off programs are that read four influences a vertex of the file."""
+    """Return a message about the error of programs that read four influences per vertex."""
     found = apart(meant, cut, rows, least)
-    text = f"up to {influences.most} influences a vertex, all of them written, strongest first"
+    text = f"up to {influences.most} influences per vertex, all of them written, strongest first"
     if found.vertices is None:
         return [text]
     off = length_text(figure, found.vertices.distance)
@@ -122,7 +122,7 @@ def _reasons(
     influences: Influences | None,
     least: float,
 ) -> list[str]:
-    """Return what vertices may be elsewhere for, in words."""
+    """Return the reasons for differences of vertices."""
     found = []
     if influences is not None and (influences.n_scaled or influences.n_negative):
         found.append(_weights_text(influences))
@@ -152,12 +152,12 @@ def _weights_text(influences: Influences) -> str:
 
 
 def vertices_text(count: int) -> str:
-    """Return a number of vertices in words."""
+    """Return a number of vertices as text."""
     return "1 vertex" if count == 1 else f"{count} vertices"
 
 
 def not_held(figure: Figure, shape: Shape) -> list[str]:
-    """Say in words what is not in the file."""
+    """Return a message about everything that the file does not hold."""
     unused = figure.n_shapes - len(shape.targets)
     parts = {
         f"{unused} blend shapes": unused > 0 and shape.baked is None,

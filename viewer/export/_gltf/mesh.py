@@ -1,4 +1,4 @@
-"""A mesh as glTF has it: one primitive a material, vertices split along seams, morph targets."""
+"""Meshes in glTF form: a primitive per material, vertices split at seams, morph targets."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def add_mesh(
     ``name``: the figure's.
     ``shape``: its figure has a mesh with vertices.
     ``influences``: of the mesh; None if no joint moves it.
-    ``color`` (r, g, b): linear, of what has no texture.
+    ``color`` (r, g, b): linear, of untextured surfaces.
     Returns ``mesh``: its index.
-    Returns ``n_vertices``: how many are written: along seams there are several for one of the
+    Returns ``n_vertices``: number of written vertices; seams have several per vertex of the
       figure.
     """
     mesh = shape.figure.require_mesh()
@@ -75,7 +75,7 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
 
 
 def _normals(mesh: Mesh) -> Floats:
-    """Return unit normals; those of the surface where the figure has none of any length."""
+    """Return unit normals, computed from the surface if the figure's have no length."""
     with np.errstate(over="ignore", invalid="ignore"):
         normals = unit(mesh.normals)
         odd = ~(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _NOT_UNIT)
@@ -91,7 +91,7 @@ def _targets(
     rows: NDArray[np.intp],
     sources: Ints,
 ) -> list[dict[str, int]]:
-    # Normals are written at length 1, and what is added to them at the same scale.
+    # Normals are written with length 1, and their offsets at the same scale.
     lengths = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
     scales = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
     targets = []
@@ -141,7 +141,7 @@ def _material(
     name = material.name or material.texture or f"material{index}"
     if material.image is None or mesh.uvs is None or len(mesh.uvs) == 0:
         return _plain(document, name, color)
-    # Materials may share a picture.
+    # Materials may share an image.
     if id(material.image) not in textures:
         picture = material.texture or name
         textures[id(material.image)] = _texture(document, material.image, picture)
@@ -150,7 +150,7 @@ def _material(
 
 
 def _texture(document: Document, image: Bytes, name: str) -> int:
-    # The viewer takes no notice of alpha either: materials are opaque by default.
+    # The viewer ignores alpha too: materials are opaque by default.
     source = document.picture(encode_png(image), name)
     if "samplers" not in document.root:
         wraps = {"wrapS": _CLAMP, "wrapT": _CLAMP}
@@ -163,7 +163,7 @@ def _plain(document: Document, name: str, color: Color | None) -> int:
 
 
 def _surface(document: Document, name: str, surface: dict[str, Any]) -> int:
-    # Without these, glTF takes a surface for metal. Files may wind triangles either way.
+    # glTF surfaces are metallic by default. Files may wind triangles either way.
     matte = {**surface, "metallicFactor": 0.0, "roughnessFactor": 0.8}
     return document.add(
         "materials",

@@ -1,4 +1,4 @@
-"""Frames as a glTF animation: one sampler for everything that moves, in straight lines."""
+"""Frames as a glTF animation, with a linear sampler for each moving property."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
-_NOISE = 1e-9  # of the skeleton's size: what moves less does not move
+_NOISE = 1e-9  # of the skeleton's size: smaller motions count as none
 
 
 def moving(skeleton: Skeleton, frames: Frames) -> Bools:
@@ -22,7 +22,7 @@ def moving(skeleton: Skeleton, frames: Frames) -> Bools:
 
 
 def still_locals(skeleton: Skeleton, rest: Locals, frames: Frames) -> Locals:
-    """Return joints at rest, those that are shifted for good where they are in all frames."""
+    """Return the rest pose, with joints of constant translation at that translation."""
     there = skeleton.rest_translations + frames.translations[0]
     chosen = moving(skeleton, frames)[:, None]
     translations = np.where(chosen, rest.translations, there)
@@ -38,22 +38,22 @@ def add_animation(
     tree: Tree,
     morph: tuple[int, Floats] | None,
 ) -> int:
-    """Add rotations of all joints, translations of those that move, and the figure's place.
+    """Add rotations of all joints, translations of those that move, and the figure's placement.
 
-    Quaternions are on the side of the frame before, so that programs that blend components do
-    right. Times begin at 0.
+    Quaternions have the sign nearest to the previous frame, for programs that blend components.
+    Times begin at 0.
 
     ``document``: changed.
     ``name``: the motion's.
-    ``rate``: frames a second.
-    ``skeleton``: in the shape that is written.
+    ``rate``: frames per second.
+    ``skeleton``: in the written shape.
     ``frames``: without gaps.
     ``tree``: the nodes.
     ``morph``: the mesh's node and its targets' weights, if these change.
     Returns: number of joints that have translations.
     Raises RigError if numbers do not fit single precision.
     """
-    # Single precision tells eight million frames apart, whatever their rate.
+    # Single precision distinguishes eight million frames at any rate.
     times = (np.arange(frames.n_frames) / rate).astype(np.float32)
     keys = _Keys(document, document.array(times, "SCALAR", bounds=True))
     turns = np.swapaxes(_continuous(frames.rotations), 0, 1)
@@ -95,7 +95,7 @@ class _Keys:
 
 
 def _continuous(rotations: Floats) -> Floats:
-    """Return unit quaternions, each on the side of the one before: (F, J, 4)."""
+    """Return unit quaternions, each with the sign nearest to the previous one: (F, J, 4)."""
     units = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
     cosines = np.einsum("fja,fja->fj", units[1:], units[:-1])
     sides = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0), axis=0)

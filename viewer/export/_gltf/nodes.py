@@ -1,4 +1,4 @@
-"""Nodes of a glTF file: what makes y up and lengths metres, the figure's place, its joints.
+"""Nodes of a glTF file: conversion to y up and metres, the figure's placement, its joints.
 
 ::
 
@@ -31,7 +31,7 @@ _Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Locals:
-    """Where joints are within their parents.
+    """Joint transforms relative to their parents.
 
     Attributes
     ----------
@@ -53,11 +53,11 @@ class Tree:
     root : int
         The topmost.
     place : int
-        Moves the whole figure.
+        The node that moves the whole figure.
     joints : list of J int
         In the figure's order.
     fixed : list of int
-        What vertices without a joint follow; one or none.
+        The node that vertices without a joint follow; one or none.
     """
 
     root: int
@@ -69,7 +69,7 @@ class Tree:
 def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
     """Return the joints of a pose.
 
-    ``skeleton``: in shape.
+    ``skeleton``: already shaped.
     ``pose``: DOFs in lengths and radians.
     """
     rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
@@ -90,11 +90,11 @@ def add_nodes(
 
     ``document``: changed.
     ``name``: the figure's.
-    ``up``: the axis that points up in the world that the figure is in.
+    ``up``: the up axis of the figure's world.
     ``unit``: as in ``Figure.unit``.
-    ``skeleton``, ``still``: the joints and where they are.
-    ``pose``: gives the figure's place.
-    ``fixes``: whether vertices need something that never moves.
+    ``skeleton``, ``still``: the joints and their transforms.
+    ``pose``: gives the figure's placement.
+    ``fixes``: whether vertices need a node that never moves.
     Raises RigError if a number is not finite.
     """
     top: dict[str, Any] = {"name": text_of(name)}
@@ -119,7 +119,7 @@ def add_nodes(
 
 
 def _above(up: str, unit: str) -> dict[str, Any]:
-    """Return what turns and scales the whole figure, with a name that says it; may be empty."""
+    """Return the node that rotates and scales the whole figure, with its name; may be empty."""
     names, node = [], {}
     if up == "z":
         names.append("z up")

@@ -1,8 +1,8 @@
-"""glTF files that were written, read back: arrays, nodes in every frame, the mesh and its skin.
+"""Reading back of written glTF files: arrays, nodes in every frame, the mesh and its skin.
 
-Only what ``viewer.export.gltf`` writes is understood: one buffer without strides, samplers whose
-keys are the frames. Where joints and vertices are is told in the figure's space, beneath the node
-that turns and scales the whole.
+Only the output of ``viewer.export.gltf`` is supported: one buffer without strides, samplers whose
+keys are the frames. Joints and vertices are returned in the figure's space, below the node that
+rotates and scales the whole.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class GltfFile:
 
 
 def parsed(files: list[bytes]) -> GltfFile:
-    """Return a file from its bytes: of a ``.glb``, or of a ``.gltf`` and what lies beside it."""
+    """Return a file from its bytes: of a ``.glb``, or of a ``.gltf`` and its buffer."""
     if files[0][:4] != b"glTF":
         return GltfFile(json.loads(files[0]), files[1] if len(files) > 1 else b"")
     (length,) = struct.unpack_from("<I", files[0], _HEAD)
@@ -68,14 +68,14 @@ def read_back(
     start: int,
     sets: int | None = None,
 ) -> Side:
-    """Return what a file says of a figure.
+    """Return the contents of a file as a comparable body.
 
-    ``file``: as it was written.
+    ``file``: the written file.
     ``tree``: indices of the nodes of joints and figure.
-    ``node``: that of the mesh.
-    ``sources`` (M,): which of the file's morph targets change over time.
-    ``start``: the figure's frame that comes first in the file.
-    ``sets``: only so many sets of influences, scaled to a sum of 1; all if omitted.
+    ``node``: index of the mesh's node.
+    ``sources`` (M,): indices of the file's morph targets that change over time.
+    ``start``: the figure's frame that is the first of the file.
+    ``sets``: number of influence sets to use, scaled to a sum of 1; all if omitted.
     """
     nodes = file.root["nodes"]
     parents = np.full(len(nodes), -1, dtype=np.int32)
@@ -109,7 +109,7 @@ def read_back(
 
 
 def _keys(file: GltfFile) -> dict[tuple[int, str], Floats]:
-    """Return what moves: of a node and path its values, a row a frame."""
+    """Return the animated values by node and path, one row per frame."""
     found: dict[tuple[int, str], Floats] = {}
     for animation in file.root.get("animations", ()):
         for channel in animation["channels"]:

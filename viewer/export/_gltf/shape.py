@@ -1,4 +1,4 @@
-"""A figure's shape as glTF has it: morph targets, or a mesh that is in shape already."""
+"""A figure's shape in glTF form: morph targets, or a mesh with the shape baked in."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.shape import shaped
 
-_MOST_TARGETS = 64  # each costs 12 bytes a vertex, and programs hold only so many
+_MOST_TARGETS = 64  # each costs 12 bytes per vertex, and programs support few
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """What is written of a figure's shape.
+    """The written form of a figure's shape.
 
     Attributes
     ----------
     figure : Figure
-        Whose mesh, skeleton and skin are written.
+        Figure whose mesh, skeleton and skin are written.
     targets : (M,) int
         Blend shapes that become morph targets.
     weights : (F, M) or (1, M)
-        Of these, over time.
+        Weights of the targets over time.
     baked : (S,) or None
-        The shape that is in the mesh instead; None where none is.
+        The shape baked into the mesh instead; None if there is none.
     """
 
     figure: Figure
@@ -37,10 +37,10 @@ class Shape:
 
 
 def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
-    """Return how a figure's shape is written.
+    """Return the written form of a figure's shape.
 
-    Where joints follow the mesh, morph targets would leave the joints behind: then one shape is
-    baked in, and so it is if there are too many.
+    Morph targets do not move joints, so a shape that affects the joints is baked in; the same
+    applies if there are too many targets.
 
     ``figure``: unshaped.
     ``weights`` (F, S) or (1, S): of its blend shapes, over time.

@@ -1,4 +1,4 @@
-"""Influences as glTF has them: in sets of four, no joint twice, none negative, sums of 1."""
+"""Influences in glTF form: sets of four, unique joints, non-negative weights that sum to 1."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from viewer.rig.skin import (
 )
 
 PER_SET = 4
-_SUM = 1e-6  # sums nearer to 1 are rounding in the figure's file
+_SUM = 1e-6  # smaller deviations from 1 are rounding in the figure's file
 _MOST_JOINTS = 65536  # they are numbered in 16 bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Influences:
-    """What a file says of a skin.
+    """A skin in the form that a file can hold.
 
     Attributes
     ----------
     skin : Skin
-        Each joint once a vertex, strongest first, weights above 0 with sums of 1.
+        Each joint at most once per vertex, strongest first, positive weights with sums of 1.
     n_scaled : int
         Vertices whose weights did not add up to 1.
     n_negative : int
         Vertices that had negative weights, which glTF forbids.
     n_fixed : int
-        Vertices that nothing moves.
+        Vertices without influence.
     most : int
         Largest number of influences of a vertex.
     """
@@ -55,9 +55,9 @@ class Influences:
 
 
 def influences_of(skin: Skin) -> Influences:
-    """Return what glTF can hold of a skin.
+    """Return a skin in the form that glTF can hold.
 
-    ``skin``: any weights.
+    ``skin``: with any weights.
     Raises RigError if there are more joints than a file can number.
     """
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
@@ -112,7 +112,7 @@ def influence_sets(
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, column after column: (N, 16).
 
-    ``influences``: says whether vertices are fixed: what they hold on to was bound at the origin.
+    ``influences``: tells whether vertices are fixed; their node is bound at the origin.
     ``inverse_bind`` (J, 4, 4): of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]

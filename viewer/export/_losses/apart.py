@@ -1,4 +1,4 @@
-"""Largest distances between a figure and the file that was written of it, as text."""
+"""Largest distances between a figure and the file written from it, as text."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
 _BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
-_CHUNK = 128  # poses looked at at once
+_CHUNK = 128  # poses estimated at once
 _LIKELY = 4  # of these, poses whose farthest vertex is measured before all others
 _SMALL = 0.05  # of what rest meshes are apart: joints that add less need not be skinned
 _MOST = 512  # poses compared one by one where vertices are not blended linearly
 _ROUNDING = 2e-6  # of the size: single precision through a chain of joints
 _EPSILON = 2.0**-22  # of a coordinate: two steps of single precision
 _SIZED = 256  # frames whose joints say how far from the origin a motion is
-_FAR = 5.0  # times the rounding; what is farther away than that is told
+_FAR = 5.0  # times the rounding; larger distances are always reported
 
 
 @dataclass(frozen=True, slots=True)
 class Farthest:
-    """The largest distance, and of which joint or vertex in which frame."""
+    """The largest distance, with its joint or vertex and frame."""
 
     distance: float
     index: int
@@ -42,16 +42,16 @@ class Farthest:
 
 @dataclass(frozen=True, slots=True)
 class Apart:
-    """What is farther apart than rounding.
+    """Distances larger than rounding.
 
     Attributes
     ----------
     joints, vertices : Farthest or None
-        The largest of all; None where nothing is lost, or there are none.
+        The largest distances; None if nothing is lost, or there are none.
     looked : int
-        Frames whose vertices were compared; less than all where that would take too long.
+        Number of frames whose vertices were compared; fewer than all if that would take too long.
     frames : int
-        All there are.
+        Number of all frames.
     """
 
     joints: Farthest | None
@@ -61,12 +61,12 @@ class Apart:
 
 
 def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
-    """Return the distance, in figure units, that single precision may cost without a word.
+    """Return the distance, in figure units, up to which rounding errors are not reported.
 
     ``figure``: gives the size.
-    ``frames``: say how far from the origin its joints are. Numbers are coarser there, but not
-      without limit: what costs five times as much as usual is told.
-    ``rows`` (F,): which of them count.
+    ``frames``: give the distance of its joints from the origin, where numbers are coarser. The
+      tolerance grows with it up to five times the usual one.
+    ``rows`` (F,): the frames to use.
     """
     size, reach = 0.0, 0.0
     if figure.mesh is not None and figure.mesh.n_vertices:
@@ -82,8 +82,8 @@ def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
 def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | None = None) -> Apart:
     """Return the largest distances of joints and vertices over poses of two sides.
 
-    What cannot hold the farthest vertex is passed over, so that the result is exact, in double
-    precision, although few vertices are skinned so.
+    Poses and vertices that cannot be the farthest are skipped, so that the result is exact in
+    double precision although few vertices are skinned in it.
 
     ``first``, ``second``: with the same joints and vertices, in the same space.
     ``rows`` (F,): the first's frames.
@@ -119,9 +119,9 @@ def _told(found: Farthest) -> Farthest | None:
 
 
 class _Search:
-    """Looks for the farthest vertex, with the least work that leaves no doubt.
+    """Exact search for the farthest vertex with little work.
 
-    Bounds say which poses may hold it, single precision which of their vertices.
+    Bounds select the candidate poses, and single precision their candidate vertices.
     """
 
     def __init__(self, first: Body, second: Body, least: float) -> None:
@@ -131,7 +131,7 @@ class _Search:
         self._estimator: Estimator | None = None
 
     def look(self, first: Poses, second: Poses, frames: Rows) -> None:
-        """Look at poses of both; ``frames`` is what they are called."""
+        """Search poses of both; ``frames`` are their numbers."""
         bounds = self._bounds.of(first, second)
         order = np.argsort(-bounds, kind="stable")
         for start in range(0, len(order), _CHUNK):
@@ -142,7 +142,7 @@ class _Search:
             self._estimate(poses_of(first, rows), poses_of(second, rows), frames[rows])
 
     def _estimate(self, first: Poses, second: Poses, frames: Rows) -> None:
-        """Look at some poses: first where vertices may be farthest of all, then at who is left."""
+        """Search some poses: first the likeliest candidates, then the remaining ones."""
         most = self._most(first, second)
         likely = np.argsort(-most.max(axis=1), kind="stable")[:_LIKELY]
         self._measure(first, second, frames, likely, np.unique(most[likely].argmax(axis=1)))
@@ -175,7 +175,7 @@ class _Search:
 
 
 def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least: float) -> Apart:
-    """Compare sides of which one is not blended linearly, so that no bound is known."""
+    """Compare sides without linear blending, for which no bound is known."""
     count = min(len(rows), _MOST)
     chosen = np.linspace(0, len(rows) - 1, count).round().astype(int)
     plain = [replace(side, body=None, exact=None) for side in (first, second)]
@@ -196,7 +196,7 @@ def _vertices(side: Side, row: int) -> Floats:
 
 
 def shared_extent(found: Apart) -> str:
-    """Return how many frames were looked at, in words, if these are not all of them."""
+    """Return the number of compared frames as text, if these are not all."""
     if found.looked == found.frames:
         return ""
     return f" (vertices compared in {found.looked} of {found.frames} frames)"
@@ -211,15 +211,15 @@ def apart_lines(
     meshes: str = "vertices",
     versus: str = "",
 ) -> list[str]:
-    """Return a line that says by how much a file differs, or none if it does not.
+    """Return a line about the difference of a file, or none if there is none.
 
     ``path``: the file.
-    ``figure``: as it is here.
-    ``found``: what was measured.
+    ``figure``: the original.
+    ``found``: the measured distances.
     ``first_frame``: what the first frame is called; None for a single pose.
     ``sources`` (V,): the figure's vertex for each that was compared.
-    ``meshes``: whose vertices these are, in words.
-    ``versus``: what the file differs from; the motion or pose if empty.
+    ``meshes``: description of these vertices.
+    ``versus``: description of the original; the motion or pose if empty.
     """
 
     def place(far: Farthest, label: str) -> str:

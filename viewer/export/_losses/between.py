@@ -47,7 +47,7 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
         return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
 
     lines = between_losses(path, animation, found, how)
-    return [f"{line}: {rate:g} a second are written" for line in lines]
+    return [f"{line}: written at {rate:g} per second" for line in lines]
 
 
 def between_losses(

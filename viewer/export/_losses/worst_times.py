@@ -1,4 +1,4 @@
-"""The times at which two motions of one figure are farthest apart, where both are curves.
+"""Times at which two motions of one figure, both given as curves, are farthest apart.
 
 Curves are smooth between their keys, so the differences are sampled there, and the highest
 samples are refined.
@@ -47,16 +47,16 @@ _ROUNDS = 4  # of narrowing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstTimes:
-    """When motions may be farthest apart.
+    """Candidate times of the largest distance.
 
     Attributes
     ----------
     times : (T,)
         Seconds, one of them the worst.
     looked : int
-        How many times were looked at.
+        Number of sampled times.
     is_estimate : bool
-        Whether these were too few to be sure of it.
+        Whether these were too few for certainty.
     """
 
     times: Floats
@@ -90,12 +90,12 @@ def _repeated(channel: Channel, start: float, stop: float) -> Floats:
 def worst_times(
     figure: Figure, one: Sampler, other: Sampler, edges: Floats, rate: float, how: Skinning
 ) -> WorstTimes:
-    """Return when joints or vertices of a figure that moves in two ways are farthest apart.
+    """Return the times at which joints or vertices of two motions are farthest apart.
 
     ``figure``: unshaped.
     ``one``, ``other``: from seconds (T,) to poses of the figure, none of them missing.
     ``edges`` (E,): seconds between which both are smooth, rising.
-    ``rate``: frames a second, by which spans are too short to matter.
+    ``rate``: frames per second; gives the shortest relevant span.
     ``how``: what moves the mesh; blended linearly.
     """
     spans = _spans(edges, _SHORT / rate)
@@ -131,7 +131,7 @@ def _within(spans: Floats, places: Floats) -> Floats:
 
 
 def _likely(pair: _Pair, spans: Floats) -> Floats:
-    """Return the spans in whose middle joints or vertices are farthest apart, in time order."""
+    """Return the spans with the largest distances in their middle, in time order."""
     if len(spans) > _MOST:
         spans = spans[np.linspace(0, len(spans) - 1, _MOST).astype(int)]
     middles = _within(spans, np.array([0.5]))
@@ -163,7 +163,7 @@ def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """A figure that moves in two ways, and the few vertices of it that are looked at."""
+    """Two motions of a figure, and the few vertices that are compared."""
 
     figure: Figure
     one: Sampler

@@ -1,4 +1,4 @@
-"""What was uploaded for the figures and actors of a scene, and when it is freed."""
+"""GPU buffers of the figures and actors of a scene, and their lifetime."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["ActorBuffers"]
 
 
 class _InstancedShapes:
-    """Instances of one figure: buffers for each of its shapes that several actors have."""
+    """Instance buffers of one figure, one per shape that several actors share."""
 
     def __init__(self) -> None:
         self.items: list[InstanceBuffers] = []
@@ -37,7 +37,7 @@ class _InstancedShapes:
 
 
 class ActorBuffers:
-    """Everything on the GPU that belongs to figures and actors.
+    """All GPU buffers of figures and actors.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class ActorBuffers:
     programs : Programs
         Gives the skinning programs.
     cube : moderngl.Buffer
-        What boxes are instances of.
+        The mesh that boxes are instances of.
     notes : list of str
-        Gets what the driver cannot do as asked.
+        Receives messages about limitations of the driver.
     forget : callable
         Called with a posed mesh that is about to be freed.
     """
@@ -80,7 +80,7 @@ class ActorBuffers:
         mesh = self.mesh(actor.figure)
         make = lambda: PosedMesh(self.context, self.programs, mesh)  # noqa: E731
         posed = self.posed.get(actor, make)
-        if posed.mesh is not mesh:  # the actor has got another figure
+        if posed.mesh is not mesh:  # the actor's figure was replaced
             self.posed.drop(actor, self._forget)
             posed = self.posed.get(actor, make)
         return posed
@@ -100,21 +100,21 @@ class ActorBuffers:
         return self.keypoints.get(actor, make)
 
     def points_of(self, actor: Actor) -> PointBuffers:
-        """Return an actor's captured points; its figure must be made of some."""
+        """Return an actor's captured points; its figure must consist of points."""
         from viewer.rendering.passes.point_pass import PointBuffers
 
         layout = actor.figure.points
-        assert layout is not None  # the caller looked
+        assert layout is not None  # checked by the caller
         return self.points.get(actor, lambda: PointBuffers(self.context, layout))
 
     def motion_path(self, actor: Actor) -> MotionPathBuffers:
-        """Return an actor's paths."""
+        """Return an actor's motion paths."""
         from viewer.rendering.passes.motion_path_pass import MotionPathBuffers
 
         return self.motion_paths.get(actor, lambda: MotionPathBuffers(self.context))
 
     def instanced(self, figure: Figure, count: int) -> list[InstanceBuffers]:
-        """Return as many buffers of a figure, the same ones in the same order as before."""
+        """Return ``count`` instance buffers of a figure, in a stable order."""
         from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 
         kept = self._instanced.get(figure, _InstancedShapes).items
@@ -125,7 +125,7 @@ class ActorBuffers:
         return kept
 
     def keep_only(self, actors: Sequence[Actor]) -> None:
-        """Free what belongs to actors that left the scene, and to figures that nobody has."""
+        """Free the buffers of removed actors and of unused figures."""
         self.posed.keep_only(actors, self._forget)
         for kept in (self.skeletons, self.keypoints, self.points, self.motion_paths):
             kept.keep_only(actors)

@@ -17,11 +17,11 @@ from viewer.rig.mesh import bounding_box
 __all__ = ["BoxBuffers", "joint_colors"]
 
 _GOLDEN = 0.618033988749895
-_MANY = 1000  # boxes from which on it pays to look for coincident ones
+_MANY = 1000  # minimum number of boxes for which coincident ones are searched
 
 
 def joint_colors(n_joints: int) -> Floats:
-    """Return a colour for each joint: hues a golden ratio apart, so neighbours differ.
+    """Return a colour for each joint: hues spaced by the golden ratio, so that neighbours differ.
 
     Returns
     -------
@@ -33,7 +33,7 @@ def joint_colors(n_joints: int) -> Floats:
 
 
 class BoxBuffers:
-    """Boxes on the GPU, each moved by a matrix of its own.
+    """Boxes on the GPU, each with its own matrix.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class BoxBuffers:
         self._arrays = self._owner.keep(VertexArrays(context))
 
     def move(self, matrices: Floats) -> None:
-        """Upload the boxes' matrices, (N, 4, 4) box to figure space; they are changed."""
+        """Upload the boxes' matrices, (N, 4, 4) box to figure space; modified in place."""
         self.center = bounding_box(matrices[:, :3, 3]).mean(axis=0)
         matrices[:, :3, 3] -= self.center
         if self.count > _MANY:
@@ -76,9 +76,9 @@ class BoxBuffers:
         write_matrices(self.world, matrices)
 
     def _hidden(self, matrices: Floats) -> Bools:
-        """Return which boxes coincide with another; shrunk to a point, they cost nothing.
+        """Return which boxes coincide with another; they are shrunk to a point to save time.
 
-        A hundred thousand boxes over one another would take minutes to draw in software.
+        A hundred thousand overlapping boxes take minutes to draw in software.
         """
         rows = np.concatenate([matrices[:, :3].reshape(-1, 12), self._boxes.reshape(-1, 6)], axis=1)
         _, first = np.unique(rows.astype(np.float32), axis=0, return_index=True)
@@ -87,7 +87,7 @@ class BoxBuffers:
         return hidden
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
-        """Return the instanced boxes for a program, with what its compiler kept."""
+        """Return the instanced boxes for a program, with the attributes that its compiler kept."""
 
         def content() -> list[Any]:
             found: list[Any] = [(self._cube, "3f4 12x", "in_corner")]

@@ -1,4 +1,4 @@
-"""An OpenGL context without a window, with every known failure put into words."""
+"""Headless OpenGL contexts, and explanations of every known failure."""
 
 from __future__ import annotations
 
@@ -77,26 +77,26 @@ def headless_context(device: int | None = None) -> moderngl.Context:
 def _create(options: Mapping[str, int]) -> moderngl.Context:
     settings: dict[str, Any] = {"standalone": True, "require": NEEDED_VERSION, **options}
     if sys.platform.startswith("linux"):
-        # Given names spare a search that starts other programs and takes 60 ms.
+        # Explicit names avoid a search that starts other programs and takes 60 ms.
         settings |= {"backend": "egl", "libegl": _LIBEGL, "libgl": _LIBGL}
-        # Mesa would print lines of its own before the one that says what to do.
+        # Mesa would print its own messages before the useful one.
         os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
         with deferred():
             return moderngl.create_context(**settings)
-    except Exception as problem:  # glcontext raises nothing more special
+    except Exception as problem:  # glcontext raises nothing more specific
         text = str(problem)
         offer = headless_offer(settings) if "0x3009" in text or "version" in text else None
         raise RenderError(explain(text) if offer is None else offer_text(offer)) from None
 
 
 def check_device(device: int) -> None:
-    """Refuse a device that is not there; nothing if there are none at all, or not by number.
+    """Refuse a missing device; accept any if there are none at all, or they have no numbers.
 
     Raises
     ------
     ViewerError
-        With the numbers that there are.
+        With the valid numbers.
     """
     count = device_count() if sys.platform.startswith("linux") else 0
     if device < 0 or (count and device >= count):
@@ -107,7 +107,7 @@ def check_device(device: int) -> None:
 
 
 def device_count() -> int:
-    """Ask for an impossible device: the refusal tells how many there are."""
+    """Return the number of devices, from the error about an impossible index."""
     try:
         _create({"device_index": 1 << 20})
     except RenderError as problem:
@@ -117,17 +117,17 @@ def device_count() -> int:
 
 
 def explain(text: str) -> str:
-    """Return what a message of glcontext or GLFW means and what to do about it.
+    """Return an explanation of a message from glcontext or GLFW, and a cure.
 
     Parameters
     ----------
     text : str
-        As the library put it.
+        The library's message.
 
     Returns
     -------
     str
-        One line: cause and cure, the library's own words in brackets.
+        One line: cause and cure, the library's message in brackets.
 
     >>> explain("libEGL.so.1 not loaded").startswith("libEGL was not found")
     True
@@ -135,14 +135,14 @@ def explain(text: str) -> str:
     devices = re.search(r"requested device index (\d+), but found (\d+)", text)
     code = re.search(r"0x30[0-9a-fA-F]{2}", text)
     if "not loaded" in text or "cannot open shared object" in text:
-        # glcontext lets these variables replace the names we gave.
+        # In glcontext these variables override the given names.
         asked_gl = os.environ.get("GLCONTEXT_LINUX_LIBGL") or _LIBGL
         library = "libGL" if asked_gl in text else "libEGL"
         return f"{library} was not found ({_INSTALL}) [{text}]"
     if devices and int(devices.group(2)) == 0:
         return (
             "EGL found 0 devices: in a container start it with NVIDIA_DRIVER_CAPABILITIES=all, "
-            f"or install Mesa for drawing in software ({_INSTALL})"
+            f"or install Mesa for software rendering ({_INSTALL})"
         )
     if devices:
         count = int(devices.group(2))
@@ -162,27 +162,27 @@ def explain(text: str) -> str:
 
 
 def is_software(context: moderngl.Context) -> bool:
-    """Return whether the processor draws, not a graphics card."""
+    """Return whether rendering is done in software."""
     renderer = context.info["GL_RENDERER"].lower()
     return any(name in renderer for name in ("llvmpipe", "softpipe", "swrast", "software", "basic"))
 
 
 def unreadable_devices() -> list[str]:
-    """Return the render nodes of graphics cards that this user may not open."""
+    """Return the render nodes of graphics cards that the user has no permission to open."""
     folder = Path("/dev/dri")
     nodes = sorted(folder.glob("renderD*")) if folder.is_dir() else []
     return [str(node) for node in nodes if not os.access(node, os.R_OK | os.W_OK)]
 
 
 def check_errors(context: moderngl.Context, doing: str) -> None:
-    """Raise if OpenGL has noted an error: too large a buffer or texture raises nothing itself.
+    """Raise if OpenGL has recorded an error, since an oversized buffer or texture does not raise.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     doing : str
-        What was attempted, for the message.
+        Name of the attempted operation, for the message.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""States of OpenGL that hold for some draws and are put back after them."""
+"""OpenGL states that are set for some draws and restored after them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["opacities", "without_colors", "without_depth_test", "without_depth_w
 
 @contextmanager
 def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
-    """Draw what hides nothing that is drawn later."""
+    """Draw without writing depths, so that later draws are not hidden."""
     target = context.fbo
     target.depth_mask = False
     target.use()  # moderngl hands masks to OpenGL only then
@@ -25,7 +25,7 @@ def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
 
 @contextmanager
 def without_colors(context: moderngl.Context) -> Iterator[None]:
-    """Draw depths alone."""
+    """Draw depths only."""
     target = context.fbo
     target.color_mask = False, False, False, False
     target.use()  # moderngl hands masks to OpenGL only then
@@ -47,9 +47,9 @@ def without_depth_test(context: moderngl.Context) -> Iterator[None]:
 
 
 def opacities(context: moderngl.Context, hidden: float | None) -> Iterator[float]:
-    """Yield the opacity of each draw: of what lies behind something, then of what is seen.
+    """Yield the opacity of each draw: first of hidden parts, then of visible ones.
 
-    ``hidden`` is that of the first; None draws once, over everything.
+    ``hidden`` is the opacity of the first; None draws once, over everything.
     """
     for order, opacity in (("1", 1.0),) if hidden is None else ((">", hidden), ("<=", 1.0)):
         context.depth_func = order

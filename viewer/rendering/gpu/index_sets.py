@@ -1,8 +1,8 @@
-"""Which triangles are drawn, and in what order: neighbours follow one another.
+"""Index buffers of the drawn triangles, in an order that keeps neighbours together.
 
-Drivers keep the last few vertices that they computed, at best a few hundred. Files often list
-triangles in an order that finds none of them there, so that every vertex is computed three to five
-times; along a space-filling curve it is once or twice (``tests/bench/bench_instances.py``).
+Drivers cache the last few computed vertices, at best a few hundred. Files often list triangles
+in an order that misses this cache, so that every vertex is computed three to five times; along a
+space-filling curve it is once or twice (``tests/bench/bench_instances.py``).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from viewer.rig.figure import Figure
 
 __all__ = ["IndexSet", "MeshRun", "curve_places", "index_set", "kept_triangles"]
 
-_CURVE_BITS = 10  # an axis
+_CURVE_BITS = 10  # per axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,16 +33,16 @@ class MeshRun:
 
 @dataclass(frozen=True, slots=True)
 class IndexSet:
-    """An index buffer and its runs; whoever made it releases the buffer.
+    """An index buffer and its runs; its creator releases the buffer.
 
     Attributes
     ----------
     indices : moderngl.Buffer
         Of split vertices.
     runs : tuple of MeshRun
-        One after the other.
+        Consecutive.
     order : (N,) int32
-        Which of the triangles that were given is drawn first, second …
+        Index of the given triangle that is drawn first, second …
     """
 
     indices: moderngl.Buffer
@@ -62,7 +62,7 @@ def index_set(
     textures: list[moderngl.Texture | None],
     positions: Floats | None = None,
 ) -> IndexSet:
-    """Upload triangles; runs follow their materials, and a space-filling curve within each.
+    """Upload triangles, sorted by material and along a space-filling curve within each.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def index_set(
     textures : list
         Of the materials.
     positions : (R, 3), optional
-        Of the split vertices, at rest; without them triangles stay in their order.
+        Of the split vertices, at rest; without them triangles keep their order.
     """
     edges = np.flatnonzero(np.diff(materials)) + 1
     runs = []
@@ -94,7 +94,7 @@ def index_set(
 
 
 def curve_places(points: Floats) -> NDArray[np.int64]:
-    """Return where points lie on a Z-order curve through their box (Morton 1966).
+    """Return the positions of points on a Z-order curve through their box (Morton 1966).
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> 
     figure : Figure
         With or without body parts.
     hidden : tuple of int
-        Parts that are not drawn.
+        Hidden parts.
     triangles : (T, 3)
         Indices of the figure's vertices.
     """

@@ -1,9 +1,9 @@
-"""Several actors of one figure and shape on the GPU: what one instanced draw of them needs.
+"""GPU buffers for an instanced draw of several actors with the same figure and shape.
 
 No posed vertices are kept: the vertex shader skins each instance by its own row of matrices, which
-on a driver in software takes less time than to write posed vertices and to read them again
-(``tests/bench/bench_instances.py``). Every draw skins anew, so a camera that moves is not free, and
-views that draw a mesh several times take the posed buffers of single actors.
+with software rendering takes less time than writing posed vertices and reading them back
+(``tests/bench/bench_instances.py``). Every draw repeats the skinning, so a moving camera has a
+cost, and views that draw a mesh several times use the posed buffers of single actors.
 """
 
 from __future__ import annotations
@@ -67,16 +67,16 @@ class InstanceBuffers:
     context : moderngl.Context
         Gives textures and buffers.
     mesh : MeshBuffers
-        Of the figure, which has skeleton and skin.
+        Mesh of the figure, which has skeleton and skin.
     way : str
-        How pose correctives are summed, see ``rest_buffers``.
+        Method of summing pose correctives, see ``rest_buffers``.
 
     Attributes
     ----------
     count : int
         Number of actors, A.
     n_updates : int
-        How often matrices went up.
+        Number of matrix uploads.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
@@ -98,12 +98,12 @@ class InstanceBuffers:
         self._arrays = VertexArrays(context)
 
     def update(self, poses: Sequence[Pose], how: Skinning) -> None:
-        """Send the matrices of poses that changed.
+        """Upload the matrices of poses that changed.
 
         Parameters
         ----------
         poses : sequence of A Pose
-            All of one shape.
+            All with the same shape.
         how : Skinning
             Method and influences.
 
@@ -119,16 +119,16 @@ class InstanceBuffers:
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
         self._how, self._words, self.count = how, words, len(poses)
         if changed:
-            self._keys = []  # a refusal leaves nothing that passes for done
+            self._keys = []  # after an error nothing counts as uploaded
             self._reserve(len(poses))
-            # The sums of pose correctives differ from actor to actor and are sent apart.
+            # Sums of pose correctives differ between actors and are uploaded separately.
             self._rest.update(figure, poses[0], replace(how, correctives=False))
             self._write(figure, [poses[row] for row in changed], np.array(changed))
             self.n_updates += 1
         self._keys = keys
 
     def _reserve(self, count: int) -> None:
-        """Make room; textures grow by half, so that growing numbers are not copied each time."""
+        """Reserve space; textures grow by half, so that a growing count is not copied each time."""
         if self._palette is not None and count <= len(self._rows):
             return
         room = max(count, len(self._rows) * 3 // 2)
@@ -171,7 +171,7 @@ class InstanceBuffers:
         self._offsets.update(rotations if active else None, rows, self.count)
 
     def place(self, actors: Sequence[Actor], view: View) -> None:
-        """Send where the actors are, seen from a camera, and their colours.
+        """Upload the actors' placements, relative to a camera, and their colours.
 
         Products are formed in float64: large translations cancel before float32 sees them.
         """
@@ -186,7 +186,7 @@ class InstanceBuffers:
         self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:
-        """Set what ``instances.vert`` needs beside its attributes."""
+        """Set the uniforms and textures of ``instance.vert``."""
         skin = self.mesh.skin(self._how)
         values = {
             "u_projection": as_uniform(view.projection),
@@ -236,7 +236,7 @@ class InstanceBuffers:
                 )
                 if name in program and buffer is not None
             ]
-            # What the compiler dropped is skipped, four bytes a number.
+            # Attributes that the compiler dropped are skipped, four bytes per number.
             layout = " ".join(
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
             )
@@ -254,7 +254,7 @@ class InstanceBuffers:
         self._palette = self._rigid = self._instances = None
 
     def release(self) -> None:
-        """Free what belongs to these actors."""
+        """Free the buffers of these actors."""
         self._release_textures()
         self._offsets.release()
         self._rest.release()

@@ -11,20 +11,20 @@ __all__ = ["InstanceRows"]
 
 
 class InstanceRows:
-    """A buffer that grows when it has to, and the vertex array that reads it.
+    """A buffer that grows on demand, and the vertex array that reads it.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     program : moderngl.Program
-        Draws a strip of four corners for each row.
+        Program that draws a strip of four corners per row.
     layout : str
-        Of a row, as moderngl writes it.
+        Layout of a row in moderngl's notation.
     names : tuple of str
-        The attributes.
+        Names of the attributes.
     what : str
-        What the rows are, for messages.
+        Name of the rows in messages.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class InstanceRows:
         self._buffer.write(data)
 
     def draw(self) -> None:
-        """Draw the rows that were written last."""
+        """Draw the most recently written rows."""
         if self._array is not None and self._count:
             self._array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._count)
 

@@ -1,4 +1,4 @@
-"""A figure's mesh and skin on the GPU: uploaded when first needed, never changed."""
+"""A figure's mesh and skin on the GPU, uploaded on first use and never changed."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ class MeshBuffers:
     """Rest vertices, triangle indices, influences and textures of one figure.
 
     Along seams a vertex is uploaded once per texture coordinate: these are the split vertices.
-    Positions are stored relative to the middle of the mesh: float32 then spends its digits on
-    the figure's shape, however far from the origin it stands.
+    Positions are stored relative to the middle of the mesh: float32 then keeps its
+    precision for the figure's shape, however far it is from the origin.
 
     Parameters
     ----------
     context : moderngl.Context
-        Owns nothing here; ``release`` frees all.
+        The context in use; ``release`` frees all buffers.
     figure : Figure
         With a mesh.
     notes : list of str
-        Gets a line for each thing that the driver cannot do as asked.
+        Receives messages about limitations of the driver.
 
     Attributes
     ----------
     center : (3,)
-        What was subtracted, figure space.
+        The offset that was subtracted, figure space.
     sources : (R,) int32
         The figure's vertex of each split vertex.
     copies : (V,) int32
@@ -88,7 +88,7 @@ class MeshBuffers:
     ) -> IndexSet:
         """Return the triangles of the full or the reduced mesh, without hidden body parts.
 
-        ``as_listed`` keeps the file's order: translucent edges look different in another one.
+        ``as_listed`` keeps the file's order, on which the look of translucent edges depends.
         """
         reduced = reduced and self.figure.reduced is not None
         key = (reduced, hidden, as_listed)
@@ -110,7 +110,7 @@ class MeshBuffers:
         return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
     def skin(self, skinning: Skinning) -> SkinBuffers:
-        """Return the influences that count."""
+        """Return the influences that the skinning uses."""
         key = (skinning.max_influences, skinning.normalize)
         if key not in self._skins:
             skin = self.figure.skin
@@ -138,7 +138,7 @@ class MeshBuffers:
 
     @property
     def product(self) -> np.ndarray:
-        """The pose correctives as float32, (P, 3 V), for drivers that want them summed here."""
+        """The pose correctives as float32, (P, 3 V), for sums on the processor."""
         if self._product is None:
             correctives = self.figure.correctives
             assert correctives is not None  # the caller looked

@@ -1,4 +1,4 @@
-"""Smaller versions of a texture, averaged by numpy where the processor draws anyway.
+"""Mipmaps of textures, averaged by numpy for software rendering.
 
 Mesa compiles two programs for ``glGenerateMipmap``: 60 ms, a fifth of the time from start to
 picture.
@@ -20,18 +20,18 @@ from viewer.rig.arrays import Bytes
 __all__ = ["add_mipmaps", "halved_pictures"]
 
 _SRGB8_ALPHA8, _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x8C43, 0x1908, 0x1401, 0x0DE1
-_STEPS = 1 << 14  # of linear light; the sum of four values still fits 16 bits
+_STEPS = 1 << 14  # steps of linear light; the sum of four values still fits 16 bits
 
 
 def add_mipmaps(texture: moderngl.Texture, pixels: Bytes) -> None:
-    """Give an sRGB texture all its smaller levels.
+    """Add all smaller levels to an sRGB texture.
 
     Parameters
     ----------
     texture : moderngl.Texture
         RGBA; its context must be current.
     pixels : (H, W, 4) uint8
-        What it holds, first row at v = 0.
+        Its contents, first row at v = 0.
     """
     upload = _upload_function() if is_software(texture.ctx) else None
     if upload is None:
@@ -50,12 +50,12 @@ def halved_pictures(pixels: Bytes) -> list[Bytes]:
     Parameters
     ----------
     pixels : (H, W, 4) uint8
-        sRGB; alpha is treated as a colour, as nothing draws it.
+        sRGB; alpha is treated like a colour, since it is not drawn.
 
     Returns
     -------
     list of (H >> n, W >> n, 4) uint8
-        No side shorter than 1; an odd last row or column counts for nothing.
+        No side is shorter than 1; an odd last row or column is dropped.
     """
     decode, encode = _tables()
     linear = decode[pixels]
@@ -74,7 +74,7 @@ def halved_pictures(pixels: Bytes) -> list[Bytes]:
 
 
 def _tables() -> tuple[np.ndarray, Bytes]:
-    """Return sRGB bytes to steps of linear light, and back."""
+    """Return the lookup tables from sRGB bytes to steps of linear light, and back."""
     decode = np.rint(decode_srgb(np.arange(256) / 255.0) * (_STEPS - 1)).astype(np.uint16)
     encoded = encode_srgb(np.arange(_STEPS) / (_STEPS - 1))
     return decode, np.rint(255.0 * encoded).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The OpenGL version that a machine offers where it refuses the one needed."""
+"""OpenGL version that a machine offers if it lacks the required one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OVERRIDES = ("MESA_GL_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE")
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What a driver says of itself: ``"4.5 (Compatibility Profile) Mesa 22.3.6"`` and the like."""
+    """Version strings of a driver: ``"4.5 (Compatibility Profile) Mesa 22.3.6"`` and the like."""
 
     version: str
     language: str
@@ -29,7 +29,7 @@ class Offer:
 
 
 def headless_offer(options: Mapping[str, Any]) -> Offer | None:
-    """Return what a machine offers without a window, None if nothing at all.
+    """Return the OpenGL that a machine offers without a window, None if there is none.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def headless_offer(options: Mapping[str, Any]) -> Offer | None:
     for version in _TRIED:
         try:
             context = create(mode="standalone", glversion=version, **names)
-        except Exception:  # glcontext raises nothing more special
+        except Exception:  # glcontext raises nothing more specific
             continue
         try:
             return offer_of(context.load("glGetString"))
@@ -52,7 +52,7 @@ def headless_offer(options: Mapping[str, Any]) -> Offer | None:
 
 
 def offer_of(address: int) -> Offer:
-    """Return what the current context's driver says.
+    """Return the version strings of the current context's driver.
 
     Parameters
     ----------
@@ -68,21 +68,21 @@ def offer_of(address: int) -> Offer:
 
 
 def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str:
-    """Return what is needed and what there is instead, in a line.
+    """Return a message about the required and the offered version.
 
     Parameters
     ----------
     offer : Offer
         Of a context of an older version.
     environment : mapping of str to str
-        Has the variables that make Mesa offer less than it could.
+        Contains the variables that limit the version offered by Mesa.
     """
     asked = [f"{name}={environment[name]}" for name in _OVERRIDES if environment.get(name)]
     where = ", ".join([f"renderer {offer.renderer}", *(f"{one} is set" for one in asked)])
     version, language = _numbers(offer.version), _numbers(offer.language)
     forced = re.match(r"(\d)(\d\d)", environment.get(_OVERRIDES[1], ""))
     if forced:
-        # It counts for core profiles alone, of which there may be none left to ask.
+        # It applies to core profiles only, and there may be none.
         language = min(language, (int(forced[1]), int(forced[2])))
     if version < _NEEDED:
         beside = f" with GLSL {_dotted(language, 2)}" if language < _NEEDED_LANGUAGE else ""
@@ -96,7 +96,7 @@ def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str
 
 
 def _numbers(text: str) -> tuple[int, int]:
-    """Return the version that a text begins with; OpenGL ES has words before it.
+    """Return the version that a text begins with; OpenGL ES has a prefix.
 
     >>> _numbers("4.5 (Core Profile) Mesa 22.3.6"), _numbers("OpenGL ES 3.2 Mesa"), _numbers("")
     ((4, 5), (3, 2), (0, 0))

@@ -1,4 +1,4 @@
-"""Ownership of OpenGL objects: who frees what, also if making an object fails."""
+"""Ownership of OpenGL objects, which are also freed if creating another one fails."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _Key = TypeVar("_Key")
 
 
 class Owner:
-    """Frees what it was given, the last first."""
+    """Owner of objects, which it frees in reverse order."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()
 
     def keep(self, item: _Item) -> _Item:
-        """Take an object over and return it."""
+        """Take ownership of an object and return it."""
         self._stack.callback(item.release)
         return item
 
     @contextmanager
     def guard(self) -> Iterator[None]:
-        """Free everything if what is inside fails: a refused upload leaves nothing behind."""
+        """Free everything if the block fails, so that a failed upload leaks nothing."""
         try:
             yield
         except BaseException:
@@ -38,15 +38,15 @@ class Owner:
             raise
 
     def release(self) -> None:
-        """Free everything that was taken over."""
+        """Free all owned objects."""
         self._stack.close()
 
 
 class Kept(Generic[_Key, _Item]):
-    """One item for each of some objects, told apart by identity, made when first asked for."""
+    """Cache of one item per object, keyed by identity and created on first use."""
 
     def __init__(self) -> None:
-        # The objects are kept too, so that no other one can take over their identity.
+        # The objects are kept alive, so that no other object can get the same id.
         self._items: dict[int, tuple[_Key, _Item]] = {}
 
     def __len__(self) -> int:

@@ -1,4 +1,4 @@
-"""Shader programs: composed of a file and a chunk, compiled once, errors with the file's name."""
+"""Shader programs: composed of files and chunks, compiled once, with errors by file and line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHADING = {
     "parts": "Body parts as colours",
     "scalar": "Numbers as colours",
 }
-"""Chunks in ``shaders/shade``, with the name that menus show."""
+"""Chunks in ``shaders/shade``, with labels for menus."""
 
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
@@ -30,7 +30,7 @@ _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
 def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
-    """Set uniforms by name; those that the compiler found unused and dropped are left out.
+    """Set uniforms by name; those that the compiler dropped as unused are skipped.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
     for name, value in values.items():
         if name in program:
             uniform = program[name]
-            assert isinstance(uniform, moderngl.Uniform)  # the names say so: u_
+            assert isinstance(uniform, moderngl.Uniform)  # by the prefix u_
             if isinstance(value, bytes):
                 uniform.write(value)
             else:
@@ -50,7 +50,7 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
 
 
 class Programs:
-    """Compiles programs and keeps them; one per context.
+    """Cache of compiled programs; one per context.
 
     Parameters
     ----------
@@ -91,14 +91,14 @@ class Programs:
         Raises
         ------
         RenderError
-            If the driver refuses a shader; the message names our file and its line.
+            If the driver rejects a shader; the message names the file and its line.
         """
         return self._get((name, skin, fragment or name, chunk, geometry, affine), ())
 
     def feedback(
         self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
     ) -> moderngl.Program:
-        """Return a program without fragments whose outputs are captured, interleaved.
+        """Return a program without a fragment shader, whose interleaved outputs are captured.
 
         Its chunk skins; ``affine`` says whether joints may scale or shear.
         """
@@ -114,7 +114,7 @@ class Programs:
             fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
-                # Both take and give the fragment shader's inputs: those of the first are renamed.
+                # Both stages output the fragment shader's inputs: the vertex shader's are renamed.
                 vertex = re.sub(r"\bv_(\w+)", r"v_vertex_\1", vertex)
             try:
                 # moderngl has functions in Python describe what a program has, and crashes if one
@@ -131,7 +131,7 @@ class Programs:
         return self._cache[key]
 
     def _explain(self, text: str, files: list[str]) -> str:
-        """Put our files and lines in place of the driver's: ``0:12(5): ``, ``0(12) : ``."""
+        """Replace the driver's source positions by files and lines: ``0:12(5): ``, ``0(12) : ``."""
 
         def place(found: re.Match[str]) -> str:
             file, line = divmod(int(found[1]), _LINES_PER_FILE)
@@ -142,7 +142,7 @@ class Programs:
         shown = " / ".join(lines) or " ".join(text.split())
         info = self.context.info
         return (
-            f"the driver refused a shader ({shown}) on {info['GL_RENDERER']}, "
+            f"the driver rejected a shader ({shown}) on {info['GL_RENDERER']}, "
             f"{info['GL_VERSION']}: please report this"
         )
 
@@ -154,10 +154,10 @@ class Programs:
 
 
 def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
-    """Return a shader's text with its chunk and includes, each line numbered as in its own file.
+    """Return a shader's text with its chunk and includes, with line numbers of the original files.
 
-    The line tells the file too, as ``_LINES_PER_FILE`` times its index in ``files``: Mesa forgets
-    a source number after parsing.
+    Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
+    Mesa drops the source number after parsing.
     """
     base = len(files) * _LINES_PER_FILE
     files.append(name)
@@ -179,14 +179,14 @@ def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
 
 
 def _included(name: str, files: list[str]) -> str:
-    """Return the text of a file that several shaders share."""
+    """Return the text of an include file."""
     text = resource("shaders", "include", f"{name}.glsl").read_text("utf-8")
     files.append(f"include/{name}.glsl")
     return f"#line {(len(files) - 1) * _LINES_PER_FILE + 1}\n{text}"
 
 
 def _chunk(folder: str, chunk: str, files: list[str]) -> str:
-    """Return a chunk's text; what it needs comes first, its function renamed after its file."""
+    """Return a chunk's text after those that it needs, whose functions get their file's name."""
     inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     needs = _NEEDS.match(inner)
     parts = []
@@ -195,7 +195,7 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
         parts.append(_chunk(folder, name, files))
         parts.append(f"#undef {folder}\n")
     if needs:
-        inner = f"\n{inner[needs.end() :]}"  # the line stays, so that lines count right
+        inner = f"\n{inner[needs.end() :]}"  # keep the line, so that line numbers stay correct
     parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
     files.append(f"{folder}/{chunk}.glsl")
     return "".join(parts)

@@ -1,7 +1,7 @@
 """The rest vertices of one actor: the figure's own, or changed by its shape and correctives.
 
 Pose correctives are summed in one of two ways. Drivers on a graphics card sum them in the vertex
-shader from a texture: a frame then uploads the weights alone. Drivers in software are several
+shader from a texture: a frame then uploads only the weights. Software drivers are several
 times faster with one product of matrix and vector per changed pose (``tests/bench`` prints both).
 """
 
@@ -23,7 +23,7 @@ from viewer.rig.skinning import Skinning
 __all__ = ["WAYS", "RestBuffers"]
 
 WAYS = ("texture", "product")
-"""How pose correctives are summed."""
+"""Methods of summing pose correctives."""
 
 
 class RestBuffers:
@@ -34,7 +34,7 @@ class RestBuffers:
     context : moderngl.Context
         Gives the buffers.
     mesh : MeshBuffers
-        Used as it is while shape and correctives are 0.
+        Used unchanged while shape and correctives are 0.
     way : str
         One of ``WAYS``; chosen by the driver if empty.
 
@@ -43,7 +43,7 @@ class RestBuffers:
     positions, normals : moderngl.Buffer
         Of every split vertex, positions minus the mesh's centre.
     n_offsets : int
-        How many rows of correctives the shader has to add.
+        Number of rows of correctives that the shader adds.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
@@ -56,7 +56,7 @@ class RestBuffers:
         self._key: tuple[bytes, bytes] = b"", b""
 
     def update(self, figure: Figure, pose: Pose, how: Skinning) -> None:
-        """Follow shape and pose.
+        """Update to a shape and pose.
 
         Parameters
         ----------
@@ -113,16 +113,16 @@ class RestBuffers:
     def attributes(
         self, program: moderngl.Program, skin: SkinBuffers, attached: bool = True
     ) -> list[tuple[moderngl.Buffer, str, str]]:
-        """Return what ``include/skinning.glsl`` reads of each vertex, as vertex arrays take it.
+        """Return the vertex attributes of ``include/skinning.glsl``, for a vertex array.
 
         Parameters
         ----------
         program : moderngl.Program
-            Attributes that its compiler dropped are left out.
+            Attributes that its compiler dropped are omitted.
         skin : SkinBuffers
             Influences.
         attached : bool
-            Whether shape and correctives count; otherwise the mesh as stored.
+            Whether shape and correctives apply; otherwise the mesh is used as stored.
         """
         rest = self if attached else self.mesh
         found = [
@@ -133,13 +133,13 @@ class RestBuffers:
         return [row for row in found if row[2] in program]
 
     def use(self, list_unit: int, offsets_unit: int) -> None:
-        """Bind what the shader needs to sum correctives, if it has to."""
+        """Bind the textures for summing correctives in the shader, if used."""
         if self.n_offsets and self._list is not None:
             self._list.use(list_unit)
             self.mesh.offsets.use(offsets_unit)
 
     def release(self) -> None:
-        """Free what belongs to this actor alone."""
+        """Free the buffers of this actor."""
         for item in (*(self._own or ()), self._list):
             if item is not None:
                 item.release()

@@ -1,4 +1,4 @@
-"""The numbers of a scalar quantity on the GPU: one per vertex, computed when one may change."""
+"""Per-vertex numbers of a scalar quantity on the GPU, recomputed on change."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ class ScalarBuffer:
     Attributes
     ----------
     values : moderngl.Buffer or None
-        One float32 for every split vertex, once something was computed.
+        One float32 for every split vertex; None before the first computation.
     numbers : (V,)
         The same for the figure's own vertices.
     range : (float, float)
         Lowest and highest value, in the unit that ``SCALARS`` names.
     span : (float, float)
-        The same, or between which nearly all lie if the view's range is robust.
+        The same, or the typical span of a quantity with a robust range.
     name : str
-        Of the view.
+        Name of the quantity.
     version : int
-        How often something was computed.
+        Number of computations.
     look : ScalarLook or None
-        How they are coloured; None for a figure that lacks what the view shows.
+        Colours of the numbers; None for a figure without the quantity.
     is_shown : bool
         Whether ``show`` was called.
     """
@@ -58,16 +58,16 @@ class ScalarBuffer:
         self._key: tuple[object, ...] | None = None
 
     def update(self, name: str, pose: Pose | None, skinning: Skinning) -> None:
-        """Compute a scalar quantity if what its numbers depend on changed.
+        """Compute a scalar quantity if its inputs changed.
 
         Parameters
         ----------
         name : str
-            A key of ``SCALARS``, with a joint if the view is about one. What the figure lacks is 0.
+            A key of ``SCALARS``, with a joint if the quantity needs one. Missing data count as 0.
         pose : Pose or None
             None for the mesh in its binding space.
         skinning : Skinning
-            How the mesh is drawn.
+            Skinning of the drawn mesh.
         """
         depends = find_quantity(name).moves and pose is not None
         key = (name, repr(skinning), pose is None, pose_key(pose) if depends and pose else None)
@@ -75,7 +75,7 @@ class ScalarBuffer:
             return
         figure, view = self.mesh.figure, find_quantity(name)
         if view.about and missing_part(name, figure):
-            # Another figure of the scene may have this joint or field.
+            # The joint or field may belong to another figure of the scene.
             nothing = -1.0 if view.kind == "categorical" else 0.0
             self.numbers = np.full(len(self.mesh.copies), nothing)
         else:
@@ -89,7 +89,7 @@ class ScalarBuffer:
         self.version += 1
 
     def show(self, look: ScalarLook | None) -> None:
-        """Take over how the numbers are coloured, None for not at all."""
+        """Set the colours of the numbers; None for no colours."""
         self.is_shown = True
         if look is not None and (self._colors is None or not self._has(look)):
             if self._colors is not None:
@@ -99,7 +99,7 @@ class ScalarBuffer:
 
     def use(self, unit: int) -> None:
         """Bind the colours to a texture unit."""
-        assert self._colors is not None  # there is a look
+        assert self._colors is not None  # set before drawing
         self._colors.use(unit)
 
     def _has(self, look: ScalarLook) -> bool:

@@ -19,18 +19,18 @@ class SkinBuffers:
     Parameters
     ----------
     context : moderngl.Context
-        Owns nothing here; ``release`` frees all.
+        The context in use; ``release`` frees all buffers.
     skin : Skin or None
-        None binds every vertex to nothing.
+        None gives no vertex any influence.
     sources : (R,)
         The skin's vertex of each split vertex.
 
     Attributes
     ----------
     bindings : moderngl.Buffer
-        A row of each split vertex, see ``include/skinning.glsl``.
+        One row per split vertex, see ``include/skinning.glsl``.
     joint_shares : (J,)
-        Each joint's part in all weights: their mean motion is that of the figure.
+        Each joint's fraction of all weights; the weighted mean motion is that of the figure.
     """
 
     def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
@@ -51,9 +51,9 @@ class SkinBuffers:
             self.pairs = keep(pair_texture(context, skin.joints, skin.weights))
             sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
             self.joint_shares = sums / (sums.sum() or 1.0)
-            # Summed in float64: in float32 even thirds miss 1, which far away moves a vertex.
+            # In float64: float32 sums deviate from 1, which moves vertices far from the origin.
             excess = (weight_sums(skin) - 1.0)[sources]
-        # One attribute of four words: drivers in software spend as long on each as on a product.
+        # One packed attribute: each costs software drivers as much time as a matrix product.
         bindings = np.empty((len(sources), 4), dtype="u4")
         bindings[:, :2], bindings[:, 2] = ranges, sources
         bindings[:, 3] = excess.astype("f4").view("u4")

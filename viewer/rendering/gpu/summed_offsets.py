@@ -1,4 +1,4 @@
-"""Pose correctives of many actors on the GPU, in the two ways that ``rest_buffers`` explains."""
+"""Pose correctives of many actors on the GPU, by the two methods of ``rest_buffers``."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ __all__ = ["SummedOffsets"]
 
 
 class SummedOffsets:
-    """What ``include/skinning.glsl`` adds to the vertices of each instance.
+    """Offsets that ``include/skinning.glsl`` adds to the vertices of each instance.
 
-    Where the shader sums, its list holds the weights of all instances. Where the processor does,
-    one product of matrices makes a row of offsets for every instance.
+    If the shader sums, its list holds the weights of all instances. If the processor sums, one
+    matrix product computes a row of offsets for every instance.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class SummedOffsets:
     Attributes
     ----------
     n_listed : int
-        Rows of each instance's list; 0 if there is nothing to sum.
+        Rows of each instance's list; 0 if there are no correctives.
     n_summed : int
         1 if there is a row of sums for each instance, else 0.
     """
@@ -52,14 +52,14 @@ class SummedOffsets:
         self._summed: moderngl.Texture | None = None
 
     def update(self, rotations: Floats | None, rows: NDArray[np.intp], count: int) -> None:
-        """Follow the poses.
+        """Update to new poses.
 
         Parameters
         ----------
         rotations : (C, J, 3, 3) or None
             Of the joints within their parents, of instances that changed; None adds nothing.
         rows : (C,)
-            Which instances those are.
+            Indices of these instances.
         count : int
             Number of all instances, A.
         """
@@ -75,7 +75,7 @@ class SummedOffsets:
             self._weights = grown
         self._weights[rows] = weights
         if not self._weights[:count].any():
-            self._sums = self._sums[:0]  # none of them counts any more
+            self._sums = self._sums[:0]  # all are invalid
             return
         if self.way == "texture":
             self._list_weights(count)
@@ -94,7 +94,7 @@ class SummedOffsets:
             write_pairs(self._list, indices, weights)
 
     def _sum(self, rows: NDArray[np.intp], count: int) -> None:
-        """Multiply the weights of all changed instances by the offsets, at once."""
+        """Multiply the weights of all changed instances by the offsets in one product."""
         product, size = self.mesh.product, 3 * len(self.mesh.copies)
         if len(self._sums) < count:
             self._sums, rows = np.zeros((count, size), "f4"), np.arange(count)
@@ -112,7 +112,7 @@ class SummedOffsets:
         self.n_summed = 1
 
     def use(self, list_unit: int, offsets_unit: int) -> None:
-        """Bind what the shader sums, if it has to."""
+        """Bind the textures for summing in the shader, if used."""
         if self.n_listed and self._list is not None:
             self._list.use(list_unit)
             self.mesh.offsets.use(offsets_unit)

@@ -1,4 +1,4 @@
-"""Where pictures are drawn: a multisampled framebuffer and the plain one it is resolved into."""
+"""Render targets: a multisampled framebuffer, and a plain one that it is resolved to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
 def check_size(
     context: moderngl.Context, size: tuple[int, int], what: str = "picture size"
 ) -> None:
-    """Refuse a picture that the driver cannot draw; ``what`` begins the message.
+    """Refuse a picture size that the driver cannot draw; ``what`` begins the message.
 
     Raises
     ------
@@ -27,14 +27,14 @@ def check_size(
     limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
     if not all(1 <= side <= limit for side in size):
         raise ViewerError(
-            f"{what}: expected 1 to {limit} pixels a side, found {size[0]} x {size[1]}"
+            f"{what}: expected 1 to {limit} pixels per side, found {size[0]} x {size[1]}"
         )
 
 
 def target_bytes(size: tuple[int, int], samples: int) -> int:
-    """Return the memory of a picture being drawn, in bytes: what OpenGL has to hold at once.
+    """Return the memory in bytes that OpenGL needs for a picture while it is drawn.
 
-    Colour and depth of every sample, 4 bytes each, and the picture that they are resolved into;
+    Colour and depth of every sample, 4 bytes each, and the resolved picture;
     without multisampling that picture and its depth.
 
     Parameters
@@ -42,7 +42,7 @@ def target_bytes(size: tuple[int, int], samples: int) -> int:
     size : (int, int)
         Width and height in pixels.
     samples : int
-        A pixel; 0 without multisampling.
+        Samples per pixel; 0 without multisampling.
 
     >>> target_bytes((100, 10), 4), target_bytes((100, 10), 0)
     (36000, 8000)
@@ -56,7 +56,7 @@ def _gigabytes(count: int) -> str:
 
 
 class Target:
-    """A picture being drawn.
+    """Framebuffers of a picture while it is drawn.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ class Target:
     size : (int, int)
         Width and height in pixels.
     samples : int
-        Wanted samples a pixel; the next smaller power of two, and at most the driver's maximum.
+        Requested samples per pixel, rounded down to a power of two and limited by the driver.
 
     Attributes
     ----------
     framebuffer : moderngl.Framebuffer
-        Draw here.
+        The framebuffer to draw to.
     texture : moderngl.Texture
         The picture after ``resolve``.
     """
@@ -79,7 +79,7 @@ class Target:
         check_size(context, size)
         self.context, self.size = context, size
         most = min(samples, context.max_samples)
-        # Drivers offer powers of two.
+        # Drivers support powers of two.
         self.samples = 1 << (most.bit_length() - 1) if most > 1 else 0
         self.asked_samples = samples
         self._owned: list[Any] = []
@@ -88,11 +88,11 @@ class Target:
             check_errors(context, f"a picture of {size[0]} x {size[1]} pixels")
         except (moderngl.Error, RenderError):
             self.release()
-            context.clear_errors()  # that of a buffer which there is no room for
+            context.clear_errors()  # that of the failed allocation
             raise self._no_room() from None
 
     def _allocate(self) -> None:
-        """Make the framebuffers; what they are made of is released even if the last one fails."""
+        """Create the framebuffers; all parts are released if any of them fails."""
         context, size, own = self.context, self.size, self._owned
         self.texture = context.texture(size, 4)
         own.append(self.texture)
@@ -112,13 +112,13 @@ class Target:
         own.append(self.framebuffer)
 
     def _no_room(self) -> RenderError:
-        """Return an error that says how much memory would be needed, and what needs less."""
+        """Return an error with the required memory and a smaller alternative."""
         width, height = self.size
-        samples = f" with {self.samples} samples a pixel" if self.samples else ""
+        samples = f" with {self.samples} samples per pixel" if self.samples else ""
         less = "a smaller size needs less"
         if self.samples:
             alone = _gigabytes(target_bytes(self.size, 0))
-            less = f"1 sample a pixel (--samples 1) needs {alone}, {less}"
+            less = f"1 sample per pixel (--samples 1) needs {alone}, {less}"
         return RenderError(
             f"a picture of {width} x {height} pixels{samples} needs "
             f"{_gigabytes(target_bytes(self.size, self.samples))} of graphics memory, which "
@@ -134,18 +134,18 @@ class Target:
     def read(self) -> Bytes:
         """Return the resolved picture: (H, W, 4) uint8, first row at the top.
 
-        Colours are not multiplied by alpha any more, as picture files expect.
+        Alpha is straight, not premultiplied, as in picture files.
         """
         return straight(picture_rows(self._resolved.read(components=4), self.size))
 
     def read_into(self, buffer: moderngl.Buffer) -> None:
-        """Have the resolved picture copied into a buffer, as soon as the driver gets to it.
+        """Queue a copy of the resolved picture to a buffer, without waiting for it.
 
         Parameters
         ----------
         buffer : moderngl.Buffer
-            4 bytes a pixel, last row first; ``picture_rows`` makes a picture of what is read
-            from it. Whoever reads it waits until it is there.
+            4 bytes per pixel, last row first; ``picture_rows`` converts its contents to a
+            picture. Reading it waits for the copy.
         """
         self._resolved.read_into(buffer, components=4)
 
@@ -156,7 +156,7 @@ class Target:
 
 
 def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
-    """Return what OpenGL read as a picture: (H, W, 4) uint8, first row at the top, not a copy.
+    """Return pixels from OpenGL as a picture: (H, W, 4) uint8, first row at the top, not a copy.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
 
 
 def straight(pixels: Bytes) -> Bytes:
-    """Return colours that are not multiplied by their alpha any more: (H, W, 4), a copy."""
+    """Return colours with straight instead of premultiplied alpha: (H, W, 4), a copy."""
     pixels = pixels.copy()
     alpha = pixels[..., 3]
     partial = (alpha > 0) & (alpha < 255)

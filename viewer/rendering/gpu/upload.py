@@ -1,4 +1,4 @@
-"""Arrays to the GPU: the only place that turns float64 into float32 or transposes a matrix."""
+"""Upload of arrays to the GPU, with all conversions to float32 and transpositions."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ __all__ = [
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 
-# Every driver takes textures 1024 wide, and those with OpenGL 3.3 4096; the shaders count on
-# these.
+# Every driver with OpenGL 3.3 allows textures at least 1024 wide; the shaders rely on
+# these widths.
 _MATRICES_PER_ROW = 256  # three texels each
 _PAIRS_PER_ROW = 1024
 _OFFSETS_PER_ROW = 4096
@@ -44,13 +44,13 @@ _SRGB8_ALPHA8 = 0x8C43
 
 
 def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffer:
-    """Return a vertex or index buffer; one byte long if there is nothing to hold."""
+    """Return a vertex or index buffer; one byte long if it is empty."""
     data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
     return checked(context, context.buffer(data), f"a mesh buffer of {len(data) / 1e6:.1f} MB")
 
 
 def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:
-    """Return an object that the driver made without complaint; else free it and say so."""
+    """Return an object if the driver created it without error; else free it and raise."""
     try:
         check_errors(context, what)
     except RenderError:
@@ -60,7 +60,7 @@ def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:
 
 
 def float32(values: Floats) -> NDArray[np.float32]:
-    """Return the same numbers as float32, in row order."""
+    """Return the numbers as contiguous float32 in row-major order."""
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
@@ -83,19 +83,19 @@ def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
 
 
 def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
-    """Upload (J, 4, 4) matrices: all that a frame of a posed figure sends."""
+    """Upload (J, 4, 4) matrices, the only upload per frame of a posed figure."""
     texture.write(matrix_rows(matrices))
 
 
 def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
-    """Upload rows of texels that fill the first rows of a texture, the last one perhaps in part.
+    """Upload rows of texels that fill the first rows of a texture, the last one possibly in part.
 
     Parameters
     ----------
     texture : moderngl.Texture
-        Of float32.
+        A texture of float32 texels.
     rows : (N, ...)
-        Texels one after the other; written in place of what was there.
+        Consecutive texels; they replace the previous contents.
     """
     wide = texture.width * texture.components
     flat = rows.reshape(-1)
@@ -112,7 +112,7 @@ def rigid_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
 
 
 def write_rigid(texture: moderngl.Texture, duals: Floats, stretches: Floats) -> None:
-    """Upload (J, 8) dual quaternions and (J, 3, 4) stretches, five texels a joint."""
+    """Upload (J, 8) dual quaternions and (J, 3, 4) stretches, five texels per joint."""
     rows = np.zeros((_height(len(duals), _RIGID_PER_ROW) * _RIGID_PER_ROW, 5, 4), "f4")
     rows[: len(duals), :2] = duals.reshape(-1, 2, 4)
     rows[: len(duals), 2:] = stretches
@@ -153,14 +153,14 @@ def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
 def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) -> moderngl.Texture:
     """Return a mip-mapped sRGB texture, clamped at its edges, v = 0 at the picture's last row.
 
-    A picture larger than the driver takes is shrunk by whole factors, and ``notes`` says so.
+    A picture above the driver's limit is reduced by an integer factor, with a message in ``notes``.
     """
     limit = context.info["GL_MAX_TEXTURE_SIZE"]
     factor = -(-max(pixels.shape[:2]) // limit)
     if factor > 1:
         notes.append(
             f"a texture of {pixels.shape[1]} x {pixels.shape[0]} pixels is above this driver's "
-            f"limit of {limit} and was shrunk by {factor}"
+            f"limit of {limit} and was reduced by {factor}"
         )
         pixels = pixels[::factor, ::factor]
     flipped = np.ascontiguousarray(pixels[::-1])
@@ -170,12 +170,12 @@ def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) 
     add_mipmaps(texture, flipped)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
-        texture.anisotropy = 8.0  # without a GPU it doubles the time of a picture
+        texture.anisotropy = 8.0  # doubles the drawing time in software
     return checked(context, texture, f"a texture of {size[0]} x {size[1]} pixels")
 
 
 def ramp_texture(context: moderngl.Context, pixels: Bytes) -> moderngl.Texture:
-    """Return an sRGB texture of one row without smaller copies: a colour map stays itself."""
+    """Return an sRGB texture of one row without mipmaps, for a colour map."""
     size = (len(pixels), 1)
     texture = context.texture(size, 4, pixels.tobytes(), internal_format=_SRGB8_ALPHA8)
     texture.repeat_x = texture.repeat_y = False

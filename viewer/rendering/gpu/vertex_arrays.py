@@ -1,4 +1,4 @@
-"""Vertex arrays of one object's buffers, kept for each program that draws them."""
+"""Vertex arrays of one object's buffers, cached by program."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["VertexArrays"]
 
 
 class VertexArrays:
-    """Makes each vertex array when it is first asked for, and frees all of them together.
+    """Cache of vertex arrays, created on first use and freed together.
 
     Parameters
     ----------
@@ -35,13 +35,13 @@ class VertexArrays:
         Parameters
         ----------
         program : moderngl.Program
-            Kept by ``Programs``, so its identity is its own.
+            Cached by ``Programs``, so its id is unique.
         content : callable
-            Gives buffers, layouts and attribute names; called if the array is new.
+            Returns buffers, layouts and attribute names; called if the array is new.
         indices : moderngl.Buffer, optional
             Of the triangles.
         key : tuple
-            Tells apart arrays of one program that differ in content or indices.
+            Distinguishes arrays of one program with different content or indices.
         """
         key = (id(program), *key)
         if key not in self._arrays:
@@ -51,7 +51,7 @@ class VertexArrays:
         return self._arrays[key]
 
     def release(self) -> None:
-        """Free all arrays; they are made again if they are asked for."""
+        """Free all arrays; they are recreated on demand."""
         for array in self._arrays.values():
             array.release()
         self._arrays.clear()

@@ -1,9 +1,9 @@
-"""Wait for the driver without keeping Python's lock, so that other threads go on meanwhile.
+"""Waiting for the driver without holding Python's lock, so that other threads can run.
 
-moderngl holds the lock in every call. Reading a picture that is still being drawn takes as long as
-the drawing, and all that time no other thread may run Python: an encoder's thread that needs the
-lock five times a frame would get through a frame in five of them. ``ctypes`` lets go of the lock
-while it calls a function, so two functions of OpenGL are called through it.
+moderngl holds the global interpreter lock in every call. Reading a picture that is still being
+drawn takes as long as the drawing, and no other thread can run Python meanwhile: an encoder's
+thread that needs the lock five times per frame would take five frames' time for each. ``ctypes``
+releases the lock during a call, so two functions of OpenGL are called through it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["Waiter"]
 
 
 class Waiter:
-    """Starts what was asked of the driver, and waits for it.
+    """Submits the driver's queued work, and waits for it.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ class Waiter:
     Attributes
     ----------
     is_free : bool
-        Whether other threads run meanwhile; False with versions of moderngl that do not show
-        where the functions are. Then everything works as well, but slower.
+        Whether other threads can run meanwhile; False with versions of moderngl that do not expose
+        the functions' addresses. Everything still works then, but slower.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -38,16 +38,16 @@ class Waiter:
         self._finish: Callable[[], None] = finish or context.finish
 
     def begin(self) -> None:
-        """Have the driver begin with all that it was asked for, and do not wait."""
+        """Submit all queued work to the driver without waiting."""
         self._flush()
 
     def end(self) -> None:
-        """Wait until the driver is done with all that it was asked for."""
+        """Wait until the driver has finished all queued work."""
         self._finish()
 
 
 def _function(context: moderngl.Context, name: str) -> Callable[[], None] | None:
-    """Return a function of OpenGL without arguments, None if nobody tells where it is."""
+    """Return an OpenGL function without arguments, None if its address is unknown."""
     loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
     address = loader(name) if loader is not None else 0
     return ctypes.CFUNCTYPE(None)(address) if address else None

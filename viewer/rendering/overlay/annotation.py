@@ -1,4 +1,4 @@
-"""What is drawn over a picture to explain it: lines and dots in the scene, words beside points."""
+"""Annotations drawn over a picture: lines and dots in the scene, labels next to points."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ __all__ = [
 ]
 
 LABEL_COLOR = (0.97, 0.97, 0.98)
-"""Usual colour of words, sRGB."""
+"""Default colour of labels, sRGB."""
 
-_LETTERS = 13.0  # pixels of a picture of usual height
-_GAP = 7.0  # pixels between a point and its word
-_LEADER, _BENEATH = 1.3, 2.6  # widths of a line to a word and of the dark beneath it, pixels
+_LETTERS = 13.0  # pixels, for a picture of standard height
+_GAP = 7.0  # pixels between a point and its label
+_LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
 _RIM = 5.0  # pixels between a point and the line that leads from it
 _DARK = (0.05, 0.06, 0.08, 0.7)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Labels:
-    """Words beside points.
+    """Labels next to points.
 
     Attributes
     ----------
     words : tuple of N str
-        What they say.
-    points : (N, 3)
+        Their texts.
+        points : (N, 3)
         Scene space.
     ranks : (N,) int
-        Where there is no room for all, the lower are drawn, also of several annotations; of equal
-        ones those that are nearer.
+        Lower ranks take precedence if there is no room for all, also across annotations; among
+        equal ranks, nearer points do.
     colors : (N, 3)
         Of the letters, sRGB, 0 to 1.
     """
@@ -60,16 +60,16 @@ class Labels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Annotation:
-    """Segments, and words over them.
+    """Segments, and labels over them.
 
     Attributes
     ----------
     segments : Segments
-        In the order in which they lie over each other.
+        In drawing order.
     manner : Manner
-        How they are drawn.
+        Style of the segments.
     labels : Labels or None
-        Words, which nothing hides.
+        Labels, which are never hidden.
     """
 
     segments: Segments
@@ -79,26 +79,26 @@ class Annotation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedLabels:
-    """The words that are drawn.
+    """Labels with their positions in the picture.
 
     Attributes
     ----------
     words : tuple of M str
-        What they say.
+        Their texts.
     corners : (M, 2)
         Left upper corners, pixels from the picture's left and upper edge.
     colors : (M, 3)
         sRGB, 0 to 1.
     points : (M, 3)
-        What they belong to, scene space.
+        Labelled points, scene space.
     ends : (M, 2)
-        The point of each that is nearest to that, pixels.
+        The point of each label that is nearest to its labelled point, pixels.
     has_line : (M,) bool
-        Whether a line has to lead there.
+        Whether a leader line is needed.
     owners : (M,)
-        Whose words they are: indices of the labels that were placed together.
+        Indices of the ``Labels`` that they belong to.
     n_seen : tuple of int
-        For each of these how many points are within the picture.
+        For each ``Labels``, the number of points within the picture.
     """
 
     words: tuple[str, ...]
@@ -112,13 +112,13 @@ class PlacedLabels:
 
     @property
     def n_left_out(self) -> tuple[int, ...]:
-        """For each of the labels how many words are not drawn, as there is no room beside them."""
+        """For each ``Labels``, the number of labels omitted for lack of room."""
         drawn = np.bincount(self.owners, minlength=len(self.n_seen)).tolist()
         return tuple(seen - count for seen, count in zip(self.n_seen, drawn, strict=True))
 
 
 def letters_for(size: tuple[int, int]) -> int:
-    """Return how high letters are in a picture, pixels.
+    """Return the height of letters in a picture, pixels.
 
     Parameters
     ----------
@@ -131,12 +131,12 @@ def letters_for(size: tuple[int, int]) -> int:
 def place_labels(
     labels: Sequence[Labels], view: View, size: tuple[int, int], lettering: Lettering
 ) -> PlacedLabels:
-    """Place words beside their points: those of low rank first, then the nearer ones.
+    """Place labels next to their points: low ranks first, then nearer points.
 
     Parameters
     ----------
     labels : sequence of Labels
-        What is to be said where; none of all these words covers another one.
+        The labels; none of them covers another.
     view : View
         The camera's matrices.
     size : (int, int)
@@ -168,12 +168,12 @@ def place_labels(
 
 
 def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Segments:
-    """Return the lines that lead from points to words which are not right beside them.
+    """Return the leader lines of labels that are not next to their points.
 
     Parameters
     ----------
     placed : PlacedLabels
-        As ``place_labels`` gives them.
+        From ``place_labels``.
     view : View
         The camera's matrices.
     size : (int, int)
@@ -182,7 +182,7 @@ def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Seg
     led, scale = placed.has_line, picture_scale(size)
     points, to = placed.points[led], placed.ends[led]
     pixels = project(view, size, points).pixels
-    # The point's own dot stays free.
+    # Keep the point's own dot clear.
     pixels = pixels + scale * _RIM * unit(to - pixels)
     starts, ends = (unproject(view, size, points, places) for places in (pixels, to))
     colors = np.hstack([placed.colors[led], np.ones((len(starts), 1))])

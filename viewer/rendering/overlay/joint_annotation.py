@@ -1,4 +1,4 @@
-"""What is seen of joints beside their boxes: bones through the skin, axes, names."""
+"""Annotations of joints: bones visible through the skin, axes, names."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def joint_annotation(
     Parameters
     ----------
     actors : sequence of Actor
-        Of a scene.
+        The actors of a scene.
     options : DisplayOptions
-        Which marks there are.
+        Display options, which select the marks.
     size : (int, int)
         Width and height of the picture, pixels.
     selected : (int, int)

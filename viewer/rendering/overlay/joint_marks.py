@@ -35,9 +35,9 @@ HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
 """Of the selected joint, sRGB and opacity."""
 
 _AXIS_COLORS = ((0.95, 0.36, 0.33), (0.42, 0.83, 0.36), (0.36, 0.58, 1.0))  # x, y, z; sRGB
-_AXIS_SHARE = 0.4  # of the way to the nearest joint that hangs together with this one
+_AXIS_SHARE = 0.4  # of the distance to the nearest connected joint
 _AXIS_LIMITS = 0.005, 0.05  # of the skeleton's size
-_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels of a picture of usual height
+_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels, for a picture of standard height
 _OUTLINE = 2.0
 _DARK = (0.05, 0.06, 0.08, 0.85)
 _DOT_REACH, _BONE_REACH = 8.0, 4.0  # pixels
@@ -63,7 +63,7 @@ class JointMarks:
 
     @property
     def points(self) -> Floats:
-        """Where the joints are, (J, 3), scene space."""
+        """Positions of the joints, (J, 3), scene space."""
         return self.matrices[:, :3, 3]
 
 
@@ -98,7 +98,7 @@ def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
     children = np.flatnonzero(parents >= 0)
     points, above = marks.points, parents[children]
     colors = _colors(marks.skeleton, selected)[above]
-    # A dark line beneath each, so that it is seen on any background.
+    # A dark line beneath each makes it visible on any background.
     starts = np.concatenate([points[above], points[above]])
     ends = np.concatenate([points[children], points[children]])
     dark = np.broadcast_to(_DARK, colors.shape)
@@ -122,8 +122,8 @@ def joint_dots(marks: JointMarks, selected: int, scale: float) -> list[Segments]
 def axis_segments(marks: JointMarks, scale: float) -> Segments:
     """Return the x, y and z axis of each joint: red, green, blue.
 
-    They reach some of the way to the nearest parent or child, so that those of a hand's many
-    joints stay apart.
+    Their length is a fraction of the distance to the nearest parent or child, so that those of a
+    hand's joints do not overlap.
 
     Parameters
     ----------
@@ -144,12 +144,12 @@ def axis_segments(marks: JointMarks, scale: float) -> Segments:
 
 
 def _axis_lengths(points: Floats, skeleton: Skeleton) -> Floats:
-    """Return how long each joint's axes are: (J,), scene units."""
+    """Return the length of each joint's axes: (J,), scene units."""
     size = box_size(bounding_box(points)) or 1.0
     children = np.flatnonzero(skeleton.parents >= 0)
     above = skeleton.parents[children]
     apart = np.linalg.norm(points[children] - points[above], axis=1)
-    apart[apart < 1e-6 * size] = np.inf  # joints in one place say nothing
+    apart[apart < 1e-6 * size] = np.inf  # coincident joints are ignored
     nearest = np.full(len(points), np.inf)
     np.minimum.at(nearest, children, apart)
     np.minimum.at(nearest, above, apart)
@@ -185,12 +185,12 @@ def joint_at(
     pixel : (float, float)
         From the picture's left and upper edge.
     with_bones : bool
-        Whether bones are drawn; a bone belongs to the joint that turns it.
+        Whether bones are drawn; a bone belongs to the joint that rotates it.
 
     Returns
     -------
     (actor, joint, point) or None
-        Indices, and where it is: (3,), scene space.
+        Indices, and its position: (3,), scene space.
     """
     best: tuple[float, float, int, int, Floats] | None = None
     for one in marks:
@@ -210,7 +210,7 @@ def _away(
     pixel: tuple[float, float],
     with_bones: bool,
 ) -> tuple[Floats, Ints, Floats]:
-    """Return how far a pixel is from dots (up to 1) and bones (1 to 2), their joints and depths."""
+    """Return distances to dots (up to 1) and bones (1 to 2) at a pixel, their joints and depths."""
     scale, seen = picture_scale(size), project(view, size, marks.points)
     away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
     away[~seen.seen | (away > 1.0)] = np.inf
@@ -227,7 +227,7 @@ def _away(
 def _beside_bones(
     marks: JointMarks, view: View, size: tuple[int, int], pixel: tuple[float, float]
 ) -> tuple[Floats, Ints]:
-    """Return how far a pixel is from each bone, and the joints that turn them."""
+    """Return the distance of a pixel from each bone, and the joints that rotate them."""
     children = np.flatnonzero(marks.skeleton.parents >= 0)
     above = marks.skeleton.parents[children]
     ends, seen = project_segments(view, size, marks.points[above], marks.points[children])

@@ -1,4 +1,4 @@
-"""Names of joints, to be written beside them."""
+"""Labels with the names of joints."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from viewer.rig.skeleton import joint_labels
 __all__ = ["name_labels"]
 
 _LONGEST = 40  # letters of a name
-_LATE = 1000  # rank of joints that nobody chose: other words come before their names
+_LATE = 1000  # rank of unselected joints: other labels take precedence
 
 
 def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
-    """Return the joints' names: that of the selected joint comes first, then the nearer ones.
+    """Return the joints' names: the selected joint's first, then nearer ones.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A picture in square cells, to ask cheaply for many rectangles at once what lies in them."""
+"""Spatial grid of a picture: fast queries for the points within many rectangles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Cells", "Dots", "summed", "sums_within"]
 _FINE = 4  # parts of a pixel, both ways, of which each has one dot
 _BLOCK = 4  # cells, both ways
 _DENSE = 8  # dots in a block on average, from which on they are looked at in layers
-_PAIRS = 1 << 18  # pairs of a rectangle and a dot that are looked at together
+_PAIRS = 1 << 18  # pairs of a rectangle and a dot that are tested at once
 
 
 class Cells:
@@ -125,15 +125,15 @@ class Dots:
         return self._counts[places[..., 1], places[..., 0]]
 
     def fewest_within(self, low: Floats, high: Floats) -> Ints:
-        """Return how many dots lie within rectangles, or fewer: (M,)."""
+        """Return lower bounds of the number of dots within rectangles: (M,)."""
         return sums_within(self._sums, *self.cells.within(low, high))
 
     def most_within(self, low: Floats, high: Floats) -> Ints:
-        """Return how many dots lie within rectangles, or more: (M,)."""
+        """Return upper bounds of the number of dots within rectangles: (M,)."""
         return sums_within(self._sums, *self.cells.touching(low, high))
 
     def pairs(self, low: Floats, high: Floats, layer: int) -> Iterator[tuple[Ints, Floats]]:
-        """Give rectangles and the dots of a layer in the cells that they touch, in parts.
+        """Yield pairs of rectangles and dots of a layer in the cells that they touch, in batches.
 
         Parameters
         ----------

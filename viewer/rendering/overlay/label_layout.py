@@ -1,4 +1,4 @@
-"""Which of many labels are drawn, and where, so that none covers another or seems another's."""
+"""Layout of labels: which are drawn, and where, without overlap or ambiguity."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SAMPLES = 5  # columns of a label whose pixels tell most labels that are in its
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """The labels that are drawn.
+    """The placed labels.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Layout:
     ends : (M, 2)
         The point of each that is nearest to its own point, pixels.
     has_line : (M,) bool
-        Whether a line has to lead there, because there was no room right beside the point.
+        Whether a leader line is needed, because there was no room next to the point.
     """
 
     chosen: Ints
@@ -56,7 +56,7 @@ def lay_out(
     picture: tuple[int, int],
     gap: float,
 ) -> Layout:
-    """Place labels one after the other beside their points, and leave out those without room.
+    """Place labels next to their points in order, and omit those without room.
 
     A label lies right of its point, left, askew, above or below, where the most room is; else a
     little away from it with a line. It is never nearer to another point than to its own,

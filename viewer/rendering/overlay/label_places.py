@@ -1,4 +1,4 @@
-"""Where labels may lie beside their points, and which of these places are clear of other points."""
+"""Candidate positions of labels around their points, and their clearance from other points."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _BESIDE_LINE = 0.75  # gaps between a line and other points
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
-    """Places of labels.
+    """Candidate positions of labels.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the colours of a scalar quantity stand for, as data that pictures and panels draw alike."""
+"""Legend of a scalar quantity, as data shared by pictures and panels."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ __all__ = ["Entry", "Legend", "Shown", "Tick", "legend_of", "round_ticks"]
 
 _MOST_TICKS = 6
 _MOST_COUNTS = 10  # blocks of a bar that each have a number
-_SAME = 1e-9  # share by which numbers differ that are the same
+_SAME = 1e-9  # relative difference of numbers that count as equal
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """A number beside the bar: where, from 0 at its left end to 1, and what it says."""
+    """A number next to the bar: its position, 0 at the left end to 1, and its text."""
 
     place: float
     text: str
@@ -43,7 +43,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A thing with a name: its colour, sRGB 0 to 255, and what it is called."""
+    """A named item: its colour, sRGB 0 to 255, and its name."""
 
     color: tuple[int, int, int]
     text: str
@@ -51,22 +51,22 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Legend:
-    """What the colours stand for.
+    """The legend of a scalar quantity.
 
     Attributes
     ----------
     title, unit : str
         Of the numbers; the unit may be empty.
     colors : (N, 4) uint8
-        The bar from left to right, sRGB; none for things with names.
+        The bar from left to right, sRGB; empty for named items.
     ticks : tuple of Tick
         Round numbers along the bar.
     entries : tuple of Entry
-        Things with names, those with the largest area first.
+        Named items, largest area first.
     lines : tuple of float
-        Where isolines are, as places on the bar.
+        Positions of isolines on the bar.
     note : str
-        A line beneath: the numbers that there are, or why there is nothing to see.
+        A line beneath: the range of the numbers, or why there is nothing to show.
     """
 
     title: str
@@ -85,16 +85,16 @@ class Legend:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """A figure with the numbers of a view, and how they are coloured.
+    """A figure with the numbers of a scalar quantity and their colours.
 
     Attributes
     ----------
     figure : Figure
         With a mesh.
     numbers : (V,)
-        As ``viewer.rig.scalars.compute`` gives them.
+        From ``viewer.rig.scalars.compute``.
     look : ScalarLook
-        Of this figure.
+        Colours for this figure.
     """
 
     figure: Figure
@@ -105,18 +105,18 @@ class Shown:
 def legend_of(
     name: str, having: Sequence[Shown], skinning: Skinning, figures: Sequence[Figure]
 ) -> Legend:
-    """Return the legend of a view.
+    """Return the legend of a scalar quantity.
 
     Parameters
     ----------
     name : str
-        Of the view.
+        Name of the quantity.
     having : sequence of Shown
-        The figures that are drawn and have what the view shows; the first one gives title and unit.
+        The drawn figures that have the quantity; the first one gives title and unit.
     skinning : Skinning
-        How they are drawn.
+        Their skinning.
     figures : sequence of Figure
-        All of the scene, also those that are not drawn; at least one.
+        All figures of the scene, including those not drawn; at least one.
     """
     if not having:
         return _empty(name, skinning, figures)
@@ -130,7 +130,7 @@ def legend_of(
 
 
 def _empty(name: str, skinning: Skinning, figures: Sequence[Figure]) -> Legend:
-    """Return the legend of a view that no figure which is drawn has: why there is nothing."""
+    """Return the legend of a quantity that no drawn figure has, with the reason."""
     missing = [missing_part(name, figure) for figure in figures]
     hidden = [figure for figure, lacks in zip(figures, missing, strict=True) if not lacks]
     if hidden:
@@ -191,7 +191,7 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
 
 
 def _counts(title: str, shown: Sequence[Shown]) -> Legend:
-    """Return the legend of a count: a block for each number, from the lowest that there is."""
+    """Return the legend of a count: a block per number, from the lowest present."""
     first = min(int(one.numbers.min()) for one in shown)
     colors = shown[0].look.colors[first:]
     step = -(-len(colors) // _MOST_COUNTS)
@@ -204,7 +204,7 @@ def _counts(title: str, shown: Sequence[Shown]) -> Legend:
 
 
 def _entries(name: str, shown: Sequence[Shown]) -> tuple[Entry, ...]:
-    """Return the things that are to be seen, largest areas first; equal ones of figures as one."""
+    """Return the visible items, largest areas first; equal ones of several figures are merged."""
     areas: dict[Entry, float] = {}
     for one in shown:
         names = categories(name, one.figure)

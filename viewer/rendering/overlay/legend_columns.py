@@ -1,4 +1,4 @@
-"""How the things of a legend are split into columns, for pictures and for the window alike."""
+"""Split of a legend's items into columns, for pictures and the window."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ __all__ = ["LegendColumns", "legend_columns"]
 
 @dataclass(frozen=True, slots=True)
 class LegendColumns:
-    """Which things stand in which column, from the top down.
+    """The items of each column.
 
     Attributes
     ----------
     counts : tuple of int
-        Things in each column from left to right; the first ones fill the first column.
+        Number of items in each column, from left to right; the first items fill the first column.
     widths : tuple of float
         Of each column.
     left_out : int
-        Things without room: a line "and N more" stands below the last column's things.
+        Items without room: a line "and N more" follows the last column's items.
     """
 
     counts: tuple[int, ...]
@@ -28,28 +28,28 @@ class LegendColumns:
 
     @property
     def rows(self) -> int:
-        """Lines of the longest column, the one that counts what is left out among them."""
+        """Lines of the longest column, including the one that counts the omitted items."""
         last = self.counts[-1] + (self.left_out > 0) if self.counts else 0
         return max((*self.counts, last), default=0)
 
 
 def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendColumns:
-    """Split things into as few columns as their lines allow; what has no room is counted.
+    """Split items into as few columns as possible; those without room are counted.
 
     Parameters
     ----------
     widths : sequence of float
-        Of each thing's swatch and name, with the gap to the next column, in any unit.
+        Width of each item's swatch and name, with the gap to the next column, in any unit.
     rows : int
-        Lines that a column may have, 1 or more.
+        Maximum number of lines per column, 1 or more.
     width : float
-        That all columns together may have, in the same unit. The first one is there even if it is
-        wider.
+        Maximum width of all columns together, in the same unit. The first one is kept even if it
+        is wider.
 
     Returns
     -------
     LegendColumns
-        Columns of about the same length if all have room, else full ones.
+        Columns of about equal length if all items fit, else full ones.
 
     >>> legend_columns([10.0] * 5, 4, 30.0).counts
     (3, 2)

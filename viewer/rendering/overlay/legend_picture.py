@@ -1,4 +1,4 @@
-"""A legend as pixels, for pictures without a window; Pillow is imported when one is drawn."""
+"""Legends as pixels, for pictures without a window; Pillow is imported on first use."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ _PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 19
 
 
 def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
-    """Return a legend's picture, as large as suits a picture of some size.
+    """Return a legend's pixels, sized for a picture.
 
-    Many things with names stand in several columns, then in smaller letters, then in more columns;
-    those that still have no room are counted.
+    Many named items are set in several columns, then in smaller letters, then in more columns;
+    those that still do not fit are counted.
 
     Parameters
     ----------
     legend : Legend
-        What the colours stand for.
+        The legend.
     size : (int, int)
         Width and height of the picture that it goes into, pixels.
 
     Returns
     -------
     (H, W, 4) uint8 or None
-        sRGB, not multiplied by alpha, first row at the top; None if there is no room for it.
+        sRGB with straight alpha, first row at the top; None if there is no room for it.
     """
     wanted = min(size[1] / _LETTERS_PER_HEIGHT, size[0] / _LETTERS_PER_WIDTH)
     letters = round(min(max(wanted, _SIZES[0]), _SIZES[1]))
@@ -60,7 +60,7 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
 
 
 class _Drawing:
-    """Lays a legend out: lines of text, a bar or columns of swatches, from the top down."""
+    """Layout of a legend from top to bottom: lines of text, a bar or columns of swatches."""
 
     def __init__(self, legend: Legend, letters: int, size: tuple[int, int], share: float) -> None:
         from PIL import Image, ImageDraw, ImageFont
@@ -80,7 +80,7 @@ class _Drawing:
         self.columns = legend_columns(widths, rows, share * size[0] - 2 * self.gap)
 
     def pixels(self) -> Bytes | None:
-        """Return the picture if it fits into nine tenths of another one."""
+        """Return the pixels if they fit into nine tenths of the picture."""
         legend, gap = self.legend, self.gap
         width = max(
             self._width(legend.heading),
@@ -116,7 +116,7 @@ class _Drawing:
         return f"and {self.columns.left_out} more"
 
     def _draw_entries(self, draw: ImageDraw.ImageDraw, top: int) -> None:
-        """Draw the columns, and beneath the last one how many things are left out."""
+        """Draw the columns, and below the last one the number of omitted items."""
         left, first, y = float(self.gap), 0, top
         for count, width in zip(self.columns.counts, self.columns.widths, strict=True):
             y = top

@@ -1,4 +1,4 @@
-"""Words as pixels, many of them in one texture; Pillow is imported when one is drawn."""
+"""Rasterised text, packed into one texture; Pillow is imported on first use."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from viewer.rig.arrays import Bytes, Ints
 __all__ = ["Lettering", "shelves"]
 
 _RIM = 2  # pixels around letters
-_WIDEST = 2048  # pixels; what is longer is cut off
-_MOST = 4000  # words that are remembered
+_WIDEST = 2048  # pixels; longer texts are truncated
+_MOST = 4000  # cached texts
 _DARK = 205  # opacity of the rim, of 255
 
 
 class Lettering:
-    """Draws words in letters of one size.
+    """Rasteriser of texts in one font size.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Lettering:
         self._pixels: dict[str, Bytes] = {}
 
     def sizes(self, words: Sequence[str]) -> Ints:
-        """Return width and height of words with their rims: (N, 2), pixels."""
+        """Return width and height of texts with their outlines: (N, 2), pixels."""
         if len(self._widths) > _MOST:
             self._widths.clear()
         for word in words:
@@ -49,7 +49,7 @@ class Lettering:
         return round(1.25 * self.letters) + 2 * _RIM
 
     def pixels(self, word: str) -> Bytes:
-        """Return a word in white with a dark rim: (H, W, 2) uint8, grey times opacity, opacity."""
+        """Return white text with a dark rim: (H, W, 2) uint8, grey times opacity, opacity."""
         from PIL import Image, ImageDraw
 
         if word not in self._pixels:
@@ -66,14 +66,14 @@ class Lettering:
 
 
 def shelves(sizes: Ints, width: int, tallest: int) -> Ints:
-    """Return where rectangles of one height lie in a picture, in rows: (M, 2), M <= N.
+    """Return positions of rectangles of equal height, packed in rows: (M, 2), M <= N.
 
     Parameters
     ----------
     sizes : (N, 2)
         Widths, at most ``width``, and heights, pixels.
     width, tallest : int
-        Of the picture; what does not fit into it any more is left out.
+        Size of the picture; rectangles that do not fit are omitted.
     """
     corners: list[tuple[int, int]] = []
     x = y = 0

@@ -1,4 +1,4 @@
-"""Marks that say "here": points and lines as large on the screen from wherever one looks."""
+"""Marks of places: points and lines of constant size on the screen."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["MARK_COLOR", "Marks", "mark_annotation"]
 
 MARK_COLOR = (1.0, 0.16, 0.56)
-"""Of marks, sRGB: it is neither in the colour maps nor in the lights."""
+"""Colour of marks, sRGB: it occurs neither in the colour maps nor in the lights."""
 
 _LINE = 1.0  # radius of lines, pixels
 _MANNER = Manner(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0.05))
@@ -21,7 +21,7 @@ _MANNER = Manner(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marks:
-    """Where marks are.
+    """Positions of marks.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Marks:
 
 
 def mark_annotation(marks: Marks) -> Annotation:
-    """Return marks as they are drawn: lines first, so that points lie over them."""
+    """Return marks as an annotation: lines first, so that points are drawn over them."""
     radii = np.concatenate([np.full(len(marks.lines), _LINE), marks.radii])
     colors = np.broadcast_to((*MARK_COLOR, 1.0), (len(radii), 4))
     starts = np.concatenate([marks.lines[:, 0], marks.points])

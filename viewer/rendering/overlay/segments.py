@@ -18,7 +18,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["HIDDEN", "Manner", "SegmentPass", "Segments", "dots", "joined"]
 
 HIDDEN = 0.4
-"""Usual opacity of what lies behind a surface."""
+"""Default opacity of parts behind a surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,17 +43,17 @@ class Segments:
 
 @dataclass(frozen=True, slots=True)
 class Manner:
-    """How segments are drawn.
+    """Style of segments.
 
     Attributes
     ----------
     on_top : bool
-        Whether nothing that was drawn before hides them.
+        Whether they are drawn over everything before them.
     hidden : float
-        Opacity of what is hidden, 0 to 1.
+        Opacity of hidden parts, 0 to 1.
     lift : float
-        Share of the way to the eye by which segments lie before their places, so that those on a
-        surface are seen.
+        Fraction of the distance to the eye by which segments are moved forward, so that those on
+        a surface are visible.
     border : float
         Width of the border around each, pixels.
     border_color : (r, g, b)
@@ -111,18 +111,18 @@ class SegmentPass:
         self._rows = InstanceRows(context, self._program, "3f4 3f4 4f4 f4", names, "segments")
 
     def draw(self, segments: Segments, view: View, size: tuple[int, int], manner: Manner) -> None:
-        """Draw segments over what is bound.
+        """Draw segments into the bound framebuffer.
 
         Parameters
         ----------
         segments : Segments
-            In the order in which they lie over each other.
+            In drawing order.
         view : View
             The camera's matrices.
         size : (int, int)
             Width and height of the picture, pixels.
         manner : Manner
-            How they are drawn.
+            Style of the segments.
         """
         if not len(segments.widths):
             return
@@ -145,5 +145,5 @@ class SegmentPass:
                 self._rows.draw()
 
     def release(self) -> None:
-        """Free what holds the segments."""
+        """Free the buffers of the segments."""
         self._rows.release()

@@ -1,4 +1,4 @@
-"""Draws a surface that is no part of the scene over it: translucent, or as its edges alone."""
+"""Draws a surface that is not part of the scene over it: translucent, or only its edges."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STYLES = ("solid", "translucent", "wireframe")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ghost:
-    """A surface that is shown and cannot be picked.
+    """A visible surface that cannot be picked.
 
     Attributes
     ----------

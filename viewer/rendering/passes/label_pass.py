@@ -1,4 +1,4 @@
-"""Draws labels over a picture, all from one texture of the words they say."""
+"""Draws labels over a picture from one texture of rasterised text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Passes that many scenes never need: imported and made when they are first asked for."""
+"""Passes that many scenes do not need, imported and created on first use."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws posed meshes: surface, edges, vertex normals. Nothing here knows of skinning."""
+"""Draws posed meshes: surface, edges and vertex normals, independent of skinning."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class MeshPass:
     def draw_lines(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> None:
-        """Draw what is asked for of edges and normals, over the surface."""
+        """Draw the requested edges and normals over the surface."""
         self.context.depth_func = "<="
         if options.wireframe:
             self.draw_edges(mesh, placement, view, options)
@@ -119,7 +119,7 @@ class MeshPass:
     def array(
         self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
     ) -> moderngl.VertexArray:
-        """Return the mesh's vertex array for a program, with what the compiler kept."""
+        """Return the mesh's vertex array for a program, with the attributes it kept."""
 
         def content() -> list[Any]:
             found: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
@@ -156,7 +156,7 @@ def _shading(mesh: PosedMesh, options: DisplayOptions) -> str:
 
 
 def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:
-    """Set what the shading programs must know of a figure's surface."""
+    """Set the uniforms of a figure's surface."""
     values = {
         "u_flat": options.flat,
         "u_opacity": surface_opacity(options),
@@ -170,7 +170,7 @@ def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOp
 def draw_runs(
     array: moderngl.VertexArray, indices: IndexSet, textured: bool, instances: int = 1
 ) -> None:
-    """Draw all triangles, those of one material at a time."""
+    """Draw all triangles, one material at a time."""
     for run in indices.runs:
         has_texture = textured and run.texture is not None
         set_uniforms(array.program, {"u_textured": has_texture})

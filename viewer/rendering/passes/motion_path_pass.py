@@ -1,4 +1,4 @@
-"""Draws the paths of joints over time as lines."""
+"""Draws motion paths of joints as lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces that one can look through: one translucent layer, whatever lies over whatever."""
+"""Translucent surfaces, drawn as a single layer regardless of overlap."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _XRAY_OPACITY = 0.4
 
 
 def surface_opacity(options: DisplayOptions) -> float:
-    """Return how much of what is behind a surface it hides, 0 to 1.
+    """Return the opacity of surfaces, 0 to 1.
 
-    Colours that stand for numbers must be those of the legend, so they stay opaque.
+    Colours of scalar quantities must match the legend, so these surfaces stay opaque.
     """
     return _XRAY_OPACITY if options.xray and options.shading != "scalar" else 1.0
 
@@ -25,7 +25,7 @@ def surface_opacity(options: DisplayOptions) -> float:
 def draw_layer(
     context: moderngl.Context, options: DisplayOptions, draw: Callable[[], object]
 ) -> None:
-    """Draw surfaces; translucent ones so that only what is nearest counts.
+    """Draw surfaces; of translucent ones only the nearest layer.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def draw_layer(
 
 
 def draw_nearest(context: moderngl.Context, draw: Callable[[], object]) -> None:
-    """Draw something translucent twice: its depths, then what is nearest, as one layer."""
+    """Draw something translucent twice: its depths, then its nearest layer."""
     with without_colors(context):
         draw()
     context.depth_func = "<="

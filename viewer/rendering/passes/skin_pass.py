@@ -1,7 +1,7 @@
 """The skinning vertex shader, run once per changed pose, by transform feedback.
 
-What it writes, the posed buffer, is what every other pass draws as a static mesh, and what the
-tests read back: shading, wireframe, normals and picking cost no second skinning.
+Its output, the posed buffer, is drawn by every other pass as a static mesh, and read back by the
+tests: shading, wireframe, normals and picking cost no second skinning.
 """
 
 from __future__ import annotations
@@ -182,5 +182,5 @@ class PosedMesh:
 
 
 def skinning_words(how: Skinning) -> tuple[object, ...]:
-    """Return what changes if and only if the way of skinning does."""
+    """Return a key that identifies the way of skinning."""
     return (how.method, how.blend_factor, how.max_influences, how.normalize, how.correctives)

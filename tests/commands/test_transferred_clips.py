@@ -65,10 +65,10 @@ def test_path_of_the_template_is_scaled_with_the_figure(folder, tmp_path, capsys
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--clip", "walk.anim"], "viewer: --clip: expected -o FILE to write the motion beside, "
+        (["--clip", "walk.anim"], "viewer: --clip: expected -o FILE to write the motion next to, "
                                   "found none"),
         (["-o", "OUT", "--clip", "walk.anim", "--clip", "walk.anim"],
-         "viewer: --clip: expected names that differ, found out-walk twice"),
+         "viewer: --clip: expected different file names, found out-walk twice"),
         (["-o", "OUT", "--clip", "scan.obj"],
          "viewer: --clip: expected a motion of the template, found none in scan.obj"),
     ],

@@ -1,4 +1,4 @@
-"""Motions of a template, written for the mesh that got its rig."""
+"""Motions of a template, transferred to the mesh that was rigged with it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from viewer.rig.scene import Actor, Scene, figure_pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CarriedClip:
-    """A motion of the template, and the file that the target's will be.
+class TransferredClip:
+    """A motion of the template, and the file its transferred copy is written to.
 
     Attributes
     ----------
     clip : Clip or SampledClip
-        As it moves the template.
+        The template's motion.
     path : Path
         ``.anim`` for course rigs, ``.bvh`` for other figures.
     """
@@ -42,34 +42,35 @@ def add_clip_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="a motion of the template; the target's is written beside the result as "
-        "NAME-FILE.anim (course rigs) or .bvh, its path scaled with the figure; repeat for more",
+        help="a motion of the template; transferred to the target, with its path scaled to the "
+        "figure, it is written next to the result as NAME-FILE.anim (course rigs) or .bvh; may be "
+        "repeated",
     )
 
 
 def read_clips(
     arguments: argparse.Namespace, template: list[Path], figure: Figure
-) -> list[CarriedClip]:
-    """Return the motions that ``--clip`` asks for, before any work is done.
+) -> list[TransferredClip]:
+    """Return the motions named by ``--clip``, before any work is done.
 
     ``arguments``: of ``viewer rig``.
     ``template``: the template's files.
     ``figure``: the template.
-    Raises ViewerError if there is no output to write beside, a file holds no motion of the
-      template, or two would have one name.
+    Raises ViewerError if there is no output to write next to, a file holds no motion of the
+      template, or two output files would have the same name.
     """
     if not arguments.clips:
         return []
     if arguments.output is None:
-        raise ViewerError("--clip: expected -o FILE to write the motion beside, found none")
+        raise ViewerError("--clip: expected -o FILE to write the motion next to, found none")
     output = Path(arguments.output)
-    found: list[CarriedClip] = []
+    found: list[TransferredClip] = []
     suffix = ".anim" if is_course_rig(figure.require_skeleton()) else ".bvh"
     for name in arguments.clips:
         path = output.with_name(f"{output.stem}-{Path(name).stem}{suffix}")
         if any(each.path == path for each in found):
-            raise ViewerError(f"--clip: expected names that differ, found {path.stem} twice")
-        found.append(CarriedClip(_clip_of(name, template, arguments.fps), path))
+            raise ViewerError(f"--clip: expected different file names, found {path.stem} twice")
+        found.append(TransferredClip(_clip_of(name, template, arguments.fps), path))
     return found
 
 
@@ -82,12 +83,12 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
     raise RigError(f"--clip: expected a motion of the template, found none in {printable(name)}")
 
 
-def write_clips(rigged: Rigged, clips: list[CarriedClip]) -> list[str]:
-    """Write the template's motions for the rigged figure; return what was written.
+def write_clips(rigged: Rigged, clips: list[TransferredClip]) -> list[str]:
+    """Write the template's motions for the rigged figure; return one line per file.
 
-    ``rigged``: the result.
+    ``rigged``: the result of the rig transfer.
     ``clips``: from ``read_clips``.
-    Raises RigError if a clip is of another skeleton.
+    Raises RigError if a clip is for a different skeleton.
     Raises OutputError if a file cannot be written.
     """
     lines = []
