@@ -124,7 +124,7 @@ def test_align_says_what_it_does(rigging, monkeypatch, fits):
     hand.state.of(Rigging).choices.fits = fits
     also = "; joints are turned and limbs resized{} where that fits much better" if fits else ""
     for label, words in (
-        ("Align", "found by closest points" + also.format(", or all of it stretched,")),
+        ("Align", "found by matching closest points" + also.format(", or all of it stretched,")),
         ("Refine", "from where it lies, by closest points" + also.format("")),
     ):
         hand.move(label)
