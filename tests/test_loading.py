@@ -113,7 +113,7 @@ def test_files_find_their_partners(files, order, expected):
 
 def test_skin_of_another_skeleton_is_refused_with_both_names_and_numbers(files):
     skel, skin = files("2.skel", "3.skin")
-    expected = f"{skin}: expected 2 binding matrices, one for each joint of {skel}, found 3"
+    expected = f"{skin}: expected 2 bind matrices, one per joint of {skel}, found 3"
     assert refusal(skel, skin) == expected
     assert refusal(skin, skel) == expected
 
@@ -122,7 +122,7 @@ def test_odd_skin_among_pairs_is_refused(files):
     skels = files("2.skel", "3.skel")
     skins = files("2.skin", "5.skin")
     assert refusal(*skels, *skins) == (
-        f"{skins[1]}: expected 3 binding matrices, one for each joint of {skels[1]}, found 5"
+        f"{skins[1]}: expected 3 bind matrices, one per joint of {skels[1]}, found 5"
     )
 
 
@@ -131,17 +131,17 @@ def test_skin_without_weights_cannot_follow_a_skeleton(files, tmp_path):
     bare = tmp_path / "bare.skin"
     bare.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
     assert refusal(skel, bare) == (
-        f"{bare}: expected weights and bindings to follow the 2 joints of {skel}, found none"
+        f"{bare}: expected weights and bindings for the 2 joints of {skel}, found none"
     )
     assert viewer.load(bare).warnings == (
-        f"{bare}: no `skinweights` and no `bindings`: the mesh cannot follow a skeleton",
+        f"{bare}: no `skinweights` or `bindings`: the mesh cannot be skinned",
     )
 
 
 def test_real_skin_of_another_skeleton_is_refused(shared):
     skel, skin = shared / "test.skel", shared / "wasp.skin"
     assert refusal(skel, skin) == (
-        f"{skin}: expected 6 binding matrices, one for each joint of {skel}, found 23"
+        f"{skin}: expected 6 bind matrices, one per joint of {skel}, found 23"
     )
 
 
@@ -195,7 +195,7 @@ def test_skeleton_named_skin_opens_with_a_warning(files):
     skel.rename(wrong)
     scene = viewer.load(wrong)
     assert parts(scene) == [("2", 2, None)]
-    assert scene.warnings == (f"{wrong}: is a .skel, named .skin",)
+    assert scene.warnings == (f"{wrong}: .skel file with the suffix .skin",)
 
 
 def test_exchanged_names_still_pair(files):
@@ -206,8 +206,8 @@ def test_exchanged_names_still_pair(files):
     scene = viewer.load(skel, skin)
     assert parts(scene) == [("2", 2, 2)]
     assert scene.warnings == (
-        f"{skel}: is a .skin, named .skel",
-        f"{skin}: is a .skel, named .skin",
+        f"{skel}: .skin file with the suffix .skel",
+        f"{skin}: .skel file with the suffix .skin",
     )
 
 
@@ -263,8 +263,8 @@ def test_missing_file_comes_with_the_nearest_name(tmp_path):
 
 def test_folder_is_refused(tmp_path):
     wanted = (
-        "expected a file, or a folder with a PIG model's tables or EasyMocap's frames, found a "
-        "folder"
+        "expected a file, a folder of PIG tables or a folder of EasyMocap frames, "
+        "found another folder"
     )
     assert refusal(tmp_path) == f"{tmp_path}: {wanted}"
     assert refusal("") == f".: {wanted}"
@@ -345,7 +345,7 @@ def test_file_above_the_size_cap_is_refused_before_it_is_read(tmp_path):
     with path.open("wb") as stream:
         stream.truncate(3 << 30)  # a hole: it takes no room
     assert refusal(path) == (
-        f"{path}: expected at most 2147483648 bytes, found 3221225472 (--max-size)"
+        f"{path}: expected at most 2147483648 bytes, found 3221225472 (see --max-size)"
     )
 
 
@@ -354,7 +354,7 @@ def test_size_cap_can_be_set(files):
     size = skel.stat().st_size
     assert parts(viewer.load(skel, max_size=size)) == [("2", 2, None)]
     assert refusal(skel, max_size=size - 1) == (
-        f"{skel}: expected at most {size - 1} bytes, found {size} (--max-size)"
+        f"{skel}: expected at most {size - 1} bytes, found {size} (see --max-size)"
     )
 
 

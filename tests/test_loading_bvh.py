@@ -46,14 +46,14 @@ def units(scene):
 def test_alone_it_keeps_the_numbers_of_its_file(bvh):
     path = bvh()
     scene = load(path)
-    assert units(scene) == ["cm"] and scene.warnings == (f"{path}: {GUESS}; --unit sets it",)
+    assert units(scene) == ["cm"] and scene.warnings == (f"{path}: {GUESS}; --unit overrides it",)
     assert_allclose(places(scene.actors[0]), 100 * np.array(PERSON_TURNED), rtol=0, atol=1e-9)
 
 
 def test_beside_a_body_it_is_scaled_to_metres(bvh):
     path = bvh()
     scene = load(path, bundled_body(), motion=BESIDE)
-    note = f"{path}: {GUESS}, and scaled to metres beside others; --unit sets it"
+    note = f"{path}: {GUESS}, and scaled to metres to match the others; --unit overrides it"
     assert units(scene) == ["m", "m"] and scene.warnings == (note,)
     skeleton = scene.actors[1]
     assert skeleton.figure.mesh is None
@@ -80,7 +80,7 @@ def test_beside_figures_of_unknown_unit_and_other_size_it_stays(bvh, tmp_path):
     giant.write_text("balljoint root { offset 0 0 0 balljoint tip { offset 0 20 0 } }")
     scene = load(giant, bvh())
     assert units(scene) == ["", "cm"]
-    assert scene.warnings[-1].endswith(f"{GUESS}; --unit sets it")
+    assert scene.warnings[-1].endswith(f"{GUESS}; --unit overrides it")
 
 
 def test_two_in_one_unit_stay_and_two_in_two_units_become_metres(bvh):
@@ -107,7 +107,7 @@ def test_unknown_units_are_never_scaled(bvh):
     path = bvh(10)
     scene = load(path, bundled_body(), motion=BESIDE)
     assert units(scene) == ["m", ""]
-    assert scene.warnings == (f"{path}: unit unknown (skeleton 17 high); --unit sets it",)
+    assert scene.warnings == (f"{path}: unit unknown (skeleton 17 high); --unit overrides it",)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_an_axis_that_is_asked_for_is_not_guessed(bvh):
         text = text.replace(f"0.000000 {number} 0.000000", f"0.000000 0.000000 {number}")
     path = bvh(text=text)
     note = "z taken for up: the head is above the feet along z"
-    assert f"{path}: {note}; --up sets it" in load(path).warnings
+    assert f"{path}: {note}; --up overrides it" in load(path).warnings
     asked = load(path, motion=MotionSettings(up="z"))
     assert asked.up == "z" and asked.warnings == ()
 
@@ -138,7 +138,7 @@ def test_the_model_is_driven(bvh):
     among = load(path, bundled_body())
     assert [actor.figure.name for actor in named.actors] == ["body"]
     assert named.warnings == among.warnings
-    assert any("walk moves 6 of 24 joints of body" in text for text in named.warnings)
+    assert any("walk drives 6 of 24 joints of body" in text for text in named.warnings)
     assert not any("taken for" in text for text in named.warnings)
     one, other = named.actors[0].clip, among.actors[0].clip
     assert np.array_equal(one.rotations, other.rotations)
@@ -170,17 +170,19 @@ def test_a_model_that_does_not_fit_is_refused(bvh, tmp_path):
         load(path, motion=MotionSettings(model=bundled_body()))
     message = str(caught.value)
     assert message.startswith(f"{path}: walk does not fit body: expected hips and a leg or an arm")
-    assert message.endswith("(--model names the model)")
+    assert message.endswith("(--model selects the model)")
     with pytest.raises(FormatError) as wrong:
         load(path, motion=MotionSettings(model=path))
-    assert str(wrong.value) == f"{path}: --model: expected a body model"
+    assert str(wrong.value) == f"{path}: --model: expected a body model, found another file"
 
 
 def test_beside_leaves_the_model_out_and_says_so(bvh):
     path = bvh()
     scene = load(path, motion=MotionSettings(model=bundled_body(), drives=False))
     assert units(scene) == ["cm"]
-    assert scene.warnings[0] == f"--model {bundled_body()}: with --beside nothing moves it"
+    assert (
+        scene.warnings[0] == f"--model {bundled_body()}: no motion is applied to it with --beside"
+    )
 
 
 @pytest.mark.parametrize("named", [False, True])

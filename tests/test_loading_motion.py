@@ -116,19 +116,20 @@ def test_bundled_body_has_neither_shapes_nor_expressions_of_the_files(tmp_path):
         (
             "a",
             {"shapes": [[1.0] * 10]},
-            ", without the shapes of the files, which mean nothing to it",
+            ", without the shape coefficients of the files, which do not apply to it",
         ),
         (
             "b",
             {"shapes": [[1.0] * 10], "expression": [[0.0] * 10]},
-            ", without the shapes and expressions of the files, which mean nothing to it",
+            ", without the shape and expression coefficients of the files, which do not apply to "
+            "it",
         ),
         ("c", {}, ""),
     ):
         folder = tmp_path / name / "smpl"
         folder.mkdir(parents=True)
         (folder / "000000.json").write_text(json.dumps([person(0, 0.0) | extra]))
-        text = f"{tmp_path / name}: drawn with the bundled body{lost} (--model names another)"
+        text = f"{tmp_path / name}: drawn with the bundled body{lost} (--model selects another)"
         assert load(tmp_path / name).warnings == (text,)
 
 
@@ -140,7 +141,10 @@ def test_people_without_any_shapes_are_said_once(tmp_path, smpl):
         del record["shapes"]
     for frame in range(300):  # read in several parts
         (folder / f"{frame:06}.json").write_text(json.dumps(people))
-    text = f"{tmp_path / 'output'}: no shapes in the files: all have the model's mean shape"
+    text = (
+        f"{tmp_path / 'output'}: no shape coefficients in the files: the model's mean shape is "
+        "used for all"
+    )
     assert load(tmp_path / "output", smpl).warnings == (text,)
     (folder / "000299.json").write_text(json.dumps([person(0, 0.0), people[1]]))
     assert text not in load(tmp_path / "output", smpl).warnings
@@ -190,7 +194,7 @@ def test_bvh_that_drives_nothing_stands_beside(tmp_path):
     path.write_text(BVH)
     scene = load(path, *write_rig(tmp_path))
     assert len(scene.actors) == 2
-    assert any("stands alone" in text for text in scene.warnings)
+    assert any("shown separately" in text for text in scene.warnings)
     boxes = [viewer.rig.scene.actor_points(actor) for actor in scene.actors]
     assert (
         boxes[0][:, 0].max() < boxes[1][:, 0].min() or boxes[1][:, 0].max() < boxes[0][:, 0].min()

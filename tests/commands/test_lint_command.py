@@ -28,8 +28,8 @@ def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
     lines = capsys.readouterr().out.splitlines()
     at = next(index for index, line in enumerate(lines) if " W001: " in line)
     assert lines[at] == (
-        f"{rig[1]}:13: warning W001: weights of 1 vertex do not sum to 1: 1.25 at vertex 1, "
-        "an error of 0.25"
+        f"{rig[1]}:13: warning W001: weights of 1 vertex do not sum to 1 (worst: 1.25 at vertex 1, "
+        "an error of 0.25)"
     )
     assert lines[at + 1] == (
         "    weights do not sum to 1: normalise them (--normalize shows the effect)"
@@ -83,7 +83,7 @@ def test_codes_are_listed(capsys) -> None:
     assert run(["lint", "--codes"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(CODES)
-    assert lines[0] == "F001  error    file cannot be read: check the name and the permissions"
+    assert lines[0] == "F001  error    unreadable file: check its path and permissions"
 
 
 def test_files_are_needed(capsys) -> None:
@@ -119,7 +119,7 @@ def test_people_of_one_file_are_told_apart(shared_data: Path, capsys) -> None:
     points = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     assert run(["lint", str(points)]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if " C012: " in line]
-    what = "1 of 25 keypoints is never seen: right_ear"
+    what = "1 of 25 keypoints is never visible: right_ear"
     assert lines == [f"{points}: note C012: easymocap body25 {person}: {what}" for person in (0, 1)]
 
 
@@ -149,7 +149,7 @@ def test_frames_of_keys_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
     assert "1 of 61 frames: root moves" in capsys.readouterr().out
     assert run([*files, "--fps", "24"]) == 0
     out = capsys.readouterr().out
-    assert "1 of 49 frames: root moves" in out and "to frame 24 at 1.014 s" in out
+    assert "1 of 49 frames: root moves" in out and "at frame 24, 1.014 s" in out
 
 
 def test_cures_fit_what_has_no_line(tmp_path: Path, capsys) -> None:
@@ -157,5 +157,5 @@ def test_cures_fit_what_has_no_line(tmp_path: Path, capsys) -> None:
     (tmp_path / "bad.skel").write_text("balljoint a { offset 1 }")
     run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "    file breaks its format: export it again, or open another file"
-    assert lines[3] == "    file breaks its format: fix the line or export the file again"
+    assert lines[1] == "    malformed file: export it again, or open another file"
+    assert lines[3] == "    malformed file: fix the line or export the file again"

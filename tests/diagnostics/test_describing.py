@@ -20,8 +20,9 @@ def test_a_diagnostic_gives_all_that_it_knows() -> None:
         "code": "W002",
         "key": "W002.negative",
         "severity": "error",
-        "message": "2 weights are negative: -0.5 at vertex 7 for joint hip, the first of 2 "
-        "(vertices 3, 7)",
+        "message": (
+            "2 negative weights (first: -0.5 at vertex 7 for joint hip); first of 2 (vertices 3, 7)"
+        ),
         "file": "a.skin",
         "line": 4,
         "part": "weights",

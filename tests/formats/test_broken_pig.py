@@ -328,5 +328,5 @@ def test_pickle_with_another_global_names_it(tmp_path):
 
 def test_pose_of_another_length_is_refused_with_both_counts(folder):
     figure = silent(write(folder))
-    with pytest.raises(RigError, match=r"^expected 13 pose numbers for pig, found 12$"):
+    with pytest.raises(RigError, match=r"^expected 13 pose values for pig, found 12$"):
         apply_record(PoseRecord(vector=np.zeros(12)), figure, rest_pose(figure.skeleton))

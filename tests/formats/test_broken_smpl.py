@@ -254,4 +254,4 @@ def test_archive_of_something_else_says_what_it_holds(tmp_path):
         viewer.load(tmp_path / "a.npz")
     message = caught.value.diagnostic.message
     assert message.startswith("expected a model or pose (SMPL family: v_template, ")
-    assert message.endswith("), found the keys vertices, colour")
+    assert message.endswith("), found keys vertices, colour")

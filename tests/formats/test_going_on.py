@@ -122,7 +122,7 @@ def test_faults_of_a_body_model_are_noted_by_vertex_and_joint(tmp_path: Any) -> 
     texts = {str(f).split(": ", 1)[1] for f in source.diagnostics.errors}
     assert "v_template: expected finite numbers, found nan at vertex 3" in texts
     assert "weights: expected finite numbers, found inf at vertex 4" in texts
-    assert "weights: vertex 5: expected weights with the sum 1, found 0.5" in texts
+    assert "weights: vertex 5: expected weights that sum to 1, found 0.5" in texts
     # The others are scaled to a sum of exactly 1, the faulty ones are as in the file.
     sums = np.bincount(
         np.repeat(np.arange(figure.skin.n_vertices), np.diff(figure.skin.starts)),

@@ -32,8 +32,8 @@ from viewer.formats._archive.values import Opaque
 from viewer.phrases import printable
 
 DAMAGED = (
-    "expected a pickle, found Windows line ends: damaged in transfer, "
-    "download it again in binary mode"
+    "expected a pickle, found Windows line endings: damaged in transfer, download it "
+    "again in binary mode"
 )
 FORBIDDEN = "which is not allowed; nothing was executed"
 
@@ -160,32 +160,34 @@ RECONSTRUCT = ("numpy.core.multiarray", "_reconstruct")
 @pytest.mark.parametrize(
     ("module", "name", "arguments", "found"),
     [
-        (*RECONSTRUCT, [NDARRAY, shape(1 << 40), text("b")], "numpy.ndarray, a tuple, a text"),
-        (*RECONSTRUCT, [NDARRAY, shape(0), text("c")], "numpy.ndarray, a tuple, a text"),
+        (*RECONSTRUCT, [NDARRAY, shape(1 << 40), text("b")], "numpy.ndarray, a tuple, a string"),
+        (*RECONSTRUCT, [NDARRAY, shape(0), text("c")], "numpy.ndarray, a tuple, a string"),
         (*RECONSTRUCT, [named("numpy", "dtype"), shape(0), text("b")],
-         "numpy.dtype, a tuple, a text"),
+         "numpy.dtype, a tuple, a string"),
         (*RECONSTRUCT, [NDARRAY], "numpy.ndarray"),
         ("numpy", "dtype", [b"]", whole(0), whole(1)], "a list, a number, a number"),
-        ("numpy", "dtype", [CODE, whole(0), whole(2)], "a text, a number, a number"),
-        ("numpy", "dtype", [text("x" * 33), whole(0), whole(1)], "a text, a number, a number"),
-        ("_codecs", "encode", [unicode("b"), text("rot13")], "a text, a text"),
-        ("_codecs", "encode", [unicode("b"), text("latin1"), text("x")], "a text, a text, a text"),
-        ("_codecs", "encode", [whole(1), text("latin1")], "a number, a text"),
+        ("numpy", "dtype", [CODE, whole(0), whole(2)], "a string, a number, a number"),
+        ("numpy", "dtype", [text("x" * 33), whole(0), whole(1)], "a string, a number, a number"),
+        ("_codecs", "encode", [unicode("b"), text("rot13")], "a string, a string"),
+        ("_codecs", "encode", [unicode("b"), text("latin1"), text("x")], (
+            "a string, a string, a string"
+        )),
+        ("_codecs", "encode", [whole(1), text("latin1")], "a number, a string"),
         ("__builtin__", "bytes", [whole(1 << 30)], "a number"),
         ("__builtin__", "set", [whole(1)], "a number"),
         ("collections", "OrderedDict", [b"](" + whole(1) + b"e"], "a list"),
         ("copy_reg", "_reconstructor", [NDARRAY, NDARRAY, b"N"],
-         "numpy.ndarray, numpy.ndarray, nothing"),
+         "numpy.ndarray, numpy.ndarray, None"),
         ("copy_reg", "_reconstructor", [named("chumpy.ch", "Ch"), named("__builtin__", "object"),
          whole(1)], "chumpy.ch.Ch, __builtin__.object, a number"),
         ("copy_reg", "_reconstructor", [named("__builtin__", "set"), named("__builtin__",
-         "object"), b"N"], "__builtin__.set, __builtin__.object, nothing"),
+         "object"), b"N"], "__builtin__.set, __builtin__.object, None"),
         ("numpy.core.numeric", "_frombuffer", [text("x" * 8), element_type(), shape(1),
-         text("A")], "a text, a dtype, a tuple, a text"),
+         text("A")], "a string, a dtype, a tuple, a string"),
         ("numpy.core.numeric", "_frombuffer", [text("x" * 8), element_type(), shape(1), text("K"),
-         shape(1)], "a text, a dtype, a tuple, a text, a tuple"),
+         shape(1)], "a string, a dtype, a tuple, a string, a tuple"),
         ("numpy.core.multiarray", "scalar", [element_type(), whole(1)], "a dtype, a number"),
-        ("numpy.core.multiarray", "scalar", [text("f8"), text("x" * 8)], "a text, a text"),
+        ("numpy.core.multiarray", "scalar", [text("f8"), text("x" * 8)], "a string, a string"),
     ],
 )  # fmt: skip
 def test_unusual_arguments(module: str, name: str, arguments: list[bytes], found: str) -> None:

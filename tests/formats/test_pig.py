@@ -171,7 +171,7 @@ def test_scale_of_0_or_less_is_noted(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=np.array([0.0] * 12 + [-2])), figure, pose)
-    assert lines(notes) == ["scale: expected more than 0, found -2; left at 1"]
+    assert lines(notes) == ["scale: expected a positive number, found -2; kept at 1"]
 
 
 # Seams
@@ -214,7 +214,7 @@ def test_two_pictures_are_left_to_the_person(folder):
     for name in ("a.png", "b.jpg"):
         save_image(folder / name, RED)
     scene = viewer.load(folder)
-    assert scene.warnings == (f"{folder}: 2 pictures in the folder: name the texture to show it",)
+    assert scene.warnings == (f"{folder}: 2 pictures in the folder: specify the texture to show",)
     assert scene.actors[0].figure.mesh.materials == ()
 
 

@@ -252,4 +252,4 @@ def test_pose_file_of_another_length_is_refused(folder, tmp_path, count):
     with pytest.raises(FormatError) as caught:
         viewer.load(folder, path)
     assert (caught.value.path, caught.value.line) == (path, count)
-    assert f"190 pose numbers for pig, found {count}" in str(caught.value)
+    assert f"190 pose values for pig, found {count}" in str(caught.value)

@@ -211,7 +211,7 @@ def test_vector_of_a_relative_poses_the_body(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=waves(72)), figure, posed)
-    assert lines(notes) == [f"2 joints of the pose that {figure.name} lacks were left out"]
+    assert lines(notes) == [f"2 joints of the pose omitted: missing from {figure.name}"]
     expected = rotation_vector_to_matrix(waves(66).reshape(-1, 3))
     assert_allclose(turns(figure, posed)[:22], expected, rtol=0, atol=1e-15)
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
@@ -221,7 +221,7 @@ def test_body_pose_of_smpl_leaves_the_face_of_smplx_alone(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(parts={"body_pose": waves(69)}), figure, posed)
-    assert lines(notes) == ["2 joints of the pose beyond the body's 21 were left out"]
+    assert lines(notes) == ["2 joints of the pose beyond the body's 21 omitted"]
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
     hands_at_rest = np.where(np.arange(69) < 63, waves(69), 0.0)
     assert apply_record(PoseRecord(parts={"body_pose": hands_at_rest}), figure, posed) == []
@@ -231,8 +231,8 @@ def test_parts_that_a_figure_lacks_are_noted_unless_they_are_at_rest(figures):
     figure = figures["smpl"]
     record, _ = parts(jaw_pose=[0.1, 0, 0], leye_pose=[0, 0, 0], left_hand_pose=[0.5] * 6)
     assert lines(apply_record(record, figure, rest_pose(figure.skeleton))) == [
-        "jaw_pose: smpl has no such joint, left out",
-        "left_hand_pose: smpl has no hand components, left out",
+        "jaw_pose omitted: smpl has no such joint",
+        "left_hand_pose omitted: smpl has no hand components",
     ]
 
 

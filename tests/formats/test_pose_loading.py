@@ -60,7 +60,7 @@ def test_coefficients_beyond_those_of_the_model_are_left_out_and_said(files):
     scene = viewer.load(files["smpl"], files["long"])
     assert scene.actors[0].pose.shape_weights.tolist() == [1.0] * 10
     assert scene.warnings[-1] == (
-        f"{files['long']}: shape coefficient 11 was left out, as smpl has 10 (largest 1)"
+        f"{files['long']}: shape coefficient 11 omitted (largest value 1): smpl has 10"
     )
 
 
@@ -81,9 +81,7 @@ def test_pose_goes_to_the_first_figure_that_it_fits(files):
 
 def test_values_beyond_limits_are_clamped_with_a_note(files):
     scene = viewer.load(files["legs"], files["far"])
-    assert scene.warnings == (
-        f"{files['far']}: 1 DOF of the pose was beyond its limits and clamped",
-    )
+    assert scene.warnings == (f"{files['far']}: 1 DOF of the pose clamped to its limits",)
     assert scene.actors[0].pose.dofs[[1, 3, 6]].tolist() == [1e8, 1, 0.5]
 
 
@@ -95,11 +93,13 @@ def test_shape_goes_to_a_body(files):
 
 def test_scale_of_0_is_noted(files):
     scene = viewer.load(files["pig"], files["zero"])
-    assert scene.warnings == (f"{files['zero']}: scale: expected more than 0, found 0; left at 1",)
+    assert scene.warnings == (
+        f"{files['zero']}: scale: expected a positive number, found 0; kept at 1",
+    )
 
 
 def test_pose_alone_is_refused(files):
-    wanted = "this is a pose: open it together with a figure"
+    wanted = "a pose without a figure: open it together with a figure"
     assert refusal(files["kick"]) == f"{files['kick']}: {wanted}"
     skin = files["kick"].with_name("a.skin")
     skin.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
@@ -143,12 +143,15 @@ def test_second_picture_goes_to_the_second_figure(files):
 def test_picture_for_figures_without_texture_coordinates_is_refused(files, names):
     listed = ", ".join(names)
     assert refusal(files["red"], *(files[name] for name in names)) == (
-        f"{files['red']}: this is a picture, but {listed} has no texture coordinates"
+        f"{files['red']}: cannot apply the picture: {listed} has no texture coordinates"
     )
 
 
 def test_picture_alone_is_refused(files):
-    assert refusal(files["red"]) == f"{files['red']}: this is a picture: open it with a figure"
+    assert (
+        refusal(files["red"])
+        == f"{files['red']}: a picture without a figure: open it together with a figure"
+    )
 
 
 def test_broken_picture_is_refused(files):
@@ -176,7 +179,7 @@ def test_pose_is_added_to_an_actor_in_place(files):
     assert pose.dofs[[3, 6]].tolist() == [0.25, 0.5]
     assert notes == []
     assert lines(add_to_actor(additions(files, "far"), actor)[1]) == [
-        f"{files['far']}: 1 DOF of the pose was beyond its limits and clamped"
+        f"{files['far']}: 1 DOF of the pose clamped to its limits"
     ]
 
 
@@ -207,7 +210,7 @@ def test_pose_for_an_actor_without_a_skeleton_is_refused(files):
     actor = viewer.load(skin).actors[0]
     with pytest.raises(RigError) as caught:
         add_to_actor(additions(files, "kick"), actor)
-    assert str(caught.value) == f"{files['kick']}: this is a pose, but a has no skeleton"
+    assert str(caught.value) == f"{files['kick']}: cannot apply the pose: a has no skeleton"
 
 
 def test_figures_and_clips_are_no_additions(files):

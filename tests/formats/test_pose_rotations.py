@@ -80,7 +80,7 @@ def test_edited_dof_of_a_saved_pose_is_what_a_figure_gets():
     record = pose.read(Source("a.json", json.dumps(values).encode()))
     found = viewer.rest_pose(skeleton)
     notes = viewer.apply_record(record, figure, found)
-    assert lines(notes) == ["1 DOF of the pose was beyond its limits and clamped"]
+    assert lines(notes) == ["1 DOF of the pose clamped to its limits"]
     assert found.dofs.tolist() == [-0.5, 1.0]
     assert found.rotations.tolist() == [[0, 0, 0, 1], [0, 0.6, 0, 0.8]]
 

@@ -66,7 +66,7 @@ def test_faces_of_different_kinds_are_mixed() -> None:
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 3]]
     assert figure.mesh.uvs.tolist() == [[1, 1], [0, 0]]
     assert figure.mesh.uv_triangles.tolist() == [[1, 1, 1], [0, 0, 0], [1, 1, 1]]
-    assert warnings == ["a.obj: 6 corners of triangles without vt: they get 0 0"]
+    assert warnings == ["a.obj: 6 triangle corners without vt: 0 0 used"]
 
 
 def test_negative_indices_count_back_from_the_line() -> None:
@@ -147,8 +147,8 @@ def test_colours_and_weights_are_left_out_and_said_once() -> None:
     )
     assert figure.mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     assert warnings == [
-        "a.obj:1: the colour of 2 vertices is not used",
-        "a.obj:4: the w of 1 vertex is not used",
+        "a.obj:1: colours of 2 vertices ignored",
+        "a.obj:4: w of 1 vertex ignored",
     ]
 
 
@@ -176,8 +176,10 @@ def test_a_vertex_with_several_normals_gets_their_mean() -> None:
     np.testing.assert_allclose(figure.mesh.normals[0], [0, half, half], atol=1e-15)
     assert figure.mesh.normals[1:].tolist() == [[0, 0, 1]] * 3
     assert warnings == [
-        "a.obj: 1 vertex has several normals, first 0: it gets the mean, "
-        "so hard edges are drawn smooth"
+        (
+            "a.obj: 1 vertex has several normals (first: vertex 0): averaged, so hard "
+            "edges are drawn smooth"
+        )
     ]
 
 
@@ -185,7 +187,7 @@ def test_normals_of_length_0_are_computed() -> None:
     figure, warnings = read(SQUARE + "vn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//2\n")
     assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1], [1, 0, 0], [1, 0, 0]]
     assert warnings == [
-        "a.obj: 1 normal of length 0, first of vertex 0: computed from the triangles"
+        "a.obj: 1 zero-length normal (first: vertex 0): recomputed from the triangles"
     ]
 
 
@@ -239,12 +241,12 @@ def test_what_libraries_lack_is_said(tmp_path) -> None:
     here = tmp_path
     assert source.warnings == [
         f"{here}/a.obj:6: material library {here}/none.mtl: cannot be read: "
-        "No such file or directory; drawn without textures",
-        f"{here}/a.obj:6: material library ../up.mtl lies outside the folder: not read",
-        f"{here}/a.obj: 1 material is in no library, first c: drawn without a texture",
+        "No such file or directory; drawn untextured",
+        f"{here}/a.obj:6: material library ../up.mtl is outside the folder: not read",
+        f"{here}/a.obj: 1 material is not in any library (first: c): drawn untextured",
         f"{here}/m.mtl:2: texture {here}/gone.png: cannot be read: "
         "No such file or directory; drawn untextured",
-        f"{here}/m.mtl:4: texture ../b.png lies outside the folder: not read",
+        f"{here}/m.mtl:4: texture ../b.png is outside the folder: not read",
     ]
 
 
@@ -253,15 +255,15 @@ def test_what_is_not_drawn_is_said() -> None:
     _, warnings = read(text)
     assert warnings == [
         'a.obj:9: skipped unknown "cstype"',
-        "a.obj: 2 lines are not drawn",
-        "a.obj: 1 point is not drawn",
+        "a.obj: 2 lines not drawn",
+        "a.obj: 1 point not drawn",
     ]
 
 
 def test_points_alone_are_a_warning() -> None:
     figure, warnings = read(SQUARE)
     assert figure.mesh.n_triangles == 0
-    assert warnings == ["a.obj: no faces: 4 points, of which nothing is drawn"]
+    assert warnings == ["a.obj: no faces: 4 points, not drawn"]
 
 
 @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def test_a_library_behind_a_link_is_not_read(folder):
     source = Source.open(path)
     assert read(source).mesh.materials[0].image is None
     assert source.warnings[0] == (
-        f"{path}:1: material library m.mtl lies outside the folder: not read"
+        f"{path}:1: material library m.mtl is outside the folder: not read"
     )
 
 
@@ -151,7 +151,7 @@ def test_a_rig_that_names_files_elsewhere_is_refused(folder, item, name):
     with pytest.raises(FormatError) as caught:
         read(Source(folder / "a.rig", f"rig a {{\n{item.format(name)}\n}}\n".encode()))
     assert caught.value.line == 2
-    assert f'below the folder of the .rig, found "{name[:39]}' in str(caught.value)
+    assert f'within the folder of the .rig, found "{name[:39]}' in str(caught.value)
 
 
 def test_a_rig_may_use_back_slashes(folder):
@@ -165,7 +165,7 @@ def test_the_picture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
     (pig / "skin.png").symlink_to(folder.parent / "secret" / "x.png")
     contents = read_files([pig])
     assert contents.figures[0][1].mesh.materials == ()
-    assert f"{pig}: texture skin.png lies outside the folder: not read" in contents.warnings
+    assert f"{pig}: texture skin.png is outside the folder: not read" in contents.warnings
 
 
 def test_a_link_is_opened_beside_its_neighbours(folder):
@@ -197,6 +197,6 @@ def test_a_secret_picture_is_not_written_again(folder, tmp_path, capsys):
     assert run(["convert", str(path), "-o", str(out / "a.gltf")]) == 0
     assert sorted(file.name for file in out.iterdir()) == ["a.bin", "a.gltf"]
     assert "images" not in json.loads((out / "a.gltf").read_text())
-    assert f"{named}:{line}: texture ../secret/x.png lies outside the folder: not read" in (
+    assert f"{named}:{line}: texture ../secret/x.png is outside the folder: not read" in (
         capsys.readouterr().err
     )

@@ -414,7 +414,7 @@ def test_unknown_suffix_cannot_be_written(tmp_path):
     known = ".skel, .skin, .anim, .json, .npz, .txt"
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", mesh()), tmp_path / "a.xyz")
-    assert str(caught.value) == f'no writer for ".xyz"; there are: {known}'
+    assert str(caught.value) == f'no writer for ".xyz"; supported: {known}'
 
 
 def test_suffix_in_capitals_is_written(tmp_path):

@@ -69,7 +69,7 @@ def test_material_without_texture_is_a_warning(folder):
     figure, warnings = textured(folder, "material a { }\nmaterial { texture }\n")
     assert [(m.name, m.texture) for m in figure.mesh.materials] == [("a", None), ("", None)]
     assert warnings == [
-        f"{folder}/a.skin:21: material without texture: drawn untextured",
+        f"{folder}/a.skin:21: material without a texture: drawn untextured",
         f"{folder}/a.skin:11: texcoords without a texture: drawn untextured",
     ]
 
@@ -79,14 +79,16 @@ def test_unknown_item_of_a_material_is_skipped(folder, item):
     figure, warnings = textured(folder, f"material a {{ {item} texture red.bmp }}")
     assert figure.mesh.materials[0].texture == "red.bmp"
     assert figure.mesh.material_indices.tolist() == [0]
-    assert warnings == [f'{folder}/a.skin:21: skipped unknown "{item.split()[0]}" in a material']
+    assert warnings == [
+        f'{folder}/a.skin:21: ignored unknown material property "{item.split()[0]}"'
+    ]
 
 
 def test_texture_without_texcoords_is_a_warning(folder):
     text = POSITIONS + NORMALS + WEIGHTS + "material { texture red.bmp }\n" + TRIANGLES + BINDINGS
     figure, warnings = read(text, folder / "a.skin")
     assert figure.mesh.materials[0].image is not None
-    assert warnings == [f"{folder}/a.skin:16: a texture without texcoords: drawn untextured"]
+    assert warnings == [f"{folder}/a.skin:16: texture without texcoords: drawn untextured"]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +96,7 @@ def test_texture_without_texcoords_is_a_warning(folder):
     [
         ("gone.png", "cannot be read: No such file or directory"),
         ("folder", "expected a file, found a folder"),
-        ("text.png", "not a picture that can be read"),
+        ("text.png", "unsupported or damaged picture"),
         ("new\x1bline.png", "cannot be read: No such file or directory"),
     ],
 )

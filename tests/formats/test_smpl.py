@@ -351,11 +351,11 @@ def test_shapes_and_correctives_are_not_read_before_they_are_needed(damaged):
     assert_allclose(deform(figure, pose)[0], turned, rtol=0, atol=1e-14)
 
     pose.dofs[3] = 0.5
-    with pytest.raises(FormatError, match=rf"^{path}: posedirs: expected a whole array, found a"):
+    with pytest.raises(FormatError, match=rf"^{path}: posedirs: expected a valid array, found a"):
         deform(figure, pose)
     pose = rest_pose(figure.skeleton)
     pose.shape_weights = np.ones(1)
-    with pytest.raises(FormatError, match=rf"^{path}: shapedirs: expected a whole array, found a"):
+    with pytest.raises(FormatError, match=rf"^{path}: shapedirs: expected a valid array, found a"):
         deform(figure, pose)
 
 

@@ -108,7 +108,7 @@ def test_expression_in_a_key_of_use_is_refused(load):
     with pytest.raises(FormatError) as caught:
         load(python_2(v_template=product))
     message = str(caught.value)
-    assert "SMPL.pkl: v_template: expected V x 3 numbers, found an unread value" in message
+    assert "SMPL.pkl: v_template: expected V x 3 numbers, found an unsupported value" in message
 
 
 @pytest.mark.parametrize("protocol", range(2, 6))
@@ -143,7 +143,7 @@ def test_regressor_of_another_size_is_refused_before_anything_grows(load):
     with pytest.raises(FormatError) as caught:
         load(python_2(J_regressor=wide))
     assert str(caught.value).endswith(
-        "SMPL.pkl: J_regressor: expected 24 x 32 numbers, found a sparse matrix 24 x 31"
+        "SMPL.pkl: J_regressor: expected 24 x 32 numbers, found a sparse 24 x 31 matrix"
     )
 
 

@@ -77,7 +77,7 @@ def test_findings_of_one_kind_say_how_many_and_where(tmp_path: Path) -> None:
         lines[positions + vertex] = "inf 1 nan"
     found = next(f for f in linted(tmp_path, lines) if f.code == "F003")
     assert found.message == (
-        'positions of vertex 3: expected a number, found "inf", the first of 6 (vertices 3, 8, 9)'
+        'positions of vertex 3: expected a number, found "inf"; first of 6 (vertices 3, 8, 9)'
     )
     assert found.vertices.tolist() == [3, 8, 9] and found.line == positions + 4
 
@@ -126,8 +126,8 @@ def test_what_is_no_text_of_this_kind_says_that_nothing_else_was_checked(tmp_pat
     (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]
     assert (found.code, found.line) == ("F002", 5)
     assert found.message == (
-        'expected "}" to close positions (line 1), found "normals"; '
-        "nothing else in this file was checked"
+        'expected "}" to close positions (line 1), found "normals"; the rest of '
+        "the file was not checked"
     )
 
 

@@ -47,7 +47,7 @@ def test_a_jump_is_in_the_frame_that_the_timeline_shows_there(start: float, offs
     assert found.frames.tolist() == [60]
     assert found.times == pytest.approx([start + offset + 2.0 + 1 / 60])
     assert found.message.startswith("1 of 121 frames: foot moves at")
-    assert found.message.endswith(f"to frame 60 at {start + offset + 2.0 + 1 / 60:.3f} s")
+    assert found.message.endswith(f"at frame 60, {start + offset + 2.0 + 1 / 60:.3f} s")
     assert shown_frame(scene, float(found.times[0])) == 60
 
 
@@ -80,7 +80,7 @@ def test_curves_beyond_limits_say_frame_and_degrees() -> None:
     (found,) = [f for f in lint_scene(scene) if f.code == "C006"]
     # 4 radians at the end, of at most 3.
     assert found.message == (
-        "1 curve leaves its limits: knee.y is 229.2° in frame 30 at 1.000 s, its limits are "
+        "1 curve exceeds its limits: knee.y is 229.2° in frame 30 at 1.000 s, its limits are "
         "-171.9° and 171.9°"
     )
     assert found.seek == pytest.approx(1.0)

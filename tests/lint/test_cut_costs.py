@@ -41,33 +41,33 @@ def cost(scene: Scene, **invalid: Ints) -> Finding:
 
 # Joint 4 is 2 m away from where it rests, so 0.05 of it is 100 mm; all else stays.
 TOLD = (
-    "kept to 4 the mesh moves by up to 100 mm (vertex 8), 100 mm on average of these, over 6 poses"
+    "pruning to 4 moves the mesh by up to 100 mm (vertex 8), 100 mm on average over these "
+    "vertices, in 6 poses"
 )
 
 
 def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
     found = cost(scene({8: CROWDED, 5: LAST}))
     assert found.message == (
-        f"2 vertices have more than 4 influences, at most 5; {TOLD}; 1 vertex is left out, as a "
-        "position or bind matrix that it needs cannot be used"
+        f"2 vertices have more than 4 influences (maximum: 5); {TOLD}; 1 vertex is omitted "
+        "because a required position or bind matrix is invalid"
     )
     assert found.vertices.tolist() == [8, 5]  # what nobody knows comes last
     found = cost(scene({8: CROWDED, 5: LAST, 6: LAST}))
     assert found.message.endswith(
-        f"{TOLD}; 2 vertices are left out, as a position or bind matrix that they need cannot be "
-        "used"
+        f"{TOLD}; 2 vertices are omitted because a required position or bind matrix is invalid"
     )
 
 
 def test_a_joint_of_weight_0_leaves_nothing_out() -> None:
     found = cost(scene({8: [*CROWDED, (5, 0.0)]}))
-    assert found.message == f"1 vertex has more than 4 influences, at most 5; {TOLD}"
+    assert found.message == f"1 vertex has more than 4 influences (maximum: 5); {TOLD}"
 
 
 def test_a_cost_that_nobody_can_know_is_not_told_as_0() -> None:
     assert cost(scene({5: LAST})).message == (
-        "1 vertex has more than 4 influences, at most 5; what keeping 4 would move is not known: "
-        "1 vertex is left out, as a position or bind matrix that it needs cannot be used"
+        "1 vertex has more than 4 influences (maximum: 5); the effect of pruning to 4 is unknown: "
+        "1 vertex is omitted because a required position or bind matrix is invalid"
     )
 
 
@@ -75,7 +75,7 @@ def test_a_cost_that_nobody_can_know_is_not_told_as_0() -> None:
 def test_what_is_not_the_files_own_is_left_out_too(part: str, places: list[int]) -> None:
     lost = np.array(places, dtype=np.int32)
     found = cost(scene({8: CROWDED, 5: LAST}, singular=False), **{part: lost})
-    assert f"{TOLD}; 1 vertex is left out, as" in found.message
+    assert f"{TOLD}; 1 vertex is omitted because" in found.message
 
 
 def test_costs_beyond_all_numbers_are_left_out() -> None:
@@ -84,4 +84,4 @@ def test_costs_beyond_all_numbers_are_left_out() -> None:
     matrices = figure.skin.inverse_bind.copy()
     matrices[5, :3, :3] *= 1e308  # squares of what it moves are infinite
     whole.actors[0].figure = replace(figure, skin=replace(figure.skin, inverse_bind=matrices))
-    assert f"{TOLD}; 1 vertex is left out, as" in cost(whole).message
+    assert f"{TOLD}; 1 vertex is omitted because" in cost(whole).message

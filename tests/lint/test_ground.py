@@ -39,7 +39,7 @@ def test_a_short_sink_is_found_however_deep_and_wherever(depth: float, floor: fl
     (sunk,) = found(np.where((_K >= 20) & (_K < 30), -depth, 0.0), floor)
     assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(120, 130))
     assert sunk.message == (
-        f"10 of 60 frames: left_ankle is {1000 * depth:g} mm below the ground in frame 120"
+        f"10 of 60 frames: left_ankle is {1000 * depth:g} mm below the ground at frame 120"
     )
 
 
@@ -55,8 +55,8 @@ def test_half_of_the_motion_sunk_elsewhere_is_said_to_be_unclear(depth: float) -
     # The ankles of the legs are 0.1 above the root's floor.
     assert (note.code, note.severity) == ("C013", "note")
     assert note.message == (
-        f"feet rest at 2 heights, 0.9 for 1 s, {0.9 - depth:g} for 1 s: it is not clear where the "
-        "ground is, and they were not checked"
+        f"feet rest at 2 heights (0.9 for 1 s, {0.9 - depth:g} for 1 s): ground height "
+        "unclear, feet not checked"
     )
 
 
@@ -93,7 +93,7 @@ def test_a_short_rest_on_the_usual_ground_far_below_is_said_to_be_unclear(
 ) -> None:
     # It stands or sits higher, or has sunk: nobody knows.
     (note,) = found(np.where(count > _K, 0.0, height), 0.0)
-    assert note.code == "C013" and f"feet rest at 2 heights, {0.1 + height:g}" in note.message
+    assert note.code == "C013" and f"feet rest at 2 heights ({0.1 + height:g}" in note.message
 
 
 @pytest.mark.parametrize("count", [8, 14, 19])
@@ -134,7 +134,7 @@ def test_what_is_sound_is_not_alarming(name: str, floor: float) -> None:
 def test_a_single_noisy_frame_is_none_but_a_deep_one_is() -> None:
     assert found(np.where(_K == 30, -0.02, 0.0), 0.0) == []
     (sunk,) = found(np.where(_K == 30, -0.03, 0.0), 0.0)
-    assert sunk.message == "1 of 60 frames: left_ankle is 30 mm below the ground in frame 130"
+    assert sunk.message == "1 of 60 frames: left_ankle is 30 mm below the ground at frame 130"
 
 
 def test_the_ground_can_be_given_or_left_out() -> None:
@@ -149,8 +149,7 @@ def test_a_body_that_floats_and_turns_has_no_ground() -> None:
     rises = 2.0 + 0.3 * np.sin(2.0 * np.pi * _K / 20)
     (note,) = found(rises, 0.0)
     assert note.message == (
-        "feet rest at no height for long: it is not clear where the ground is, and they were not "
-        "checked"
+        "feet rest at no height long enough: ground height unclear, feet not checked"
     )
 
 

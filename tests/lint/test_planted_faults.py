@@ -413,14 +413,14 @@ def test_numbers_of_the_messages() -> None:
     messages = {name: findings_of(FAULTS[name][0]) for name in ("sum too large", "jump", "sliding")}
     texts = {f.code: f.message for found in messages.values() for f in found}
     assert texts["W001"] == (
-        "weights of 2 vertices do not sum to 1: 1.1 at vertex 9, an error of 0.1"
+        "weights of 2 vertices do not sum to 1 (worst: 1.1 at vertex 9, an error of 0.1)"
     )
     # 3 m in 1/30 s; the legs are 0.2 m wide and 0.9 m high, and may move at 15 times 0.922 m.
     assert texts["C003"] == (
-        "2 of 60 frames: pelvis moves at 90 m/s (limit 13.8 m/s) to frame 120 at 0.667 s"
+        "2 of 60 frames: pelvis moves at 90 m/s (limit 13.8 m/s) at frame 120, 0.667 s"
     )
     # All of the 59 steps of 0.5 / 30 m.
-    assert "left_ankle slides by 983 mm in all, at most 0.5 m/s to frame" in texts["C007"]
+    assert "left_ankle slides by 983 mm in total, at up to 0.5 m/s (frame " in texts["C007"]
 
 
 def test_numbers_of_meshes_and_gaps() -> None:
@@ -428,11 +428,11 @@ def test_numbers_of_meshes_and_gaps() -> None:
     names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
     texts = {f.code: f.message for name in names for f in findings_of(FAULTS[name][0])}
     assert texts["M006"] == (
-        "1 edge belongs to more than two triangles, at most 3, first between vertices 0 and 1"
+        "1 non-manifold edge with up to 3 triangles (first: between vertices 0 and 1)"
     )
-    assert texts["M005"].startswith("3 edges belong to one triangle only, first between vertices 0")
+    assert texts["M005"].startswith("3 boundary edges (first: between vertices 0")
     assert texts["M009"] == (
-        "1 of 20 normals points against all of its triangles, first of vertex 3"
+        "1 of 20 normals opposes the winding of all adjacent triangles (first: vertex 3)"
     )
     assert texts["C005"] == "4 of 60 frames are missing in 2 gaps: frames 110 to 112, frame 130"
     # 4 and 3 radians.
@@ -498,8 +498,8 @@ def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:
     (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
     # The whole: 0.05 of 2 m. The cut keeps nothing of e: 100 mm in the present pose, 0 at rest.
     assert found.message == (
-        "1 vertex has more than 4 influences, at most 5; kept to 4 the mesh moves by up to "
-        "100 mm (vertex 8), 100 mm on average of these, over 6 poses"
+        "1 vertex has more than 4 influences (maximum: 5); pruning to 4 moves the mesh "
+        "by up to 100 mm (vertex 8), 100 mm on average over these vertices, in 6 poses"
     )
 
 
@@ -541,6 +541,7 @@ def test_rare_keypoints_of_low_confidence_are_told_by_how_often_they_are_seen() 
 
     (low,) = lint_scene(captured(change))
     assert low.message == (
-        "hip has a confidence below 0.3 in 30 % of the 10 frames that see it, first in frame 104"
+        "hip has a confidence below 0.3 in 30 % of the 10 frames in which it is "
+        "visible (first: frame 104)"
     )
     assert low.frames.tolist() == [104, 105, 106] and low.joints.tolist() == [0]

@@ -72,7 +72,7 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
                             "a.skel", 5),
     "pose outside limits": (skel("pose 0.5", "pose 1.5"), "S004", "warning", "a.skel", 1),
     "same name": (skel("arm", "root"), "S006", "warning", "a.skel", 1),
-    "clip of another skeleton": (
+    "clip for another skeleton": (
         {"a.skel": skel_text.GOOD,
          "a.anim": CLIP.replace("channels 9", "channels 6").replace(STILL * 3, "", 1)},
         "C009", "error", "a.anim", None,
@@ -199,7 +199,8 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
     assert sorted(np.concatenate([f.joints for f in named]).tolist()) == low.tolist()
     assert [len(f.joints) for f in named] == [1] * 6 + [len(low) - 6]
     assert named[0].message.endswith(
-        " has a confidence below 0.7 in 100 % of the 18 frames that see it, first in frame 0"
+        " has a confidence below 0.7 in 100 % of the 18 frames in which it is visible "
+        "(first: frame 0)"
     )
     assert f"{len(low) - 6} more keypoints have a confidence below 0.7: " in named[6].message
 

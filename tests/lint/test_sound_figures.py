@@ -61,7 +61,7 @@ def test_the_pig_has_two_pairs_of_joints_of_one_name(shared_data: Path) -> None:
     for name in ("PIG_core.pkl", "core_txt_files"):
         _, findings = lint_files([shared_data / "pig" / name])
         assert heavy(findings) == [
-            ("S006", '4 joints share their names with others: "R leg" (2), "L leg" (2)')
+            ("S006", '4 joints with duplicate names: "R leg" (2), "L leg" (2)')
         ]
         # Its weights are raw, and off by 0.002 at most.
         assert "W001" in notes(findings)

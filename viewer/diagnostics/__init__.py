@@ -1,8 +1,8 @@
-"""Faults and remarks as data: what was found, where, and with which values.
+"""Faults and remarks as data: message key, place and values.
 
-A :class:`Diagnostic` names its message by a key, ``"W004.vertices"``: the stable code before the
-dot, and which of the code's messages after it. Severity, title and cure of a code are in
-``wording/``, and so is every message, a template. Nothing recovers meaning from text.
+A :class:`Diagnostic` names its message by a key, ``"W004.vertices"``: the stable code, a
+dot, and the name of one of the code's messages. ``wording/`` holds severity, title and cure of each
+code and the template of each message. Nothing recovers meaning from text.
 """
 
 from __future__ import annotations

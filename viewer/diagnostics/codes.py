@@ -1,4 +1,4 @@
-"""The code of a kind of fault: its severity, title and cure."""
+"""Codes of faults: severity, title and cure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 __all__ = ["SEVERITIES", "Code"]
 
 SEVERITIES = ("note", "warning", "error")
-"""From harmless to fatal."""
+"""In ascending order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,13 +17,13 @@ class Code:
     Attributes
     ----------
     severity : str
-        One of ``SEVERITIES``; single findings may differ.
+        One of ``SEVERITIES``; a diagnostic may override it.
     title : str
-        For lists.
+        Short description, for lists of codes.
     hint : str
-        What to do.
+        Suggested cure.
     other_hint : str
-        The same where no line is known; empty if it is no other.
+        Suggested cure if no line is known; empty if it is the same.
     """
 
     severity: str

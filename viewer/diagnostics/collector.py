@@ -1,4 +1,4 @@
-"""Diagnostics in the order in which they are found."""
+"""Collector of diagnostics, in the order in which they are found."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ from collections.abc import Iterator
 
 from viewer.diagnostics.diagnostic import Diagnostic
 
-_MOST = 100  # warnings of one file; nobody reads more
+_MOST = 100  # warnings of one file; more would not be read
 
 
 class Collector:
-    """Takes in what readers and operations find.
+    """Collects the diagnostics of readers and operations.
 
-    Warnings of the same message are kept once, and not more than a hundred of them; errors are
-    all kept.
+    Repeated warnings are dropped, and so are those after the first hundred; errors are all kept.
 
     Parameters
     ----------
     keeps_errors : bool
-        Whether a reader goes on after an error, so that all of them are found. Otherwise the
+        Whether a reader continues after an error in order to find all errors. Otherwise the
         first one is raised where it is recorded.
     """
 
@@ -34,7 +33,7 @@ class Collector:
         return len(self._found)
 
     def add(self, found: Diagnostic) -> None:
-        """Keep an error, or a warning that has not been given yet."""
+        """Keep an error, or a warning that is not kept yet."""
         if found.is_refusal:
             self._found.append(found)
             return
@@ -48,10 +47,10 @@ class Collector:
 
     @property
     def errors(self) -> list[Diagnostic]:
-        """Errors in the order found; ``load`` refuses a file for the first."""
+        """Errors in the order found; ``load`` raises the first."""
         return [found for found in self._found if found.is_refusal]
 
     @property
     def warnings(self) -> list[Diagnostic]:
-        """Everything else."""
+        """Warnings and notes in the order found."""
         return [found for found in self._found if not found.is_refusal]

@@ -15,11 +15,11 @@ from viewer.phrases import printable
 
 __all__ = ["described", "plain"]
 
-_LISTED = 100  # places and names of one diagnostic; their number is always there
+_LISTED = 100  # places and names of one diagnostic; their total is always given
 
 
 def described(found: Diagnostic) -> dict[str, Any]:
-    """Return everything that a diagnostic knows.
+    """Return all data of a diagnostic.
 
     Parameters
     ----------
@@ -29,8 +29,8 @@ def described(found: Diagnostic) -> dict[str, Any]:
     Returns
     -------
     dict
-        Code, key, severity, message, file and line or None, part, count, and values as ``plain``
-        gives them; of the places the first 100, and how many there are.
+        Code, key, severity, message, file and line (or None), part, count, values as returned by
+        ``plain``, the first 100 places, and the number of places.
     """
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     return {
@@ -49,10 +49,10 @@ def described(found: Diagnostic) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of a message as JSON can hold it.
+    """Return a value of a message as JSON data.
 
-    Words of files become text, phrases their text and values, numbers that JSON does not have
-    (``nan``, ``inf``) become text, and lists are cut after 100 items.
+    Bytes of a file and non-finite numbers become text, phrases become their text and values, and
+    lists are truncated after 100 items.
     """
     if isinstance(value, Mapping):
         return {str(name): plain(item) for name, item in value.items()}

@@ -1,4 +1,4 @@
-"""One fault or remark: its message key, its place, and the values that its message shows."""
+"""A single fault or remark: message key, place, and values of the message."""
 
 from __future__ import annotations
 
@@ -26,35 +26,36 @@ Part = Literal[
     "channels",
     "frames",
 ]
-"""The data of a figure or motion that a fault is in."""
+"""Part of a figure or motion that contains a fault."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnostic:
-    """Something that a reader, check or operation found.
+    """A fault or remark of a reader, check or operation.
 
     Attributes
     ----------
     key : str
-        A key of ``MESSAGES``: the code, a dot, and the name of the message: ``"W004.vertices"``.
+        A key of ``MESSAGES``: code, dot, name of the message, as in ``"W004.vertices"``.
     path : Path or None
-        The file it is in.
+        The file that contains the fault.
     line : int or None
-        In that file, from 1.
+        Line in that file, from 1.
     part : str
-        The data that ``places`` index. A reader replaces them with neutral values.
+        Part of the figure or motion that ``places`` index. Readers replace faulty data with neutral
+        values.
     places : (N,) int32 or None
-        Vertices (of positions and weights), triangles, joints (of bindings, of joints, and of
-        items: their boxes, limits and poses), channels of a clip, or rows of frames, ascending.
+        Indices, ascending: vertices (positions, weights), triangles, joints (bindings, joints, and
+        items: boxes, limits and poses), channels of a clip, or rows of frames.
     values : mapping of str to object
-        What the template shows.
+        Values of the template.
     count : int
-        How many faults it stands for; 0 if another one says what is wrong, and this one only
-        where.
+        Number of faults it stands for; 0 if it only adds places to a fault reported by another
+        diagnostic.
     level : str
-        Severity, if it is not that of the code.
+        Severity, if it differs from that of the code.
     is_refusal : bool
-        Whether ``load`` refuses the file for it.
+        Whether ``load`` refuses the file because of it.
     is_final : bool
         Whether it ended the reading of its file.
     """
@@ -77,29 +78,29 @@ class Diagnostic:
 
     @property
     def severity(self) -> str:
-        """One of ``SEVERITIES``; what a file is refused for is an error."""
+        """One of ``SEVERITIES``; a refusal is an error unless ``level`` differs."""
         return self.level or ("error" if self.is_refusal else CODES[self.code].severity)
 
     @property
     def message(self) -> str:
-        """What is wrong, on one line, without the place."""
+        """The message on one line, without the place."""
         return rendered(MESSAGES[self.key], self.values)
 
     @property
     def full_message(self) -> str:
-        """The message with the number of further faults, and whether reading ended there."""
+        """The message with the number of faults, and whether reading ended there."""
         text = self.message
         if self.count > 1:
             text += FURTHER.format(self.count)
             noun = PLACES.get(self.part)
             if self.places is not None and len(self.places) > 1 and noun is not None:
                 text += f" ({noun} {listed(self.places.tolist())})"
-        # The name of a file that cannot be read promises no further checks.
+        # Nothing could be checked in a file that cannot be read at all.
         return text + NOTHING_ELSE * (self.is_final and self.code != "F001")
 
     @property
     def place(self) -> str:
-        """``file:line``, as much of it as is known."""
+        """``file:line``, or the known part of it."""
         if self.path is None:
             return ""
         path = printable(self.path, 300)
@@ -107,9 +108,9 @@ class Diagnostic:
 
     @property
     def labelled(self) -> str:
-        """The line, with its severity in front unless that is a note."""
+        """Place and message, prefixed with the severity unless it is a note."""
         return str(self) if self.severity == "note" else f"{self.severity}: {self}"
 
     def __str__(self) -> str:
-        """Return one line: place and message."""
+        """Return place and message on one line."""
         return ": ".join(filter(None, (self.place, self.message)))

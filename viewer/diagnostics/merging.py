@@ -1,4 +1,4 @@
-"""Diagnostics that say the same of different places, as one."""
+"""Merging of diagnostics that differ only in their places."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from viewer.diagnostics.phrase import Phrase
 
 
 def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """Return diagnostics in order, those of one kind joined to their first.
+    """Return diagnostics in order, each kind merged into its first.
 
-    They are of one kind if they have the same message, file and part, and name the same things:
-    values that are ``str`` are names, others (numbers, words of a file in ``bytes``) may differ.
+    Two are of one kind if they have the same message, file, part and names: values of type ``str``
+    are names, while numbers and text of a file (``bytes``) may differ.
     """
     kinds: dict[tuple[object, ...], list[Diagnostic]] = {}
     for one in found:

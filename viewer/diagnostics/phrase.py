@@ -1,4 +1,4 @@
-"""A part of a message with a template of its own."""
+"""Parts of messages with their own templates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Phrase:
     key : str
         A key of ``PHRASES``.
     **values : object
-        What the template shows.
+        Values of the template.
     """
 
     __slots__ = ("key", "values")
@@ -30,12 +30,12 @@ class Phrase:
         return rendered(PHRASES[self.key], self.values)
 
     def __repr__(self) -> str:
-        """Return the call that makes it."""
+        """Return the call that creates the phrase."""
         values = "".join(f", {name}={value!r}" for name, value in self.values.items())
         return f"Phrase({self.key!r}{values})"
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the other has the same key and values."""
+        """Return whether two phrases have the same key and values."""
         return isinstance(other, Phrase) and (self.key, self.values) == (other.key, other.values)
 
     __hash__ = None  # type: ignore[assignment]

@@ -1,20 +1,20 @@
-"""Templates of messages: ``str.format`` with a few specifications of our own.
+"""Templates of messages: ``str.format`` with additional specifications.
 
 =====================  ===========================================================================
-``{word:quoted}``      a word in quotes; None is the end of the file
-``{word:word}``        the word without quotes
-``{name}``             numbers as they are, texts with control characters escaped
-``{name:text}``        the same, not more than 200 letters
-``{name:name}``        a name in a file, cut after 60 characters; bytes that are no text show as �
-``{names:list}``       the first six and how many more, ``none``; ``list12`` for twelve
+``{word:quoted}``      text in quotes; None is the end of the file
+``{word:word}``        the same without quotes
+``{name}``             number unchanged, text with control characters escaped
+``{name:text}``        the same, at most 200 characters
+``{name:name}``        a name in a file, at most 60 characters; undecodable bytes as �
+``{names:list}``       the first six and how many more, or ``none``; ``list12`` for twelve
 ``{names:all}``        every name
-``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any number
+``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any size
 ``{names:or}``         alternatives
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
 ``{n:#frame/{all}}``   a count of a total: ``3 of 20 frames``; a verb may follow
 ``{n:?one|many}``      the first for 1, the second for other counts
-``{near:+; {}}``       the rest of the specification, if the value is not empty; ``{}`` is the value
+``{near:+; {}}``       the rest of the specification unless the value is empty; ``{}`` is the value
 =====================  ===========================================================================
 """
 
@@ -28,19 +28,19 @@ from typing import Any
 from viewer.phrases import counted, listed, one_of, printable, quoted
 
 _SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # a number with its sign
-_PLACE = "\0"  # of a value inside its own specification
-_LONGEST = 1000  # letters of a text that is a value
+_PLACE = "\0"  # placeholder of a value inside its own specification
+_LONGEST = 1000  # characters of a value that is text
 _LONGEST_NAME = 60
 _NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
-    """Return a template with its values in place."""
+    """Return a template with its values filled in."""
     return _FORMATTER.vformat(template, (), values)
 
 
 def fields(template: str) -> dict[str, str]:
-    """Return the names of the values that a template shows, each with its specification."""
+    """Return the names of the values of a template, each with its specification."""
     found = {}
     for _, name, spec, _ in Formatter().parse(template):
         if name:
@@ -51,7 +51,7 @@ def fields(template: str) -> dict[str, str]:
 
 class _Formatter(Formatter):
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Return one value as its specification says."""
+        """Return one value formatted by its specification."""
         kind, rest = format_spec[:1], format_spec[1:]
         if kind == "#":
             noun, one, many, *_ = [*rest.split("|"), "", ""]
@@ -61,7 +61,7 @@ class _Formatter(Formatter):
             one, many = rest.split("|")
             return one if value == 1 else many
         if kind == "+" and not _SIGNED.fullmatch(format_spec):
-            # An empty pair of braces in a specification has been filled with "" by now.
+            # ``{}`` inside the specification has been replaced by the placeholder by now.
             return rest.replace(_PLACE, printable(value, 300)) if value else ""
         if not format_spec and isinstance(value, str) and value != _PLACE:
             return printable(value, _LONGEST)

@@ -75,7 +75,7 @@ def test_dropped_pictures_replace_each_other(textured, tmp_path):
 def test_dropped_picture_needs_texture_coordinates(box, tmp_path):
     figure, before = box.state.actor.figure, _key(box)
     box.open(_picture(tmp_path))
-    assert "red.png: this is a picture, but box has no texture coordinates" in box.state.error
+    assert "red.png: cannot apply the picture: box has no texture coordinates" in box.state.error
     assert box.state.actor.figure is figure and _key(box) == before
 
 
@@ -102,7 +102,7 @@ def test_pose_dropped_on_a_lone_skin_says_that_there_are_no_joints(drive, rig, t
     scene = hand.state.scene
     (tmp_path / "bend.json").write_text('{"dofs": {"arm.y": 0.5}}')
     hand.open(tmp_path / "bend.json")
-    assert "bend.json: this is a pose, but tiny has no skeleton" in hand.state.error
+    assert "bend.json: cannot apply the pose: tiny has no skeleton" in hand.state.error
     assert hand.state.scene is scene
 
 
@@ -131,4 +131,4 @@ def test_dropped_folder_of_other_things_says_so(hand, tmp_path):
     (tmp_path / "photos").mkdir()
     scene = hand.state.scene
     hand.open(tmp_path / "photos")
-    assert "found a folder" in hand.state.error and hand.state.scene is scene
+    assert "found another folder" in hand.state.error and hand.state.scene is scene

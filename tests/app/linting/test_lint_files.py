@@ -76,7 +76,7 @@ def test_rows_say_file_and_line_and_can_be_filtered_by_them(lint, files, texts):
     hand = lint(*files)
     texts.clear()
     hand.step()
-    assert "limit with its minimum above its maximum (a.skel:5)" in texts
+    assert "limit with minimum above maximum (a.skel:5)" in texts
     hand.click("Filter findings")
     hand.type("a.anim")
     listed = [name for name in hand.state.item_rects if name.startswith("finding ")]

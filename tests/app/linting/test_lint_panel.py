@@ -338,8 +338,8 @@ def test_all_are_copied_as_text_and_json(lint, monkeypatch):
     hand.click("Copy text")
     lines = copied[-1].splitlines()
     assert lines[0] == (
-        "column: warning W001: weights of 1 vertex do not sum to 1: 0.9 at vertex 5, "
-        "an error of 0.1"
+        "column: warning W001: weights of 1 vertex do not sum to 1 (worst: 0.9 at "
+        "vertex 5, an error of 0.1)"
     )
     assert lines[1] == f"    {CODES['W001'].title}: {CODES['W001'].hint}"
     assert lines[-1] == "0 errors, 1 warning, 0 notes"

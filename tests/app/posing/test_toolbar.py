@@ -230,7 +230,7 @@ def test_pose_goes_to_an_actor_with_other_dofs_as_rotations(two):
     steps = two.undo_steps
     two.click("tool Paste")
     assert_allclose(rotations(two)[:2], wanted[:2], atol=1e-12)
-    assert two.says("second has no joint called hand") and two.says("Pose pasted")
+    assert two.says("second has no joint named hand") and two.says("Pose pasted")
     assert not two.state.error and two.undo_steps == steps + 1
     two.key("z", "ctrl")
     assert not two.dofs().any()

@@ -38,8 +38,8 @@ def test_match_lines_say_what_is_out_of_the_ordinary():
     ]
     assert [line.severity for line in lines] == ["note", "warning", "note", "note"]
     assert lines[1].labelled == (
-        "warning: less than 75% of the target meets the template: check the alignment, or allow "
-        "a larger distance"
+        "warning: less than 75% of the target matches the template: check the "
+        "alignment or allow a larger distance"
     )
 
 
@@ -47,7 +47,7 @@ def test_match_lines_speak_of_one_part_alone():
     found = matches([True, True], [0])
     (line,) = match_lines(found, ~found.matched, "direct")[1:]
     assert str(line) == (
-        "1 part of the target faces the other way than the template: matched as if turned round"
+        "1 part of the target with winding opposite to the template: matched with reversed normals"
     )
 
 

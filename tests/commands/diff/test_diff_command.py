@@ -212,9 +212,9 @@ def test_folder_without_a_rig_is_refused(tmp_path, capsys):
     folder = write(tmp_path / "a")
     (tmp_path / "empty").mkdir()
     code, lines, _ = said(capsys, folder, str(tmp_path / "empty"))
-    assert code == 2 and "expected a folder with files of a rig (.skel, .skin, " in lines[1]
+    assert code == 2 and "expected a folder with rig files (.skel, .skin, " in lines[1]
     code, _, error = said(capsys, str(tmp_path / "empty"), folder)
-    assert code == 2 and error.startswith(f"{tmp_path / 'empty'}: expected a folder with files")
+    assert code == 2 and error.startswith(f"{tmp_path / 'empty'}: expected a folder with rig files")
 
 
 @pytest.mark.parametrize(

@@ -163,12 +163,12 @@ def test_what_a_figure_lacks_is_noted(family):
     )  # fmt: skip
     _, notes = posed(family("smpl"), given)
     assert lines(notes) == [
-        "the left hand: smpl has no hand components",
-        "2 joints that smpl lacks were left out: jaw, left_middle3",
-        "shape coefficients 11 to 12 were left out, as smpl has 10 "
-        f"(largest {np.abs(waves(12)[10:]).max():.3g})",
-        f"expression coefficients 1 to 10 were left out, as smpl has 0 "
-        f"(largest {np.abs(waves(10)).max():.3g})",
+        "left hand omitted: smpl has no hand components",
+        "2 joints missing from smpl omitted: jaw, left_middle3",
+        "shape coefficients 11 to 12 omitted "
+        f"(largest value {np.abs(waves(12)[10:]).max():.3g}): smpl has 10",
+        f"expression coefficients 1 to 10 omitted "
+        f"(largest value {np.abs(waves(10)).max():.3g}): smpl has 0",
     ]
 
 
@@ -193,8 +193,8 @@ def test_of_many_joints_left_out_six_are_named(family):
     lost = [name for name in names[22:] if name not in family("smpl").skeleton.names]
     listed = ", ".join(lost[:6])
     assert len(lost) == 33
-    assert lines(notes) == [f"33 joints that smpl lacks were left out: {listed} and 27 more"]
+    assert lines(notes) == [f"33 joints missing from smpl omitted: {listed} and 27 more"]
     vectors[:, 28:] = 0.0
     assert lines(posed(family("smpl"), motion(names, vectors))[1]) == [
-        f"6 joints that smpl lacks were left out: {listed}"
+        f"6 joints missing from smpl omitted: {listed}"
     ]

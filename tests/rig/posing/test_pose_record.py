@@ -69,7 +69,7 @@ def test_dofs_beyond_their_limits_are_clamped_and_counted():
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(dofs={"knee.z": 3.0, "hip.x": -2.0}), figure, pose)
     assert pose.dofs.tolist() == [0.5, -1.0, 1.0]
-    assert lines(notes) == ["2 DOFs of the pose were beyond their limits and clamped"]
+    assert lines(notes) == ["2 DOFs of the pose clamped to their limits"]
 
 
 def test_unknown_dof_is_refused_and_leaves_the_pose():
@@ -129,7 +129,7 @@ def test_vector_of_another_member_goes_by_joint_names(family, kind, count, share
         expected[target : target + joints] = wanted[source : source + joints]
     found, notes = applied(figure, vector=wanted.ravel())
     assert_allclose(found, expected, atol=1e-13)
-    said = [f"{left_out} joints of the pose that {figure.name} lacks were left out"]
+    said = [f"{left_out} joints of the pose omitted: missing from {figure.name}"]
     assert lines(notes) == (said if left_out else [])
 
 
@@ -158,7 +158,7 @@ def test_scale_that_cannot_be_drawn_is_left_out(family, scale):
     assert (
         len(notes) == 1
         and lines(notes)[0].startswith("scale: expected")
-        and "left at 1.5" in lines(notes)[0]
+        and "kept at 1.5" in lines(notes)[0]
     )
 
 
@@ -166,7 +166,7 @@ def test_place_and_shape_beyond_all_measure_are_left_out_or_refused(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
-    assert lines(notes) == ["translation: expected at most 1e+09, found 1e+300; left as it was"]
+    assert lines(notes) == ["translation: expected at most 1e+09, found 1e+300; unchanged"]
     assert not pose.figure_translation.any()
     message = refusal(figure, shape=np.array([1e300]))
     assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
@@ -185,7 +185,7 @@ def test_hands_at_rest_of_another_member_are_not_worth_a_note(family):
 def test_vector_of_no_member_is_refused(family, kind, count, own):
     figure = family(kind)
     message = refusal(figure, vector=np.ones(count))
-    assert message == f"expected {own} pose numbers for {figure.name}, found {count}"
+    assert message == f"expected {own} pose values for {figure.name}, found {count}"
 
 
 def test_body_pose_begins_after_the_root(family):
@@ -201,7 +201,7 @@ def test_body_pose_begins_after_the_root(family):
 
 
 def test_body_pose_of_another_length_is_refused(family):
-    message = "body_pose: expected 3 numbers a joint, of up to 23 joints, found "
+    message = "body_pose: expected 3 numbers per joint for at most 23 joints, found "
     for kind, count in (("smpl", 72), ("smpl", 64), ("smpl", 2), ("smplx", 72), ("smplx", 65)):
         found = refusal(family(kind), parts={"body_pose": np.ones(count)})
         assert found == f"{message}{count} numbers"
@@ -231,7 +231,7 @@ def test_part_that_the_figure_lacks_is_noted_if_it_says_something(family):
     figure = family("smpl")
     assert applied(figure, parts={"jaw_pose": np.zeros(3)})[1] == []
     found, notes = applied(figure, parts={"jaw_pose": np.ones(3)})
-    assert lines(notes) == [f"jaw_pose: {figure.name} has no such joint, left out"]
+    assert lines(notes) == [f"jaw_pose omitted: {figure.name} has no such joint"]
     assert not found.any()
 
 
@@ -298,7 +298,7 @@ def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
     assert_allclose(found[37:].ravel(), wanted, atol=1e-13)
     assert notes == []
     found, notes = applied(figure, parts={"right_hand_pose": np.ones(6)})
-    assert lines(notes) == [f"right_hand_pose: {figure.name} has no hand components, left out"]
+    assert lines(notes) == [f"right_hand_pose omitted: {figure.name} has no hand components"]
     assert not found.any()
 
 
@@ -328,8 +328,8 @@ def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
     pose = figure_pose(figure)
     record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
     assert lines(apply_record(record, figure, pose, cut=True)) == [
-        f"shape coefficients 11 to 16 were left out, as {figure.name} has 10 (largest 3)",
-        f"expression coefficient 1 was left out, as {figure.name} has 0 (largest 2)",
+        f"shape coefficients 11 to 16 omitted (largest value 3): {figure.name} has 10",
+        f"expression coefficient 1 omitted (largest value 2): {figure.name} has 0",
     ]
     assert pose.shape_weights.tolist() == [0.5] * 10
 

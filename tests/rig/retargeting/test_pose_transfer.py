@@ -79,7 +79,7 @@ def test_other_order_of_dofs_gets_the_same_rotation() -> None:
     y, z, x = pose.dofs[3:]
     second = about(2, -0.7) @ about(1, 0.2) @ about(0, 1.0)
     assert_allclose(about(0, x) @ about(2, z) @ about(1, y), second, atol=1e-12)
-    assert lines(notes) == ["2 of 2 joints of one taken over"]
+    assert lines(notes) == ["transferred 2 of 2 joints of one"]
 
 
 def test_labels_alone_would_give_another_pose() -> None:
@@ -95,7 +95,7 @@ def test_joints_that_are_missing_are_named_in_one_line_and_others_stay() -> None
     other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
     start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
     pose, notes = transfer_pose(one, posed(one, *[0.2] * 12), other, start)
-    assert lines(notes) == ["2 of 4 joints of cat taken over", "man has no joint called tail, tip"]
+    assert lines(notes) == ["transferred 2 of 4 joints of cat", "man has no joint named tail, tip"]
     assert_allclose(pose.dofs, [0.2] * 6 + [0.1, 0.2, 0.3], atol=1e-12)
     assert_allclose(start.dofs[:6], 0)
 
@@ -136,7 +136,7 @@ def test_limits_and_missing_axes_are_kept_and_said() -> None:
     assert_allclose(pose.dofs[:3], [0.1, 0, 0], atol=1e-9)
     # Rz(0.2) Rx(0.4) on an axis x: tan t = (1 + cos 0.2) sin 0.4 / ((1 + cos 0.2) cos 0.4).
     assert_allclose(pose.dofs[3], 0.4, atol=1e-9)
-    assert lines(notes)[1:] == ["turned as far as their DOFs and limits allow: a, b"]
+    assert lines(notes)[1:] == ["rotated as far as DOFs and limits allow: a, b"]
 
 
 def test_place_size_and_shape_stay() -> None:
@@ -178,7 +178,7 @@ def test_long_lists_are_cut() -> None:
     one = figure(["a", *(f"j{k}" for k in range(20))], ["xyz"] * 21)
     other = figure("a", ["zyx"], "man")
     _, notes = transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
-    assert lines(notes)[1].startswith("man has no joint called j0, j1, ") and lines(notes)[
+    assert lines(notes)[1].startswith("man has no joint named j0, j1, ") and lines(notes)[
         1
     ].endswith("8 more")
 
@@ -214,8 +214,8 @@ def test_record_for_other_dofs_turns_joints_and_leaves_place_and_size() -> None:
     pose.figure_scale = 2.0
     found = rest_pose(other.skeleton)
     assert lines(apply_record(record_of(one, pose), other, found)) == [
-        "2 of 2 joints of cat taken over",
-        "left as they were: the figure's place, its size",
+        "transferred 2 of 2 joints of cat",
+        "unchanged: figure translation, figure scale",
     ]
     wanted = joint_rotations(one.skeleton, pose)
     assert_allclose(joint_rotations(other.skeleton, found), wanted, atol=1e-12)
@@ -275,7 +275,7 @@ def test_edited_dof_beyond_its_limit_leaves_no_rotation_beneath() -> None:
     record = record_of(one, posed(one, 0.1, 0.2, 0.3))
     found = rest_pose(one.skeleton)
     notes = apply_record(replace(record, dofs={**record.dofs, "a.x": 2.0}), one, found)
-    assert lines(notes) == ["1 DOF of the pose was beyond its limits and clamped"]
+    assert lines(notes) == ["1 DOF of the pose clamped to its limits"]
     assert found.dofs.tolist() == [0.5, 0.2, 0.3]
     assert found.rotations.tolist() == [[0, 0, 0, 1]]
 
@@ -301,7 +301,7 @@ def test_lists_that_do_not_fit_the_skeleton_go_by_name() -> None:
                     rotations=np.array([[0, 0, 0, 1.0]]))  # fmt: skip
     found = posed(one, 0, 0, 0, 0.3)
     notes = apply_record(replace(record, turns=turns), one, found)
-    assert lines(notes) == ["1 of 1 joints of cat taken over"]
+    assert lines(notes) == ["transferred 1 of 1 joints of cat"]
     assert_allclose(found.dofs, [0.1, 0, 0, 0.3], atol=1e-12)
 
 
@@ -328,8 +328,8 @@ def test_same_skeleton_with_fewer_shapes_takes_place_size_and_the_shapes_of_both
     one, other = shaped(bones, 4, 2), replace(shaped(bones, 2, 1), name="kin")
     found = rest_pose(bones.skeleton)
     assert lines(apply_record(record_of(one, body_pose(one)), other, found, cut)) == [
-        "shape coefficients 3 to 4 were left out, as kin has 2 (largest 0.5)",
-        "expression coefficient 2 was left out, as kin has 1 (largest 4)",
+        "shape coefficients 3 to 4 omitted (largest value 0.5): kin has 2",
+        "expression coefficient 2 omitted (largest value 4): kin has 1",
     ]
     assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4]
     assert found.shape_weights.tolist() == [2, -1, 3]
@@ -351,8 +351,8 @@ def test_same_skeleton_without_shapes_says_which_it_leaves() -> None:
     one = shaped(bones, 4, 2)
     found = rest_pose(bones.skeleton)
     assert lines(apply_record(record_of(one, body_pose(one)), bones, found)) == [
-        "shape coefficients 1 to 4 were left out, as bones has 0 (largest 2)",
-        "expression coefficients 1 to 2 were left out, as bones has 0 (largest 4)",
+        "shape coefficients 1 to 4 omitted (largest value 2): bones has 0",
+        "expression coefficients 1 to 2 omitted (largest value 4): bones has 0",
     ]
     assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4] and found.shape_weights.size == 0
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2

@@ -131,8 +131,8 @@ def test_onto_itself_is_the_identity() -> None:
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
     np.testing.assert_allclose(clip.translations, motion.clip.translations, atol=1e-12 * 100)
     assert lines(notes) == [
-        "mocap moves 20 of 20 joints of mocap",
-        "its path is scaled by 1, the ratio of legs",
+        "mocap drives 20 of 20 joints of mocap",
+        "root path scaled by 1, the ratio of leg lengths",
     ]
 
 
@@ -151,12 +151,12 @@ def test_limbs_point_as_the_source_s_do_from_t_pose_to_a_pose() -> None:
     clip, notes = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
     assert lines(notes)[0].startswith(
-        "mocap moves 19 of 20 joints of body: pelvis by Hips, left_hip by "
+        "mocap drives 19 of 20 joints of body: pelvis by Hips, left_hip by "
     )
     assert lines(notes)[0].endswith("left_wrist by LeftHand, right_wrist by RightHand")
     assert lines(notes)[1:3] == [
-        "at rest, as nothing moves them: spine2",
-        "joints of mocap without a partner: LeftToeBase",
+        "joints kept at rest: spine2",
+        "unmatched joints of mocap: LeftToeBase",
     ]
 
 
@@ -249,7 +249,7 @@ def test_the_path_is_scaled_by_the_legs() -> None:
     clip, notes = retarget(source, figure)
     theirs = places(source.figure, source.clip)["Hips"]
     np.testing.assert_allclose(places(figure, clip)["pelvis"], path_scale() * theirs, atol=1e-12)
-    assert lines(notes)[-1] == f"its path is scaled by {path_scale():.4g}, the ratio of legs"
+    assert lines(notes)[-1] == f"root path scaled by {path_scale():.4g}, the ratio of leg lengths"
     assert clip.figure_translations is None
 
 
@@ -297,7 +297,7 @@ def test_joints_between_two_that_match_are_folded_in() -> None:
         bones(theirs, ("LeftForeArm", "LeftHand")),
         atol=EXACT,
     )
-    assert "joints of mocap without a partner: LeftToeBase, LeftArmRoll" in lines(notes)
+    assert "unmatched joints of mocap: LeftToeBase, LeftArmRoll" in lines(notes)
 
 
 def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
@@ -305,7 +305,7 @@ def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
     clip, notes = retarget(source, figure)
     np.testing.assert_array_equal(clip.rotations[:, -2:], np.tile([0.0, 0, 0, 1], (5, 2, 1)))
-    assert "at rest, as nothing moves them: spine2, jaw, tail" in lines(notes)
+    assert "joints kept at rest: spine2, jaw, tail" in lines(notes)
 
 
 def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
@@ -361,7 +361,7 @@ def test_same_hierarchy_with_other_proportions_takes_rotations_over() -> None:
             "na,na->n", clip.rotations[:, joint], source.clip.rotations[:, names.index(name)]
         )
         np.testing.assert_allclose(np.abs(same), 1.0, atol=EXACT)
-    assert lines(notes)[0] == "one moves 20 of 20 joints of two"
+    assert lines(notes)[0] == "one drives 20 of 20 joints of two"
 
 
 def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> None:
@@ -377,7 +377,7 @@ def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> 
     np.testing.assert_allclose(clip.translations[:, 4], 2 * shifts[:, 4], atol=EXACT)
     _, notes = retarget(motion, figure_of(HIK, "mocap"))
     assert lines(notes)[-1] == (
-        "positions of 1 joint within its parent were left out, up to 0.0548 (left_knee)"
+        "translations of 1 joint relative to its parent omitted (largest: 0.0548 at left_knee)"
     )
 
 
@@ -396,10 +396,10 @@ def test_mapping_names_what_rules_do_not_know() -> None:
         bones(mine, ("left_elbow", "left_wrist")), bones(theirs, ("x14", "x15")), atol=EXACT
     )
     assert lines(notes)[0] == (
-        "strange moves 4 of 20 joints of body: pelvis by x0, left_shoulder by x13, left_elbow by "
-        "x14, left_wrist by x15"
+        "strange drives 4 of 20 joints of body: pelvis by x0, left_shoulder by x13, "
+        "left_elbow by x14, left_wrist by x15"
     )
-    assert "at rest, as nothing moves them: left_hip, right_hip" in lines(notes)[1]
+    assert "joints kept at rest: left_hip, right_hip" in lines(notes)[1]
 
 
 def test_equal_names_match_whatever_they_mean() -> None:
@@ -414,8 +414,8 @@ def test_equal_names_match_whatever_they_mean() -> None:
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     np.testing.assert_allclose(mine["tail_02"], theirs["tail_02"], atol=EXACT)
     assert lines(notes)[:2] == [
-        "snake moves 3 of 4 joints of wasp",
-        "at rest, as nothing moves them: sting",
+        "snake drives 3 of 4 joints of wasp",
+        "joints kept at rest: sting",
     ]
 
 

@@ -1,7 +1,7 @@
-"""The wording of all diagnostics: codes and their messages, one table per area.
+"""Wording of all diagnostics: codes and their messages, one table per area.
 
-See ``template.py`` for what may stand in braces. A key is the code, a dot and a name; within a
-code the name is unique. ``PHRASES`` are parts of messages, by a name alone.
+``template.py`` lists the specifications that braces may contain. A key is the code, a dot and a
+name that is unique within the code. ``PHRASES`` are parts of messages, keyed by a name alone.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging)
 CODES: dict[str, Code] = {
     code: row for table in _CODED for code, row in sorted(table.CODES.items())
 }
-"""By code; a code is never given to another fault."""
+"""By code; a code is never reused for another fault."""
 
 MESSAGES: dict[str, str] = {
     key: template for table in TABLES for key, template in table.MESSAGES.items()
@@ -64,10 +64,10 @@ PLACES = {
     "items": "joints",
     "frames": "frames",
 }
-"""What the places of a part are called."""
+"""Plural noun for the places of a part."""
 
-FURTHER = ", the first of {}"
-"""Ends a message that stands for several faults."""
+FURTHER = "; first of {}"
+"""Suffix of a message that stands for several faults."""
 
-NOTHING_ELSE = "; nothing else in this file was checked"
-"""Ends a message of a fault that ended the reading."""
+NOTHING_ELSE = "; the rest of the file was not checked"
+"""Suffix of a message whose fault ended the reading."""

@@ -2,21 +2,23 @@
 
 MESSAGES = {
     "F002.bvh-seconds": "Frame Time: expected seconds, found {found:quoted}",
-    "F002.bvh-row": "frame {frame}: expected {expected:#number} as CHANNELS says, found {found}",
-    "F002.bvh-no-frame": "{expected:+expected {} as Frames says, }found none{rest:+ and {}}",
+    "F002.bvh-row": "frame {frame}: expected {expected:#number} as declared by CHANNELS, found "
+    "{found}",
+    "F002.bvh-no-frame": "{expected:+expected {} as declared by Frames, }found none{rest:+ and {}}",
     "F002.bvh-few-channels": "expected channels for most joints, found {channels} for {joints} "
     "joints in {frames} frames",
-    "F006.bvh-after": "ignored what follows the last frame, {found:quoted}",
-    "F007.bvh-frames": "{expected:+expected {} as Frames says, }found {found}{rest:+ and {}}; "
-    "the whole ones are used",
-    "F007.bvh-no-motion": "no MOTION: shown in the rest pose",
-    "F007.bvh-no-count": "Frames is missing: all rows are used",
+    "F006.bvh-after": "ignored data after the last frame, starting with {found:quoted}",
+    "F007.bvh-frames": "{expected:+expected {} as declared by Frames, }found {found}{rest:+ and "
+    "{}}; only complete frames are used",
+    "F007.bvh-no-motion": "no MOTION section: shown in the rest pose",
+    "F007.bvh-no-count": "missing Frames: all rows are used",
     "F007.bvh-no-channels": "no joint has channels: shown in the rest pose",
     "F007.bvh-empty": "no frames: shown in the rest pose",
-    "F007.bvh-no-time": "Frame Time is missing: taken for {rate:g} frames a second",
-    "F007.bvh-time": "Frame Time is {seconds:g}, expected {low:g} to {high:,.0f} seconds: taken "
-    "for {rate:g} frames a second",
-    "F007.bvh-positions": "position channels are 0 but for the root's: taken as added to OFFSET",
+    "F007.bvh-no-time": "missing Frame Time: {rate:g} frames per second assumed",
+    "F007.bvh-time": "Frame Time: expected {low:g} to {high:,.0f} seconds, found {seconds:g}; "
+    "{rate:g} frames per second assumed",
+    "F007.bvh-positions": "position channels are 0 except at the root: interpreted as relative to "
+    "OFFSET",
 }
 
 PHRASES = {

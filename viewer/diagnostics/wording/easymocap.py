@@ -8,77 +8,79 @@ MESSAGES = {
     "F002.capture-frames": "expected frame files (smpl_full, smplfull, smpl, keypoints3d: "
     "000000.json …), found none",
     "F002.capture-people": "expected people, found none in {n:#frame}",
-    "F002.capture-people-fault": "expected people, found none in {n:#frame}; the first: {problem}",
+    "F002.capture-people-fault": "expected people, found none in {n:#frame}; first fault: "
+    "{problem}",
     "F002.capture-list": "expected a list of people, found {found}",
-    "F002.capture-digits": "expected numbers of up to {most} digits, found a longer one",
-    "F002.capture-text": "expected text in UTF-8, found other bytes",
-    "F007.capture-no-files": "{names:list}: expected files, found something else",
-    "F007.capture-beside": "{name:text}/ is read, {others:text}/ beside it is not",
-    "F007.capture-files": "files beside the folders of frames are not read: {names:list}",
-    "F007.capture-camera": "{folder:text}/{name:text} is read, others are not: {others:list}",
-    "F007.capture-numbers": "{n:#frame} numbered from {first} to {last}: taken one after the other",
-    "C005.capture-twice": "frames that another file has too are left out: {names:list}",
-    # Records of people: faults of single frames are remarks, unless nobody is left
+    "F002.capture-digits": "expected numbers of at most {most} digits, found a longer one",
+    "F002.capture-text": "expected UTF-8 text, found other bytes",
+    "F007.capture-no-files": "ignored, not files: {names:list}",
+    "F007.capture-beside": "read {name:text}/, ignored {others:text}/ in the same folder",
+    "F007.capture-files": "ignored files next to the frame folders: {names:list}",
+    "F007.capture-camera": "read {folder:text}/{name:text}, ignored other cameras: {others:list}",
+    "F007.capture-numbers": "{n:#frame} numbered from {first} to {last}: treated as consecutive",
+    "C005.capture-twice": "omitted frames that occur in more than one file: {names:list}",
+    # Records of people: faults in single frames are remarks as long as one person remains
     "F002.record": _RECORD,
     "F003.record": _RECORD,
-    "F002.record-twice": "{item:text} is there twice: the first counts",
+    "F002.record-twice": "{item:text} occurs twice: the first one is used",
     "F007.record": "{problem}",
     "F007.records": "{name:text}: {n} more faults in frame files",
-    "F007.record-untracked": 'people without a track (id -1) are called "untracked" and numbered '
-    "within each frame: nobody says who of them is who in the next",
-    "F007.record-no-id": "people without id: numbered in the order of their lists",
-    "F007.record-ids": "people whose id and personID differ: id counts everywhere",
-    "F007.record-points": "keypoints3d in it and beside it: those in the folder keypoints3d count",
-    "F007.record-poses": "poses in it and beside it: those beside it count",
-    "F007.record-vertices": "vertices are not needed, and left out everywhere",
-    "F007.record-first": "no earlier record has {keys:or}: 0 is taken there",
-    "F007.record-last": "no {item} in this record: the person's last ones are kept, wherever there "
-    "are none",
-    "F007.record-no-last": "no {item} in this record, nor in earlier ones of the same person: 0 is "
-    "taken",
-    "F007.record-unseen": "{name:text}: no keypoint of {people:list} is ever seen: every "
+    "F007.record-untracked": 'people without a track (id -1) are named "untracked" and numbered '
+    "within each frame: they cannot be matched between frames",
+    "F007.record-no-id": "people without id: numbered in list order",
+    "F007.record-ids": "people with different id and personID: id is used",
+    "F007.record-points": "keypoints3d in this record and in the folder keypoints3d: those in the "
+    "folder are used",
+    "F007.record-poses": "poses in this record and in a separate folder: those in the folder are "
+    "used",
+    "F007.record-vertices": "vertices not needed and ignored",
+    "F007.record-first": "no earlier record has {keys:or}: 0 is used there",
+    "F007.record-last": "no {item} in this record: the person's last known values are used",
+    "F007.record-no-last": "no {item} in this or earlier records of the same person: 0 is used",
+    "F007.record-unseen": "{name:text}: no keypoint of {people:list} is ever visible: every "
     "confidence is 0",
     # Cameras
-    "F007.cameras": "{problem}; the cameras are left out",
-    "F007.camera": "{problem}; this camera is left out",
-    "F007.cameras-beside": "no {name} beside it; the cameras are left out",
-    "F002.camera-focal": "{item:text}: expected focal lengths above 0 and the last row 0 0 1",
+    "F007.cameras": "{problem}; cameras omitted",
+    "F007.camera": "{problem}; camera omitted",
+    "F007.cameras-beside": "no {name} in the same folder; cameras omitted",
+    "F002.camera-focal": "{item:text}: expected positive focal lengths and a last row of 0 0 1, "
+    "found other numbers",
     "F002.camera-focal-range": "{item:text}: expected focal lengths of {low:g} to {high:g} pixels, "
     "found {first:g} and {second:g}",
-    "F003.camera-limit": "{item:text}: expected numbers up to {limit:g}, found {found:g}",
-    "F002.camera-rotation": "{item:text}: expected a rotation, found a matrix that is none",
+    "F003.camera-limit": "{item:text}: expected numbers within ±{limit:g}, found {found:g}",
+    "F002.camera-rotation": "{item:text}: expected a rotation matrix, found another matrix",
     "F002.camera-no-key": "{item:text}: expected {shape:axes} numbers, found no such key",
     "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found something else",
     "F002.camera-shape": "{item:text}: expected {shape:axes} numbers, found {found:axes}",
-    "F002.camera-twice": 'expected every key once, found "{found:text}"',
-    "F002.camera-value": "expected name: value, found {found:quoted}",
+    "F002.camera-twice": 'expected unique keys, found "{found:text}" again',
+    "F002.camera-value": "expected `name: value`, found {found:quoted}",
     "F002.camera-part": "expected rows, cols, dt or data, found {found:quoted}",
     "F002.camera-size": "expected a size, found {found:quoted}",
-    "F002.camera-data": "expected [ numbers ], found {found:quoted}",
+    "F002.camera-data": "expected a list of numbers in brackets, found {found:quoted}",
     "F002.camera-lacks": "{item:text}: expected rows, cols and data, found no {name}",
     "F002.camera-count": "{item:text}: expected {shape:axes} numbers, found {found}",
 }
 
 PHRASES = {
     "not-finite": "expected finite numbers, found {found:g}",
-    "beyond-limit": "expected numbers up to {limit:.2g}, found {found:g}",
+    "beyond-limit": "expected numbers within ±{limit:.2g}, found {found:g}",
     "found-no-key": "no such key",
-    "record-person": "expected a person with names and values, found {found}",
-    "record-id": "expected a whole number, found {found}",
-    "record-id-limit": "expected less than {limit}, found {found}",
-    "record-lacks": "expected {expected:or}, found the keys {keys:list8}",
+    "record-person": "expected a person with named values, found {found}",
+    "record-id": "expected an integer, found {found}",
+    "record-id-limit": "expected an id below {limit}, found {found}",
+    "record-lacks": "expected {expected:or}, found keys {keys:list8}",
     "record-no-keys": "expected {expected:or}, found no keys",
     "record-numbers": "expected numbers, found {found}",
     "record-count": "expected {expected:#number}, found {found}",
     "record-odd": "expected {expected:#number}, found {found} among them",
     "record-lengths": "expected {expected:or} numbers, found {found}",
-    "record-vposer": "expected rotations, found {found} numbers, a code of VPoser that only its "
+    "record-vposer": "expected rotations, found {found} numbers, a VPoser code that only its "
     "network can decode: write full poses in EasyMocap",
     "record-rows": "expected rows of 3 or 4 numbers, found {found}",
     "record-other-rows": "expected rows of 3 or 4 numbers, found others",
     "record-no-rows": "expected rows of 3 or 4 finite numbers, found none",
     "record-most-points": "expected at most {most} keypoints, found {found}",
     "record-points": "expected {expected:#keypoint}, found {found}",
-    "record-unseen": "{n:#keypoint} without finite numbers, or of a confidence below 0, "
-    "{n:?counts|count} as not seen",
+    "record-unseen": "{n:#keypoint} with non-finite numbers or negative confidence, treated as not "
+    "visible",
 }

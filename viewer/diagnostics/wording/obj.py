@@ -1,14 +1,14 @@
 """Messages about ``.obj`` files and their material libraries."""
 
-_BACK = "-1 to {least}, found {found}"
-_EARLY = "after the first, found {found}"
-_RANGE = "1 to {limit}, found {found}"
-_NONE = "only where the file has one, found {found}"
+_BACK = "index from -1 to {least}, found {found}"
+_EARLY = "defined before this line, found {found}"
+_RANGE = "index from 1 to {limit}, found {found}"
+_NONE = "only if the file defines one, found {found}"
 
 MESSAGES = {
     "F002.obj-mesh": "expected a mesh, found no `v` line{looks:+ ({})}",
     "F002.obj-vertex": "v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found {found}",
-    "F002.obj-face": "f: expected {least} or more corners, found {found}",
+    "F002.obj-face": "f: expected at least {least} corners, found {found}",
     "F002.obj-zero": "f: expected an index from 1, found 0",
     "F002.obj-corner": "f: expected a corner v, v/vt, v//vn or v/vt/vn, found {found:quoted}",
     "F002.obj-v-back": f"f: expected a vertex {_BACK}",
@@ -23,20 +23,20 @@ MESSAGES = {
     "F002.obj-v-none": f"f: expected a vertex {_NONE}",
     "F002.obj-vt-none": f"f: expected a texture coordinate {_NONE}",
     "F002.obj-vn-none": f"f: expected a normal {_NONE}",
-    "F005.obj-texture": "a texture without vt lines: drawn untextured",
-    "F005.library": "material library {problem}; drawn without textures",
+    "F005.obj-texture": "texture without vt lines: drawn untextured",
+    "F005.library": "material library {problem}; drawn untextured",
     "F005.library-refused": "material library {name:text} {reason}",
-    "F005.mtl-materials": "{n:#material|is|are} in no library, first {material:text}: drawn "
-    "without a texture",
-    "F007.obj-colour": "the colour of {n:#vertex} is not used",
-    "F007.obj-w": "the w of {n:#vertex} is not used",
-    "F007.obj-lines": "{n:#line|is|are} not drawn",
-    "F007.obj-points": "{n:#point|is|are} not drawn",
-    "F007.obj-texcoords": "{n} texture coordinates that no face uses: left out",
-    "F007.obj-normals": "{n} normals that no face uses: left out",
-    "F007.obj-corners": "{n:#corner} of triangles without vt: {n:?it gets|they get} 0 0",
-    "F007.obj-hard-edges": "{n:#vertex|has|have} several normals, first {vertex}: "
-    "{n:?it gets|they get} the mean, so hard edges are drawn smooth",
+    "F005.mtl-materials": "{n:#material|is|are} not in any library (first: {material:text}): drawn "
+    "untextured",
+    "F007.obj-colour": "colours of {n:#vertex} ignored",
+    "F007.obj-w": "w of {n:#vertex} ignored",
+    "F007.obj-lines": "{n:#line} not drawn",
+    "F007.obj-points": "{n:#point} not drawn",
+    "F007.obj-texcoords": "omitted {n} texture coordinates not used by any face",
+    "F007.obj-normals": "omitted {n} normals not used by any face",
+    "F007.obj-corners": "{n:#triangle corner} without vt: 0 0 used",
+    "F007.obj-hard-edges": "{n:#vertex|has|have} several normals (first: vertex {vertex}): "
+    "averaged, so hard edges are drawn smooth",
 }
 
 PHRASES = {

@@ -1,13 +1,13 @@
-"""Messages about pictures, and about the files that textures name."""
+"""Messages about pictures and texture files."""
 
 MESSAGES = {
-    "F001.picture": "a picture that cannot be read: {reason:text}",
-    "F002.picture": "not a picture that can be read",
+    "F001.picture": "unreadable picture: {reason:text}",
+    "F002.picture": "unsupported or damaged picture",
     "F005.texture": "texture {problem}; drawn untextured",
     "F005.texture-refused": "texture {name:text} {reason}",
 }
 
 PHRASES = {
-    "outside-folder": "lies outside the folder: not read",
-    "absolute-path": "is an absolute path: not followed, not read",
+    "outside-folder": "is outside the folder: not read",
+    "absolute-path": "is an absolute path: not read",
 }

@@ -1,14 +1,14 @@
 """Messages about ``.rig`` files."""
 
 MESSAGES = {
-    "F002.rig-empty": "expected a skeleton or a skin, found no name of a file",
+    "F002.rig-empty": "expected a skeleton or a skin, found no file name",
     "F002.rig-item": "expected skeleton, skin or morphs, found {found:quoted}",
     "F002.rig-word": 'expected "{expected}", found {found:quoted}',
     "F002.rig-morphs": "morphs: expected {expected:#file}, found {found}",
-    "F002.rig-name": "{item}: expected the name of a file, found {found:quoted}",
-    "F002.rig-outside": "{item}: expected a file below the folder of the .rig, found "
+    "F002.rig-name": "{item}: expected a file name, found {found:quoted}",
+    "F002.rig-outside": "{item}: expected a file within the folder of the .rig, found "
     "{found:quoted}",
-    "F006.rig-after": "ignored what follows the rig, {found:quoted}",
+    "F006.rig-after": "ignored data after the rig, starting with {found:quoted}",
 }
 
 PHRASES: dict[str, str] = {}

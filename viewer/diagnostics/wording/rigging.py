@@ -1,12 +1,14 @@
-"""Messages about meshes that get the rig of a template."""
+"""Messages about transferring the rig of a template to a mesh."""
 
 from viewer.diagnostics.codes import Code
 
 CODES = {
-    "R001": Code("note", "alignment of the template", "none if the template lies on the target"),
+    "R001": Code(
+        "note", "alignment of the template", "none if the template coincides with the target"
+    ),
     "R002": Code(
         "warning",
-        "doubtful alignment",
+        "unreliable alignment",
         "give --up, --facing or landmarks, or pose the template like the target",
     ),
     "R003": Code("note", "fitted pose and proportions", "none if they match the target"),
@@ -19,7 +21,7 @@ CODES = {
     "R006": Code(
         "warning", "few matched vertices", "check the alignment or allow a larger distance"
     ),
-    "R007": Code("note", "rigid part", "none if the part is stiff"),
+    "R007": Code("note", "rigid part", "none if the part is rigid"),
     "R008": Code("note", "transferred joints", "none if they lie inside the limbs"),
     "R009": Code("warning", "joints outside the mesh", "check the alignment or move the joints"),
     "R010": Code(
@@ -32,61 +34,62 @@ CODES = {
 }
 
 MESSAGES = {
-    "R001.alignment": "alignment: {how}; scale {scale:.6g}{factors}, turned by {angle:.2f} "
-    "degrees, shift ({x:z.4g}, {y:z.4g}, {z:z.4g})",
-    "R001.boxes": "alignment: boxes; the target scaled along x, y, z by {x:.4g}, {y:.4g}, {z:.4g}",
+    "R001.alignment": "alignment: {how}; scale {scale:.6g}{factors}, rotation {angle:.2f} degrees, "
+    "translation ({x:z.4g}, {y:z.4g}, {z:z.4g})",
+    "R001.boxes": "alignment: bounding boxes; target scaled along x, y, z by {x:.4g}, {y:.4g}, "
+    "{z:.4g}",
     "R001.error": "alignment error: {error:.3f} % of the target's size (RMS of the best 90 %; "
     "template to target {away:.3f} %)",
-    "R002.error": "the alignment is doubtful, above {limit:g} %: give --up, --facing or "
+    "R002.error": "unreliable alignment, error above {limit:g} %: give --up, --facing or "
     "landmarks, or pose the template like the target",
-    "R003.gap": "that leaves {gap}",
-    "R003.not-fitted": "pose: not fitted, as that would leave {gap}",
-    "R003.pose": "pose: the template's joints turned to fit, {joint:text} by {angle:.0f} degrees; "
-    "its limbs resized, {limb:text} by {change:+z.0f} % in length",
-    "R003.proportions": "proportions: the template stretched by {scales}, pose kept",
-    "R004.gap": "that leaves {gap}: is the template of the same kind as the target?",
-    "R004.not-fitted": "pose: not fitted, as that would leave {gap}, with {joint:text} turned by "
-    "{angle:.0f} degrees: is the template of the same kind as the target?",
-    "R004.stretched-along-its-axes": "stretched by {scales}, the template fits much better, with "
-    "a gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, fit proportions",
-    "R004.stretched-along-the-target": "stretched by {scales}, the template fits much better, "
-    "with a gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, ask for it "
-    "(--scale axes)",
-    "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all have the weights of the "
+    "R003.gap": "result: {gap}",
+    "R003.not-fitted": "pose: not fitted, as that would give {gap}",
+    "R003.pose": "pose: template joints rotated to fit, at most {joint:text} by {angle:.0f} "
+    "degrees; limbs resized, at most {limb:text} by {change:+z.0f} % in length",
+    "R003.proportions": "proportions: template stretched by {scales}, pose kept",
+    "R004.gap": "poor fit: {gap}; use a template of the same kind as the target",
+    "R004.not-fitted": "pose: not fitted, as that would give {gap}, with {joint:text} rotated by "
+    "{angle:.0f} degrees; use a template of the same kind as the target",
+    "R004.stretched-along-its-axes": "the template fits much better stretched by {scales}, with a "
+    "gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, fit proportions",
+    "R004.stretched-along-the-target": "the template fits much better stretched by {scales}, with "
+    "a gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use --scale axes",
+    "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all take the weights of the "
     "nearest vertex",
-    "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), filled in {filled}",
+    "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {filled}",
     "R005.nearest": "nearest vertex within the limit for {n} of {all} vertices",
-    "R005.negative-weights": "negative weights of the template that count as 0: {n}",
-    "R005.reversed": "{n:#part} of the target {n:?faces|face} the other way than the template: "
-    "matched as if turned round",
-    "R005.solver": "the weights that were filled in needed another solver: {method}",
-    "R006.matched": "less than {limit:.0%} of the target meets the template: check the "
-    "alignment, or allow a larger distance",
-    "R007.more-parts": "and so do {n:#smaller part}",
-    "R007.part": "a part of {n:#vertex} at vertex {vertex} meets the template nowhere: it moves "
+    "R005.negative-weights": "negative weights of the template treated as 0: {n}",
+    "R005.reversed": "{n:#part} of the target with winding opposite to the template: matched with "
+    "reversed normals",
+    "R005.solver": "weights inpainted with the fallback solver: {method}",
+    "R006.matched": "less than {limit:.0%} of the target matches the template: check the alignment "
+    "or allow a larger distance",
+    "R007.more-parts": "{n:#smaller part} also {n:?moves|move} rigidly",
+    "R007.part": "part of {n:#vertex} at vertex {vertex} without a match in the template: moves "
     "rigidly, mostly with joint {joint:text}",
-    "R008.aligned": "joints: those of the template, aligned",
-    "R008.copied": "joints: those of the template, copied",
-    "R008.limits-widened": "limits of {joint:text} widened to hold the target's pose",
-    "R008.transferred": "joints: {n} of {all} carried by {by}{missed}{without}",
-    "R009.joints": "outside the mesh: {names:list8}",
-    "R010.vertices": "{n} vertices bent too far to be undone exactly, smoothed: {vertices:list8}",
-    "R011.residual": "posed again, the mesh is off by at most {residual:.2e} of its size",
-    "R012.residual": "that is more than {limit:g}",
-    "R013.correctives": "pose correctives of the template: left out",
-    "R013.correctives-too-large": "pose correctives of the template: left out, too large for this "
+    "R008.aligned": "joints: aligned with the template",
+    "R008.copied": "joints: copied from the template",
+    "R008.limits-widened": "limits of {joint:text} widened to include the target's pose",
+    "R008.transferred": "joints: {n} of {all} transferred using {by}{missed}{without}",
+    "R009.joints": "joints outside the mesh: {names:list8}",
+    "R010.vertices": "{n} vertices bent too far to invert the skinning exactly, smoothed: "
+    "{vertices:list8}",
+    "R011.residual": "after posing, the mesh differs from the target by at most {residual:.2e} of "
+    "its size",
+    "R012.residual": "this error is above {limit:g}",
+    "R013.correctives": "pose correctives of the template omitted",
+    "R013.correctives-too-large": "pose correctives of the template omitted: too large for this "
     "many vertices",
-    "R013.shapes": "not carried over: {n} shape directions of the template",
-    "R014.unit": "unit, judged by size: {unit}",
-    "R014.unit-unknown": "unit, judged by size: not known, much larger or smaller than the "
-    "template",
-    "R014.wound": "wound inside out, and turned round in the result: {n} triangles",
+    "R013.shapes": "{n} shape directions of the template not transferred",
+    "R014.unit": "unit, estimated from the size: {unit}",
+    "R014.unit-unknown": "unit unknown: much larger or smaller than the template",
+    "R014.wound": "inside-out winding, reversed in the result: {n} triangles",
 }
 
 PHRASES = {
-    "aligned-as-it-is": "the target lies on the template as it is",
-    "aligned-in-place": "the template is scaled and turned about the origin that both share",
-    "aligned-by-search": "found by closest points",
+    "aligned-as-it-is": "the target already coincides with the template",
+    "aligned-in-place": "the template is scaled and rotated about the shared origin",
+    "aligned-by-search": "found by matching closest points",
     "aligned-by-landmarks": "from the landmarks",
     "aligned-as-given": "as given",
     "aligned-by-fit": "found by fitting pose and proportions",
@@ -94,9 +97,9 @@ PHRASES = {
     "own-factors": " (along the template's x, y, z: {x:.4g}, {y:.4g}, {z:.4g})",
     "scales-along-its-axes": "{x:.4g}, {y:.4g}, {z:.4g} along its own x, y and z",
     "scales-along-the-target": "{x:.4g}, {y:.4g}, {z:.4g} along the target's x, y and z",
-    "gap": "a gap of {after:.3f} % of the size, before {before:.3f} %",
+    "gap": "a gap of {after:.3f} % of the size, {before:.3f} % before",
     "by-joint-regressor": "the joint regressor",
-    "by-boundaries": "the boundaries of the joints' regions",
+    "by-boundaries": "the boundaries of their regions",
     "joints-missed": "; too little of the target around {names:list8}",
     "joints-without-boundary": "; {n} without such a boundary moved with their parents",
 }

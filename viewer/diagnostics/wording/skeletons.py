@@ -4,34 +4,32 @@ from viewer.diagnostics.codes import Code
 
 CODES = {
     "S001": Code("error", "parent after its child", "list joints parents first"),
-    "S002": Code("error", "cycle of parents", "give one of these joints another parent"),
-    "S003": Code("error", "limit with its minimum above its maximum", "swap the two numbers"),
+    "S002": Code("error", "cyclic hierarchy", "give one of these joints another parent"),
+    "S003": Code("error", "limit with minimum above maximum", "swap the two numbers"),
     "S004": Code("warning", "pose outside its limits", "widen the limit or change the pose"),
     "S005": Code("note", "locked DOFs", "none if these joints should not move"),
     "S006": Code(
-        "warning", "joints with the same name", "rename them: many programs match joints by name"
+        "warning", "duplicate joint names", "rename them: many programs match joints by name"
     ),
-    "S007": Code(
-        "warning", "joints without a name", "name them: many programs match joints by name"
-    ),
+    "S007": Code("warning", "unnamed joints", "name them: many programs match joints by name"),
     "S008": Code(
-        "note", "several roots", "give them a common parent for programs that expect one root"
+        "note", "multiple roots", "give them a common parent for programs that expect a single root"
     ),
-    "S009": Code(
-        "warning", "rest rotation that is not a unit quaternion", "normalise the quaternion"
-    ),
-    "S010": Code("warning", "rest scale of 0 or less", "freeze the scale of this joint"),
+    "S009": Code("warning", "non-unit rest rotation", "normalise the quaternion"),
+    "S010": Code("warning", "non-positive rest scale", "freeze the scale of this joint"),
 }
 
 MESSAGES = {
-    "S004.clamped": "{n:#DOF}, {dof}: clamped",
+    "S004.clamped": "{n:#DOF} clamped: {dof}",
     "S004.pose": "{n:#DOF} of the pose {n:?is outside its|are outside their} limits: {dof}",
     "S005.dofs": "{n:#DOF/{all}|is|are} locked: {names:list}",
-    "S006.joints": "{n:#joint} share their names with others: {names:list}",
-    "S007.joints": "{n:#joint|has|have} no name, first joint {joint}",
+    "S006.joints": "{n:#joint} with duplicate names: {names:list}",
+    "S007.joints": "{n:#joint|has|have} no name (first: joint {joint})",
     "S008.roots": "{n} joints have no parent: {names:list}",
-    "S009.rotations": "{n:#rest rotation|is|are} not of length 1, {joint:text} has {length:.4g}",
-    "S010.scales": "{n:#rest scale|is|are} 0 or less, {joint:text} has {x:zg} {y:zg} {z:zg}",
+    "S009.rotations": "{n:#rest rotation|is|are} not normalised (first: length {length:.4g} at "
+    "{joint:text})",
+    "S010.scales": "{n:#rest scale|is|are} not positive (first: {x:zg} {y:zg} {z:zg} at "
+    "{joint:text})",
 }
 
 PHRASES = {
