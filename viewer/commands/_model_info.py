@@ -88,7 +88,7 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
         if strongest(figure) > count:
             pruned = Skinning(max_influences=count, correctives=skinning.correctives)
             largest = float(compute("cut", figure, pose, pruned).max())
-            effects[f"pruned to {count} influences"] = largest
+            effects[f"cut to {count} influences"] = largest
     for name, text in (("normalized", "normalised weights"), ("correctives", "pose correctives")):
         effects[text] = float(compute(name, figure, pose, skinning).max())
     first, *others = (METHODS[name].short for name in PURE)
