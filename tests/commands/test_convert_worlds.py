@@ -48,7 +48,9 @@ def convert(*arguments):
 
 def test_world_that_hangs_is_announced_when_it_is_judged(hanging, smpl):
     scene = viewer.load(smpl, hanging)
-    told = f"{hanging}: taken for -y up, judged by the people, so all is turned over; --up sets it"
+    told = (
+        f"{hanging}: -y up, estimated from the poses, so everything is flipped; --up overrides it"
+    )
     assert told in scene.warnings
     assert scene.up == "y"
     assert_allclose(scene.actors[0].placement[:3, :3], OVER, atol=1e-12)
@@ -103,5 +105,5 @@ def test_motion_that_does_not_say_what_is_up_is_judged_by_its_people(smpl, tmp_p
     np.savez(tmp_path / "m.npz", poses=poses, trans=np.zeros((4, 3)), fps=np.array(25))
     scene = viewer.load(smpl, tmp_path / "m.npz")
     assert scene.up == "z"
-    told = f"{tmp_path / 'm.npz'}: taken for z up, judged by the people; --up sets it"
+    told = f"{tmp_path / 'm.npz'}: z up, estimated from the poses; --up overrides it"
     assert told in scene.warnings

@@ -414,7 +414,7 @@ def test_the_wasp_walks_in_and_out(shared: Path, tmp_path: Path) -> None:
     found, _ = write(animation, tmp_path)
     assert_places(found, animation)
     clip, notes = retarget(bvh.read(Source.open(tmp_path / "out.bvh")), actor.figure)
-    assert str(notes[0]).endswith("moves 23 of 23 joints of wasp")
+    assert str(notes[0]).endswith("drives 23 of 23 joints of wasp")
     again = sample_animation(Actor(actor.figure, clip=clip))
     np.testing.assert_allclose(joints_of(again), joints_of(animation), atol=1e-6)
 
