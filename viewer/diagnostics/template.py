@@ -59,7 +59,7 @@ class _Formatter(Formatter):
         if kind == "?":
             one, many = rest.split("|")
             return one if value == 1 else many
-        if kind == "+":
+        if kind == "+" and _PLACE in rest:  # otherwise the sign of a number
             # ``{}`` inside the specification has been replaced by the placeholder by now.
             return rest.replace(_PLACE, printable(value, 300)) if value else ""
         if not format_spec and isinstance(value, str) and value != _PLACE:
@@ -103,7 +103,7 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "text": printable,
     "name": _name,
     "axes": _axes,
-    "all": lambda names: ", ".join(map(printable, names)),
+    "all": lambda names: ", ".join(map(printable, names)) or "none",
     "or": _alternatives,
 }
 _FORMATTER = _Formatter()
