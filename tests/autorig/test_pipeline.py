@@ -218,7 +218,7 @@ def test_joint_outside_the_target_is_told():
     assert rigged.outside == (0, 1)
     (outside,) = [line for line in rigged.lines if line.code == "R009"]
     assert outside.places.tolist() == [0, 1] and outside.values == {"names": ["base", "tip"]}
-    assert outside.labelled == "warning: outside the mesh: base, tip"
+    assert outside.labelled == "warning: joints outside the mesh: base, tip"
 
 
 @pytest.mark.parametrize(

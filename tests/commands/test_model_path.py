@@ -112,14 +112,14 @@ def test_unknown_name_lists_what_is_there(folder, capsys):
     line = refused(capsys, "info", "smplx:male", "--model-path", str(folder))
     names = ", ".join(sorted(FILES.values()))
     assert line == (
-        f"smplx:male: no such file, and no such model in {folder.resolve()}; models there: {names}"
+        f"smplx:male: no such file or model in {folder.resolve()}; available models: {names}"
     )
 
 
 def test_empty_folder_says_so(tmp_path, capsys):
     (tmp_path / "empty").mkdir()
     line = refused(capsys, "info", "smplx", "--model-path", str(tmp_path / "empty"))
-    assert line.endswith("; models there: none")
+    assert line.endswith("; available models: none")
 
 
 def test_without_a_folder_a_name_is_a_missing_file(capsys):
@@ -237,7 +237,7 @@ def test_body_stands_beside_other_files(folder, capsys):
 def test_unknown_name_among_many_comes_with_the_nearest(folder, capsys, monkeypatch):
     monkeypatch.setattr("viewer.commands._scene._MOST_MODELS", 2)
     line = refused(capsys, "info", "smplx:femal", "--model-path", str(folder))
-    assert "; did you mean smplx:female" in line and "models there" not in line
+    assert "; did you mean smplx:female" in line and "available models" not in line
 
 
 def test_unknown_name_of_a_model_that_draws_captures_lists_what_is_there(
@@ -246,4 +246,4 @@ def test_unknown_name_of_a_model_that_draws_captures_lists_what_is_there(
     motion = tmp_path / "motion.npz"
     np.savez(motion, poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), mocap_framerate=30.0)
     line = refused(capsys, "info", str(motion), "--model", "smplx:mal", "--model-path", str(folder))
-    assert "models there: " in line and "smplx:neutral" in line
+    assert "available models: " in line and "smplx:neutral" in line

@@ -66,10 +66,10 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ("arms.skel --shape 1", "--shape: arms has 0 shape coefficients, found 1"),
         ("twist.skin --shape 1", "--shape: no file has a skeleton"),
         # Poses
-        ("smpl.npz --pose 1,2,3", "--pose: expected 72 pose numbers for smpl, found 3"),
-        ("mano.npz --pose 1,2,3", "--pose: expected 48 pose numbers for mano, found 3"),
-        ("pig --pose 1,2", "--pose: expected 22 pose numbers for pig, found 2"),
-        ("arms.skel --pose 1", "--pose: expected 18 pose numbers for arms, found 1"),
+        ("smpl.npz --pose 1,2,3", "--pose: expected 72 pose values for smpl, found 3"),
+        ("mano.npz --pose 1,2,3", "--pose: expected 48 pose values for mano, found 3"),
+        ("pig --pose 1,2", "--pose: expected 22 pose values for pig, found 2"),
+        ("arms.skel --pose 1", "--pose: expected 18 pose values for arms, found 1"),
         ("smpl.npz --pose 1,,2", f'--pose: {NUMBERS_WANTED} "1,,2"'),
         ("smpl.npz --pose 1-2", f'--pose: {NUMBERS_WANTED} "1-2"'),
         ("twist.skin --pose 1,2", "--pose: no file has a skeleton"),
@@ -93,9 +93,9 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ("arms.skel --dof left.x=far", '--dof: expected a number after "=", found "left.x=far"'),
         (
             "arms.skel --dof figure.scale=0",
-            "--dof: scale: expected more than 0, found 0",
+            "--dof: scale: expected a positive number, found 0",
         ),
-        ("arms.skel --dof figure.scale=-1", "--dof: scale: expected more than 0, found -1"),
+        ("arms.skel --dof figure.scale=-1", "--dof: scale: expected a positive number, found -1"),
         (
             "arms.skel --dof figure.scale=big",
             '--dof: expected a number after "=", found "figure.scale=big"',
@@ -201,7 +201,7 @@ def test_pose_numbers_beyond_limits_are_clamped_and_told(folder, capsys):
     (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 }")
     actor, notes = described(capsys, "hinge.skel", "--pose", "0,0,0,2,0,0")
     assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
-    assert notes == ["warning: 1 DOF of the pose was beyond its limits and clamped"]
+    assert notes == ["warning: 1 DOF of the pose clamped to its limits"]
 
 
 def test_the_figure_is_placed(folder, capsys):
@@ -299,9 +299,12 @@ def test_mistyped_key_beside_others_is_a_warning_with_its_line(folder, capsys):
 
 
 @pytest.mark.parametrize(
-    ("text", "found"), [("[]", "an empty list"), ("[{}]", "a list of 1"), ("[[1, 2]]", "a list of")]
+    ("text", "found"),
+    [("[]", "an empty list"), ("[{}]", "a list of length 1"), ("[[1, 2]]", "a list of")],
 )
 def test_pose_file_with_a_list_is_refused_as_a_pose(folder, capsys, text, found):
     (folder / "list.json").write_text(text)
     message = refused(capsys, "smpl.npz", "--pose", "list.json")
-    assert message.startswith("list.json:1: expected a pose (an object with names), found " + found)
+    assert message.startswith(
+        "list.json:1: expected a pose (an object with named values), found " + found
+    )

@@ -11,7 +11,7 @@ import pytest
 
 import viewer
 from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase, wording
-from viewer.diagnostics.template import fields
+from viewer.diagnostics.template import fields, rendered
 from viewer.diagnostics.wording import PHRASES
 
 ROOT = Path(viewer.__file__).parent
@@ -89,3 +89,12 @@ def test_no_key_is_in_two_tables() -> None:
     for name in ("CODES", "MESSAGES", "PHRASES"):
         keys = [key for table in wording.TABLES for key in getattr(table, name, ())]
         assert len(keys) == len(set(keys)) > 0
+
+
+def test_a_sign_is_no_condition() -> None:
+    assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 4.0, "more": ""}) == "+4 %"
+    assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 0.0, "more": "a"}) == "+0 %; a"
+
+
+def test_no_names_are_none() -> None:
+    assert rendered("{names:all}, {names:list}", {"names": []}) == "none, none"

@@ -91,7 +91,7 @@ def template(text: str) -> str:
             )
         elif kind == "?":
             shown += rest.partition("|")[2]
-        elif kind == "+":
+        elif kind == "+" and "{}" in rest:
             shown += f"[{rest.replace('{}', value)}]"
         else:
             shown += value

@@ -37,7 +37,7 @@ def within_text(found: float, limit: float = FARTHEST) -> Phrase:
     """Return the phrase "expected …, found …" for a number that is too large or not finite.
 
     >>> str(within_text(1e20)), str(within_text(float("inf")))
-    ('expected numbers up to 1e+09, found 1e+20', 'expected finite numbers, found inf')
+    ('expected numbers within ±1e+09, found 1e+20', 'expected finite numbers, found inf')
     """
     if not np.isfinite(found):
         return Phrase("not-finite", found=float(found))

@@ -48,7 +48,7 @@ def refused_text(name: str) -> Phrase:
     """Return the reason why ``referenced_path`` gives no path, to follow the file's name.
 
     >>> str(refused_text("../a.png")), str(refused_text("/home/a.png"))
-    ('lies outside the folder: not read', 'is an absolute path: not followed, not read')
+    ('is outside the folder: not read', 'is an absolute path: not read')
     """
     is_absolute = _is_absolute(name.replace("\\", "/"))
     return Phrase("absolute-path") if is_absolute else Phrase("outside-folder")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,6 +11,7 @@ from numpy.testing import assert_allclose
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
 from viewer.app.shown_panels import ShownPanels
+from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.motion.body_motion import BodyMotion
@@ -256,7 +259,13 @@ def test_error_while_reading_is_said_and_the_scene_stays(streaming):
     def parts():
         for part in good.parts():
             if part.stop > 20:
-                raise FormatError("take/000020.json", "cannot be read: Input/output error")
+                raise FormatError(
+                    Diagnostic(
+                        "F001.unreadable",
+                        Path("take/000020.json"),
+                        values={"reason": "Input/output error", "near": ""},
+                    )
+                )
             yield part
 
     streaming.start(Capture("bad", 100, 0, parts, up="y"))

@@ -118,7 +118,7 @@ def test_scales_of_axes_keep_the_pose():
 def test_stretched_target_gets_a_scale_along_each_axis(own):
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
-    whose, cure = "the target's", "ask for it (--scale axes)"
+    whose, cure = "the target's", "use --scale axes"
     rotation = np.eye(3)
     if own:
         whose, cure = "its own", "fit proportions"
@@ -129,13 +129,13 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     wanted = rotation @ np.diag([1.3, 1.0, 0.8])
     assert_allclose(found.alignment.similarity.linear, wanted, atol=0.005)
     assert [re.sub(r"[\d.]+", "N", str(line)) for line in found.lines] == [
-        f"proportions: the template stretched by N, N, N along {whose} x, y and z, pose kept",
-        "that leaves a gap of N % of the size, before N %",
+        f"proportions: template stretched by N, N, N along {whose} x, y and z, pose kept",
+        "result: a gap of N % of the size, N % before",
     ]
     unfitted, _ = aligned(figure, target, fits=False)
     (line,) = unfitted.lines
     found = re.fullmatch(
-        rf"warning: stretched by (.+) along {whose} x, y and z, the template fits much better, "
+        rf"warning: the template fits much better stretched by (.+) along {whose} x, y and z, "
         rf"with a gap of 0\.\d+ % instead of \d\.\d+ %: if the target was stretched, (.+)",
         line.labelled,
     )
@@ -170,18 +170,18 @@ def fit_of(figure, pose, angle):
 @pytest.mark.parametrize(
     ("target", "reached", "lines"),
     [
-        (1.5, 1.38, ("warning: pose: not fitted, as that would leave a gap of G % of the size, "
-                     "before G %, with tip turned by 79 degrees: is the template of the same kind "
-                     "as the target?",)),
-        (0.9, 0.7, ("pose: the template's joints turned to fit, tip by 40 degrees; its limbs "
-                    "resized, base by +0 % in length",
-                    "warning: that leaves a gap of G % of the size, before G %: is the template of "
-                    "the same kind as the target?")),
-        (1.5, 1.5, ("pose: the template's joints turned to fit, tip by 86 degrees; its limbs "
-                    "resized, base by +0 % in length",
-                    "that leaves a gap of G % of the size, before G %")),
-        (1.5, 0.1, ("pose: not fitted, as that would leave a gap of G % of the size, "
-                    "before G %",)),
+        (1.5, 1.38, ("warning: pose: not fitted, as that would give a gap of G % of the size, "
+                     "G % before, with tip rotated by 79 degrees; use a template of the same kind "
+                     "as the target",)),
+        (0.9, 0.7, ("pose: template joints rotated to fit, at most tip by 40 degrees; limbs "
+                    "resized, at most base by +0 % in length",
+                    "warning: poor fit: a gap of G % of the size, G % before; use a template of "
+                    "the same kind as the target")),
+        (1.5, 1.5, ("pose: template joints rotated to fit, at most tip by 86 degrees; limbs "
+                    "resized, at most base by +0 % in length",
+                    "result: a gap of G % of the size, G % before")),
+        (1.5, 0.1, ("pose: not fitted, as that would give a gap of G % of the size, "
+                    "G % before",)),
     ],
 )  # fmt: skip
 def test_fit_that_leaves_a_gap_is_doubted_or_left(monkeypatch, target, reached, lines):

@@ -187,28 +187,33 @@ def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
 @pytest.mark.parametrize(
     ("scale", "angle", "words"),
     [
-        (1.0, 0.0, "the target lies on the template as it is; scale 1, turned by 0.00 degrees"),
+        (
+            1.0,
+            0.0,
+            "the target already coincides with the template; scale 1, rotation 0.00 degrees",
+        ),
         (
             1000.0,
             np.pi / 2,
-            "the template is scaled and turned about the origin that both share; scale 1000, "
-            "turned by 90.00 degrees",
+            "the template is scaled and rotated about the shared origin; scale 1000, "
+            "rotation 90.00 degrees",
         ),
     ],
 )
 def test_lines_of_a_shared_origin_say_whether_anything_was_done(scale, angle, words):
     similarity = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
     lines = alignment_lines(Alignment(similarity, 0.0, 0.0, (0.0, 0.0), "in place"))
-    assert str(lines[0]) == f"alignment: {words}, shift (0, 0, 0)"
+    assert str(lines[0]) == f"alignment: {words}, translation (0, 0, 0)"
 
 
 def test_lines_tell_everything_and_warn_of_a_bad_fit():
     similarity = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
     lines = alignment_lines(Alignment(similarity, 0.05, 0.1, (0.05, 0.1), "search"))
     assert [line.labelled for line in lines] == [
-        "alignment: found by closest points; scale 2, turned by 90.00 degrees, shift (1, 0, -2)",
+        "alignment: found by matching closest points; scale 2, rotation 90.00 degrees, "
+        "translation (1, 0, -2)",
         "alignment error: 5.000 % of the target's size (RMS of the best 90 %; template to target "
         "10.000 %)",
-        "warning: the alignment is doubtful, above 3 %: give --up, --facing or landmarks, or pose "
+        "warning: unreliable alignment, error above 3 %: give --up, --facing or landmarks, or pose "
         "the template like the target",
     ]
