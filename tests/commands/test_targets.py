@@ -180,5 +180,7 @@ def test_another_picture_of_a_skin_stays(inputs, folder, refuse):
     """A ``.skin`` names its pictures, so another one cannot give way."""
     (folder / "cloth1.png").write_bytes(b"precious")
     for more in ([], ["--force"]):
-        refuse(into(folder, converting(inputs)["a pose as p.skel"]) + more, "cloth1.png: another")
+        refuse(
+            into(folder, converting(inputs)["a pose as p.skel"]) + more, "cloth1.png: a different"
+        )
         assert contents(folder) == {"cloth1.png": b"precious"}

@@ -487,7 +487,7 @@ def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
     assert state.of(Rigging).placing.fitted is not None
     texts.clear()
     hand.step()
-    assert any(text.startswith("pose: the template's joints turned") for text in texts)
+    assert any(text.startswith("pose: template joints rotated") for text in texts)
     ghost = hand.app.frame.renderer.ghost
     shown = apply_transform(ghost.placement, ghost.figure.mesh.positions)
     own = apply_transform(ghost.placement, deform(actor.figure, actor.pose)[0])
