@@ -65,6 +65,7 @@ def test_commands_have_the_options_that_pages_use(page: str, line: str) -> None:
     parser.parse_intermixed_args(words)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_python_runs_as_it_is_printed(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
