@@ -14,14 +14,13 @@ from numpy.typing import ArrayLike
 from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
-from viewer.formats._numbers import LARGEST, is_too_large, word_begins
-from viewer.phrases import quoted
+from viewer.formats._numbers import word_begins
 from viewer.rig.arrays import Ints
 
 if TYPE_CHECKING:
     from viewer.formats._archive.values import Archive
 
-__all__ = ["MAX_SIZE", "Source", "no_number", "read_bytes"]
+__all__ = ["MAX_SIZE", "Source", "read_bytes"]
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
@@ -201,11 +200,8 @@ class Source:
         FormatError
             Immediately, if the collector does not keep errors.
         """
-        self._keep(self._diagnostic(key, offset, values), count, part, places)
-
-    def _keep(self, found: Diagnostic, count: int, part: Part, places: ArrayLike | None) -> None:
-        indices = None if places is None else _indices(places)
-        found = replace(found, is_refusal=True, count=count, part=part, places=indices)
+        found = self._diagnostic(key, offset, values, count, part, places)
+        found = replace(found, is_refusal=True)
         if not self.diagnostics.keeps_errors:
             raise FormatError(found)
         self.diagnostics.add(found)
@@ -232,13 +228,20 @@ class Source:
         **values : object
             Values in the message.
         """
-        found = self._diagnostic(key, offset, values)
-        indices = None if places is None else _indices(places)
-        self.diagnostics.add(replace(found, count=count, part=part, places=indices))
+        self.diagnostics.add(self._diagnostic(key, offset, values, count, part, places))
 
-    def _diagnostic(self, key: str, offset: int | None, values: dict[str, Any]) -> Diagnostic:
+    def _diagnostic(
+        self,
+        key: str,
+        offset: int | None,
+        values: dict[str, Any],
+        count: int = 1,
+        part: Part = "",
+        places: ArrayLike | None = None,
+    ) -> Diagnostic:
         line = None if offset is None else self.line(offset)
-        return Diagnostic(key, self.path, line, values=values)
+        indices = None if places is None else _indices(places)
+        return Diagnostic(key, self.path, line, part, indices, values, count)
 
     @property
     def warnings(self) -> list[str]:
@@ -300,16 +303,3 @@ def _without_marks(data: bytes) -> bytes:
     if data.startswith(_ANY_END):
         return data
     return data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)
-
-
-def no_number(word: bytes | None) -> str:
-    """Return "expected a number, found …"; the word is None at the end of the file.
-
-    >>> no_number(b"up"), no_number(b"1e300")
-    ('expected a number, found "up"', 'expected a number below 3.4e+38, found "1e300"')
-    """
-    if word is None:
-        return "expected a number, found the end of the file"
-    # A number that is too large is well-formed, so the message gives the limit.
-    below = f" below {LARGEST:.1e}" if is_too_large(word) else ""
-    return f"expected a number{below}, found {quoted(word)}"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.wording import PLACES
 from viewer.errors import ViewerError
 from viewer.lint._finding import Finding
 
@@ -14,17 +15,6 @@ __all__ = ["CHECKED", "of_diagnostic", "of_error", "of_refusal"]
 
 CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
 """Codes of warnings that checks of the scene report again, with all locations."""
-
-_FIELDS = {
-    "positions": "vertices",
-    "weights": "vertices",
-    "triangles": "triangles",
-    "bindings": "joints",
-    "joints": "joints",
-    "items": "joints",
-    "frames": "frames",
-}
-"""Fields of a finding for each part of a diagnostic."""
 
 
 def of_error(problem: ViewerError, path: Path | None = None) -> Finding:
@@ -43,7 +33,7 @@ def of_refusal(problem: ViewerError, path: Path) -> Finding:
 
 def of_diagnostic(found: Diagnostic) -> Finding:
     """Return a reader's diagnostic as a finding."""
-    field = _FIELDS.get(found.part)
+    field = PLACES.get(found.part)
     if field is None or found.places is None:
         return Finding(found)
     places: dict[str, Any] = {field: found.places}
