@@ -52,16 +52,20 @@ class Lights:
     key, rim : Light
         A warm one from the front, a cool one from behind the other side.
     ambient : float
-        Light from everywhere.
+        Strength of the ambient light.
+    sky, ground : (r, g, b)
+        Colours of the ambient light on surfaces that face up and down, linear.
     specular, shininess : float
         Strength and exponent of the Blinn-Phong highlight.
     follow_camera : bool
         Whether the directions rotate with the camera.
     """
 
-    key: Light = field(default_factory=lambda: Light(-38.0, 38.0, (1.0, 0.80, 0.56), 1.0))
-    rim: Light = field(default_factory=lambda: Light(106.0, 14.0, (0.22, 0.46, 1.0), 1.6))
-    ambient: float = 0.16
+    key: Light = field(default_factory=lambda: Light(-42.0, 40.0, (1.0, 0.86, 0.68), 1.05))
+    rim: Light = field(default_factory=lambda: Light(114.0, 16.0, (0.30, 0.54, 1.0), 1.15))
+    ambient: float = 0.26
+    sky: Color = (0.76, 0.88, 1.0)
+    ground: Color = (0.44, 0.36, 0.31)
     specular: float = 0.18
     shininess: float = 32.0
     follow_camera: bool = True

@@ -55,14 +55,16 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 
 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
-    """Set the uniforms of ``shade/phong.glsl`` that the program kept."""
+    """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program kept."""
     pair = (lights.key, lights.rim)
     directions = [_direction(light, lights.follow_camera, view) for light in pair]
     colors = [[light.strength * channel for channel in light.color] for light in pair]
     values = {
         "u_light_directions": np.array(directions, dtype="f4").tobytes(),
         "u_light_colors": np.array(colors, dtype="f4").tobytes(),
-        "u_ambient": lights.ambient,
+        "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)]),
+        "u_sky": tuple(lights.ambient * channel for channel in lights.sky),
+        "u_ground": tuple(lights.ambient * channel for channel in lights.ground),
         "u_specular": lights.specular,
         "u_shininess": max(lights.shininess, 1.0),
     }
