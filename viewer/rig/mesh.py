@@ -20,7 +20,7 @@ __all__ = [
     "volume",
 ]
 
-_ROW = 64  # points reduced side by side
+_ROW = 64  # points per row of a reduction, see bounding_box
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,7 +212,7 @@ def volume(positions: Floats, triangles: Ints) -> float:
     >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)
     0.166666666667
     """
-    # Tetrahedra start at the mean, so that a small hole changes the sum little.
+    # All tetrahedra share the mean as a corner, so that a small hole changes the sum only slightly.
     centered = positions - positions.mean(axis=0)
     a, b, c = (centered[triangles[:, corner]] for corner in range(3))
     return float(np.einsum("ta,ta->", a, np.cross(b, c)) / 6.0)

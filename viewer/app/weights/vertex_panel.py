@@ -210,7 +210,7 @@ def _draw_dual(sheet: _Sheet, dual: DualTerms) -> None:
     imgui.separator_text("Dual quaternions")
     for index, values in enumerate(dual.duals):
         flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
-        imgui.text_wrapped(f"q{index + 1}: weight {dual.shares[index]:.{_DIGITS}f}{flip}")
+        imgui.text_wrapped(f"q{index + 1}: weight {dual.fractions[index]:.{_DIGITS}f}{flip}")
         _draw_quaternions(sheet, f"dual {index}", values)
     imgui.text_wrapped("q = sum of weight times q, negated as above")
     _draw_quaternions(sheet, "blended", dual.blended)

@@ -18,8 +18,8 @@ from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["VertexFacts", "facts_text", "nearest_corner", "vertex_facts"]
 
-_LONGEST = 40  # letters of a name
-_MOST = 8  # influences that are listed one by one
+_LONGEST = 40  # characters of a name
+_MOST = 8  # influences that are listed individually
 
 
 @dataclass(frozen=True, slots=True, eq=False)
