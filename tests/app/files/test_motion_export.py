@@ -115,7 +115,7 @@ def test_everybody_is_written_a_file_each_as_convert_names_them(crowd, tmp_path)
         "walk-2.bvh",
     ]
     assert frames_of(tmp_path / "walk-0.bvh") == 21
-    assert crowd.says("captured points are not written: face4 0")
+    assert crowd.says("captured points are not exported: face4 0")
 
 
 def test_only_the_chosen_actor_is_written_if_asked_for(crowd, tmp_path):
@@ -134,10 +134,10 @@ def test_nobody_there_in_the_range_is_said(drive, rig, tmp_path):
     finish(hand)
     assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk-0.bvh"]
     assert frames_of(tmp_path / "walk-0.bvh") == 11
-    assert hand.says("tiny 1: absent throughout the range, not written")
+    assert hand.says("tiny 1: absent throughout the range, not exported")
     hand.state.clock.set_range(5.0, 6.0)
     save_motion(hand.state, tmp_path / "none.bvh", everyone=True)
-    assert hand.state.error == ("everybody is absent in the playback range: nothing to write")
+    assert hand.state.error == ("all actors are absent in the playback range: nothing to export")
 
 
 def test_all_files_appear_or_none(crowd, tmp_path):

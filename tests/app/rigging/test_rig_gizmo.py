@@ -15,9 +15,9 @@ pytest.importorskip("scipy")
 
 from viewer.app.core.view_frame import view_frame
 from viewer.app.rigging.placing import (
+    aligned_template,
     as_similarity,
     ghost_place,
-    laid_template,
     move_by_hand,
     posed_template,
     similarity_now,
@@ -117,7 +117,7 @@ def test_ring_turns_the_template_about_its_middle(hand):
 
 @pytest.mark.parametrize("kind", ["factors", "own_factors"])
 def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
-    laid = laid_template(hand.state)
+    laid = aligned_template(hand.state)
     stretch = np.array([1.3, 1.0, 1.0]) / 1.3 ** (1 / 3)
     straight = replace(similarity(hand), rotation=np.eye(3), **{kind: stretch})
     move_by_hand(hand.state, laid, straight)
@@ -159,7 +159,7 @@ def test_moved_template_keeps_its_fitted_pose_and_not_the_gap_it_left(hand):
     finish(hand)
     pose, gap = hand.state.of(Rigging).placing.lines
     assert (pose.key, gap.key) == ("R003.pose", "R003.gap")
-    laid = laid_template(hand.state)
+    laid = aligned_template(hand.state)
     away = translation_matrix(np.array([2.5, 0.0, 0.0])) @ similarity_now(hand.state, laid).matrix
     move_by_hand(hand.state, laid, as_similarity(away))
     assert hand.state.of(Rigging).placing.lines == (pose,)

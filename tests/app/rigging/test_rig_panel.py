@@ -70,7 +70,7 @@ def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
     hand.menu("menu Window", "Rig")
     texts.clear()
     hand.step(2)
-    assert "Every mesh in the scene has a rig: add one without, an .obj or .ply." in texts
+    assert "Every mesh in the scene has a rig: add a mesh without one, .obj or .ply." in texts
     for label in ("Align", "Run", "Compare methods", "rig tool move"):
         hand.click(label)
     assert hand.state.job is None and hand.state.of(Rigging).tool == "" and not hand.state.error
@@ -137,7 +137,7 @@ def test_template_posed_after_aligning_says_so(rigging, texts):
     hand.state.scene.actors[1].pose.dofs[8] = 0.0
     texts.clear()
     hand.step(2)
-    assert "the template has been posed since: align again" in texts
+    assert "the template was posed after the alignment: align it again" in texts
 
 
 def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
@@ -151,7 +151,7 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
     finish(hand)
     state = hand.state
     assert (state.options.shading, state.options.scalar) == ("scalar", "class:match")
-    assert state.of(Rigging).match_share == 1.0 and state.error == ""
+    assert state.of(Rigging).match_fraction == 1.0 and state.error == ""
     fields = {field.name: field for field in state.scene.actors[0].figure.fields}
     assert fields["match"].names == ("matched", "unmatched")
     assert fields["match"].values.tolist() == [0.0] * state.scene.actors[0].figure.mesh.n_vertices
@@ -176,7 +176,7 @@ def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
     assert hand.state.of(Rigging).choices.max_distance == pytest.approx(0.01)
     hand.click("Show match")
     finish(hand)
-    assert hand.state.of(Rigging).match_share < 0.35
+    assert hand.state.of(Rigging).match_fraction < 0.35
 
 
 def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):

@@ -54,7 +54,7 @@ class Snapshot:
     options : DisplayOptions
         Display settings of the scene.
     time : float
-        Seconds of the scene's clock.
+        Time of the scene's clock, seconds.
     kept : object or None
         A feature's value that is undone with the scene; compared by identity.
     """
@@ -87,7 +87,7 @@ def same_pose(old: Pose | None, new: Pose | None) -> bool:
 
 
 def is_current(snapshot: Snapshot, scene: Scene, options: DisplayOptions) -> bool:
-    """Return whether the scene and its display are unchanged, ignoring the template."""
+    """Return whether the scene and its display are unchanged, ignoring the feature's value."""
     if snapshot.options != options:
         return False
     if [*map(id, snapshot.actors)] != [*map(id, scene.actors)]:

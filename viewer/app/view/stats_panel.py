@@ -1,4 +1,4 @@
-"""Stats: how large the scene is, how long a frame takes, and who draws it."""
+"""Stats panel: size of the scene, duration of a frame, and renderer."""
 
 from __future__ import annotations
 

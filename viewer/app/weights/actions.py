@@ -154,9 +154,7 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
     """
     figure = state.scene.actors[actor].figure
     if not figure.is_attached:
-        state.say_status(
-            "This figure has no skin that follows a skeleton: no influences to explain"
-        )
+        state.say_status("This figure has no skin attached to a skeleton: no influences to explain")
         return
     state.of(Weights).pinned = Pinned(actor, figure, vertex)
     set_open(state, "vertex", True)
