@@ -17,10 +17,11 @@ from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
 from viewer.commands._view import camera_of
-from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.interrupts import hold, poll
 from viewer.media.video_kinds import VIDEOS
+from viewer.phrases import printable
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.commands._frame_numbers import Numbering, numbering_of
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Scene
 
