@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
+from viewer.phrases import printable
 
 __all__ = ["Bools", "Bytes", "Deferred", "Floats", "Ints", "frozen"]
 

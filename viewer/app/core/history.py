@@ -9,20 +9,20 @@ from typing import Protocol
 
 from viewer.app.core.snapshot import (
     Snapshot,
-    copied_poses,
     have_same_motion,
     is_current,
     is_same,
+    key_of,
     look_of,
     restore_display,
     restore_motion,
-    same_pose,
+    restored_pose,
 )
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.pose import Pose
+from viewer.rig.pose import PoseKey
 from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = ["History", "Undoable"]
@@ -72,7 +72,7 @@ class History:
     feature: Undoable | None = None
     _seen: Snapshot | None = None  # state of the last frame
     _before: Snapshot | None = None  # state before an edit in progress
-    _clocked: dict[Actor, tuple[Motion, float, Pose | None]] = field(default_factory=dict)
+    _clocked: dict[Actor, tuple[Motion, float, PoseKey | None]] = field(default_factory=dict)
     _undo: list[_Step] = field(default_factory=list)
     _redo: list[_Step] = field(default_factory=list)
 
@@ -123,7 +123,7 @@ class History:
         if self._seen is None:
             return
         actors = self._seen.actors  # other actors may have been added since
-        poses = copied_poses(actors)
+        poses = tuple(map(key_of, actors))
         self._seen = replace(self._seen, poses=poses, by_hand=(False,) * len(poses), time=time)
         self._clocked = {
             actor: (actor.clip, actor.offset, pose)
@@ -225,8 +225,9 @@ class History:
         rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
         for actor, pose, is_own in rows:
             if is_own and pose is not None:
-                actor.pose = pose.copy()
-        self._seen = replace(restored, poses=copied_poses(restored.actors), time=time)
+                actor.pose = restored_pose(pose)
+        poses = tuple(map(key_of, restored.actors))
+        self._seen = replace(restored, poses=poses, time=time)
 
     def _replace(self, change: Callable[[Snapshot], Snapshot]) -> None:
         """Replace every stored state."""
@@ -238,13 +239,14 @@ class History:
 
     def _take(self, scene: Scene, options: DisplayOptions) -> Snapshot:
         actors = tuple(scene.actors)
-        poses, by_hand = copied_poses(actors), tuple(map(self._is_by_hand, actors))
+        poses = tuple(map(key_of, actors))
+        by_hand = tuple(map(self._is_by_hand, actors, poses))
         looks, shown = tuple(map(look_of, actors)), copy.deepcopy(options)
         # An edit belongs to the time of the poses: the clock may have advanced already.
         time = (scene.time or 0.0) if self._seen is None else self._seen.time
         return Snapshot(actors, poses, by_hand, looks, shown, time, self._kept())
 
-    def _is_by_hand(self, actor: Actor) -> bool:
+    def _is_by_hand(self, actor: Actor, now: PoseKey | None) -> bool:
         """Return whether an actor's pose differs from the one that the clock set from its clip.
 
         A new clip overrides the pose in the same frame.
@@ -252,7 +254,7 @@ class History:
         clip, offset, pose = self._clocked.get(actor, (None, 0.0, None))
         if clip is None or clip is not actor.clip or offset != actor.offset:
             return False
-        return not same_pose(pose, actor.pose)
+        return pose != now
 
     def _kept(self) -> object | None:
         return None if self.feature is None else self.feature.kept()

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.errors import printable
 from viewer.formats import FORMATS
+from viewer.phrases import printable
 
 __all__ = ["PICTURES", "FileDialog", "folder_of"]
 

@@ -14,8 +14,8 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.state import Files
-from viewer.errors import printable
 from viewer.formats import FORMATS
+from viewer.phrases import printable
 
 __all__ = ["draw_file_dialog"]
 

@@ -18,9 +18,9 @@ from viewer.app.files.motion_export import (
     save_motion,
 )
 from viewer.app.files.state import Files
-from viewer.errors import printable
 from viewer.export import EXPORTERS
 from viewer.formats import file_stem
+from viewer.phrases import printable
 
 __all__ = ["ask_for_motion"]
 

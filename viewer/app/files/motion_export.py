@@ -8,7 +8,7 @@ from pathlib import Path
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
@@ -18,6 +18,7 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
+from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.formats import check_targets
+from viewer.phrases import printable
 
 __all__ = ["save_files"]
 

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.scene import Actor

@@ -25,7 +25,7 @@ from viewer.app.posing.figure_place import draw_figure_place
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose, reset_pose
 from viewer.app.posing.state import Posing
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size

@@ -12,9 +12,10 @@ from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.state import Comparison, Result, Rigging
 from viewer.autorig.rigged import clip_for
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import check_targets
+from viewer.phrases import printable
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import Pairs

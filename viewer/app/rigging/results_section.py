@@ -26,9 +26,9 @@ from viewer.app.rigging.results import (
 )
 from viewer.app.rigging.sources import no_results
 from viewer.app.rigging.state import Result, Rigging
-from viewer.errors import printable
 from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of
 from viewer.formats import file_stem
+from viewer.phrases import printable
 
 __all__ = ["draw_results"]
 

@@ -37,8 +37,8 @@ from viewer.app.rigging.sources import (
 from viewer.app.rigging.state import RigChoices, Rigging, Template
 from viewer.app.rigging.work import start_adding, start_match, start_reading, start_run
 from viewer.autorig.settings import JOINTS, METHODS
-from viewer.errors import printable
 from viewer.formats import MESHES
+from viewer.phrases import printable
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, actor_points, free_title

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from viewer.app.core.state import AppState
 from viewer.app.rigging.state import Rigging, Template
-from viewer.errors import RigError, one_of, printable
+from viewer.errors import RigError
 from viewer.formats import MESHES
 from viewer.loading import bundled_body, bundled_files, load
+from viewer.phrases import one_of, printable
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 

@@ -40,8 +40,9 @@ from viewer.app.rigging.steps import (
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import METHODS
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
 from viewer.loading import load
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import surface_point
 from viewer.rig.mesh import Mesh

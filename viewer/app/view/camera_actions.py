@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from viewer.app.core.fitting import fit_again, fit_shown
 from viewer.app.core.state import AppState
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, look_from
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.inspection.front import Front

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider
 from viewer.app.view.camera_actions import face, fit_view, look, look_through, toggle_projection
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.camera import VIEWS, front_azimuth
 from viewer.rig.inspection.front import front_axes
 from viewer.rig.mesh import box_size

@@ -18,7 +18,7 @@ from viewer.app.core.widgets import (
 from viewer.app.view.display_actions import show
 from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import SHOWN
 from viewer.rendering.part_colors import part_colors

@@ -18,7 +18,8 @@ from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.hover_text import tells_vertices
 from viewer.app.weights.state import Hover, Weights, wants_vertex
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.picking import Pick
 from viewer.rendering.renderer import Renderer

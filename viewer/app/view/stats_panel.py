@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.scene import Scene

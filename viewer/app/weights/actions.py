@@ -6,7 +6,7 @@ from viewer.app.core.state import AppState
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.shown_panels import is_open, set_open
 from viewer.app.weights.state import Pinned, Weights
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.inspection.explanation import Explanation, explain
 from viewer.rig.pose import pose_key
 from viewer.rig.scalars import (

@@ -14,7 +14,8 @@ from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.weights.actions import explained, toggle_picking, unpin
 from viewer.app.weights.explanation_lines import influence_colors
 from viewer.app.weights.state import Weights
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.explanation import DualTerms, Explanation
 from viewer.rig.inspection.explanation_text import explanation_text

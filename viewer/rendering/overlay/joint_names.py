@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Labels
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT, JointMarks
 from viewer.rig.skeleton import joint_labels

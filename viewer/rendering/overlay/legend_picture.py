@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.overlay.legend import Legend
 from viewer.rendering.overlay.legend_columns import legend_columns
 from viewer.rig.arrays import Bytes

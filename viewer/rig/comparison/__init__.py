@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from viewer.errors import counted
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.comparison.difference import Difference, Measure, Tally
 from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance

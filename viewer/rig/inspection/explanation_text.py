@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.explanation import DualTerms, Explanation
 from viewer.rig.number_text import number_text

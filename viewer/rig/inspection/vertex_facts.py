@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.single_vertices import check_vertices, deform_vertices

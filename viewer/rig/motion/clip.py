@@ -8,7 +8,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from viewer.errors import RigError, counted
+from viewer.errors import RigError
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 

@@ -21,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
