@@ -31,7 +31,8 @@ from viewer.formats._texture import load_image
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
 
 __all__ = ["read"]
 
@@ -258,7 +259,7 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     if len(named) > 1:
         source.warn("F007.ply-textures", named[1][1], n=len(named))
     name, offset = named[0]
-    return (Material(name, name, load_image(source, name, offset)),)
+    return (Material(name, Texture(name, load_image(source, name, offset))),)
 
 
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:

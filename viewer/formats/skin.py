@@ -44,7 +44,8 @@ from viewer.media.saving import as_words, save_text
 from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh, vertex_normals
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin
 
 __all__ = ["read", "write"]

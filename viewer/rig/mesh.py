@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Bytes, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.material import Material
 
 __all__ = [
-    "Material",
     "Mesh",
     "bounding_box",
     "box_size",
@@ -21,31 +21,6 @@ __all__ = [
 ]
 
 _ROW = 64  # points per row of a reduction, see bounding_box
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Material:
-    """The surface appearance of some triangles.
-
-    Attributes
-    ----------
-    name : str
-        As in the file; triangles refer to materials by index.
-    texture : str or None
-        File name of the picture, relative to the figure's folder.
-    image : (H, W, 4) uint8 or None
-        Pixels of the picture, sRGB with alpha, first row at v = 1; None if it could not be read.
-    """
-
-    name: str = ""
-    texture: str | None = None
-    image: Bytes | None = None
-
-    def __post_init__(self) -> None:
-        if self.image is not None:
-            object.__setattr__(
-                self, "image", frozen("image", self.image, (None, None, 4), np.uint8)
-            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +42,8 @@ class Mesh:
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
+    second_uvs : (U, 2) or None
+        Another texture coordinate for each row of ``uvs``, for textures that name this set.
     """
 
     positions: Floats
@@ -76,6 +53,7 @@ class Mesh:
     materials: tuple[Material, ...] = ()
     triangle_materials: Ints | None = None
     uv_triangles: Ints | None = None
+    second_uvs: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -87,6 +65,9 @@ class Mesh:
         if self.uvs is not None:
             rows = self.n_vertices if self.uv_triangles is None else None
             put("uvs", frozen("uvs", self.uvs, (rows, 2)))
+        if self.second_uvs is not None:
+            rows = 0 if self.uvs is None else len(self.uvs)
+            put("second_uvs", frozen("second_uvs", self.second_uvs, (rows, 2)))
         if self.uv_triangles is not None:
             shape = (self.n_triangles, 3)
             put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))

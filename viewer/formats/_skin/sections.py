@@ -14,7 +14,7 @@ from viewer.formats._skin.rows import OffsetOf, read_rows, whole_corners
 from viewer.formats._skin.weights import read_weights
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bytes, Floats, Ints
-from viewer.rig.mesh import Material
+from viewer.rig.material import Material
 
 __all__ = ["Sections", "TriangleRun", "check_declared", "read_sections"]
 
