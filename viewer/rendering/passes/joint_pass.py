@@ -1,4 +1,4 @@
-"""Draws a skeleton: one box per joint, instances of a small cube."""
+"""Pass that draws skeletons: one box per joint, as instances of a cube."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
-_CUBE_SIZE = 0.015  # of a skeleton without boxes
+_CUBE_SIZE = 0.015  # of the skeleton's size, for a skeleton without boxes
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
 
@@ -40,7 +40,7 @@ class SkeletonBuffers:
         self._key: NumberKey | None = None
 
     def is_current(self, pose: Pose) -> bool:
-        """Return whether the joints' matrices are those of a pose."""
+        """Return whether the uploaded joint matrices belong to a pose."""
         return self._key == pose.skinning_key
 
     def update(self, pose: Pose) -> None:
@@ -55,7 +55,7 @@ class SkeletonBuffers:
         if key == self._key:
             return
         skeleton = shaped(self.figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # shaping keeps it
+        assert skeleton is not None  # applying a shape keeps the skeleton
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy())
         self._key = key
 
@@ -72,7 +72,7 @@ class JointPass:
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -94,9 +94,9 @@ class JointPass:
         Parameters
         ----------
         skeleton : SkeletonBuffers
-            Already updated.
+            Updated buffers.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         options : DisplayOptions
@@ -104,10 +104,10 @@ class JointPass:
         selected : int
             The joint to highlight, -1 for none.
         opacity : float
-            Below 1 the boxes are one translucent layer over everything drawn before: boxes
-            often enclose the skin, and would hide it.
+            Below 1 the boxes are drawn as one translucent layer over everything else: they often
+            enclose the skin and would hide it.
         color : (r, g, b), optional
-            Of all boxes, linear; a colour for each joint if omitted.
+            Colour of all boxes, linear; by default each joint has its own colour.
         """
         overlays = opacity < 1.0
         view = in_front(view) if overlays else view
@@ -115,7 +115,7 @@ class JointPass:
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_boxes, program, skeleton.boxes, *how)
         if overlays:
-            # Only the nearest boxes count: the others would show through them.
+            # Draw only the nearest surface, so that other boxes do not show through.
             draw_nearest(self.context, draw)
         else:
             draw()
@@ -135,7 +135,7 @@ def draw_boxes(
     opacity: float = 1.0,
     color: Color | None = None,
 ) -> None:
-    """Draw boxes that were moved to where they belong."""
+    """Draw boxes whose matrices are already uploaded."""
     set_model(program, view, placement, boxes.center)
     set_lights(program, view, options.lights)
     values = {
@@ -155,7 +155,7 @@ def draw_boxes(
 
 
 def _joint_boxes(skeleton: Skeleton) -> Floats:
-    """Return the joints' boxes, small cubes if no file gave any: (J, 2, 3)."""
+    """Return the joints' boxes, small cubes if the skeleton has none: (J, 2, 3)."""
     if skeleton.boxes is not None:
         return skeleton.boxes
     points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
