@@ -15,7 +15,7 @@ from viewer.diagnostics.phrase import Phrase
 def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return diagnostics in order, each kind merged into its first.
 
-    Two are of one kind if they have the same message, file, part and names: values of type ``str``
+    Two are of the same kind if message, file, part and names are equal: values of type ``str``
     are names, while numbers and text of a file (``bytes``) may differ.
     """
     kinds: dict[tuple[object, ...], list[Diagnostic]] = {}

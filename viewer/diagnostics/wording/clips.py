@@ -40,7 +40,8 @@ MESSAGES = {
     "C012.points": "{n:#keypoint/{all}|is|are} never visible: {names:list}",
     "C013.heights": "feet rest at {n:#height} ({levels:list}): ground height unclear, feet not "
     "checked",
-    "C013.no-height": "feet rest at no height long enough: ground height unclear, feet not checked",
+    "C013.no-height": "feet never rest long enough at one height: ground height unclear, "
+    "feet not checked",
 }
 
 PHRASES = {

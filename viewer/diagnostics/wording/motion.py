@@ -34,7 +34,7 @@ PHRASES = {
     "ratio-of-legs": "leg lengths",
     "ratio-of-arms": "arm lengths",
     "ratio-of-bones": "bone lengths",
-    "ratio-of-nothing": "nothing",
+    "ratio-of-nothing": "unknown lengths",
     "left-moves": "joint translations",
     "left-place": "figure translation",
     "left-size": "figure scale",
