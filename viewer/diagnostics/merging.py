@@ -28,7 +28,7 @@ def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
 
 def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
     for name, value in sorted(values.items()):
-        if isinstance(value, Phrase):
+        if isinstance(value, Phrase | Diagnostic):
             yield (name, value.key, *_names(value.values))
         elif isinstance(value, str):
             yield name, value
