@@ -22,8 +22,8 @@ from viewer.rig.mesh import vertex_normals
 pytestmark = pytest.mark.slow
 
 POSITIONS, TRIANGLES = tube()
-# A quarter of the usual number: a search takes a quarter of the time.
-SAMPLES = 500
+# An eighth of the usual number: a search takes far less time.
+SAMPLES = 250
 TEMPLATE = Posed(POSITIONS, TRIANGLES)
 
 
