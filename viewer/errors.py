@@ -51,6 +51,11 @@ class ViewerError(Exception):
         # Names of joints, figures and files come from files and may contain any character.
         super().__init__(self._line(problem))
 
+    @property
+    def cause(self) -> str | Diagnostic:
+        """The fault as data if it is known, else the line: a value for another diagnostic."""
+        return self.diagnostic or str(self)
+
     def _line(self, problem: str | Diagnostic) -> str:
         return str(problem)
 

@@ -64,12 +64,6 @@ def box(drive_body):
 
 
 @pytest.fixture
-def quick_fits(monkeypatch):
-    """Fits take a quarter of the usual time, and are nearly as good."""
-    monkeypatch.setattr("viewer.autorig.alignment.surface_alignment.SAMPLES", 500)
-
-
-@pytest.fixture
 def texts(monkeypatch):
     """What panels write as plain text, in the order of writing; empty the list to read anew."""
     written = []

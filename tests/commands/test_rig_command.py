@@ -21,7 +21,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
 
 @pytest.fixture(scope="module")

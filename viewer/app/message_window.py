@@ -6,7 +6,13 @@ from imgui_bundle import imgui
 
 from viewer.app.core.messages import Message, message_line
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, explain, same_line_if_room
+from viewer.app.core.widgets import (
+    begin_window,
+    button,
+    checkbox,
+    explain,
+    same_line_if_room,
+)
 from viewer.phrases import printable
 
 __all__ = ["draw_error", "draw_message_window"]
@@ -22,20 +28,11 @@ def draw_message_window(state: AppState) -> None:
     """Draw the window if it is open."""
     if not state.messages.is_open:
         return
-    size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
-    room = (
-        min(_SIZE[0] * size, 0.95 * viewport.size.x),
-        min(_SIZE[1] * size, 0.9 * viewport.size.y),
-    )
-    imgui.set_next_window_size(room, imgui.Cond_.appearing)
-    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
-    flags |= imgui.WindowFlags_.no_collapse
-    shown, stays = imgui.begin(_TITLE, True, flags)
+    shown, stays = begin_window(_TITLE, _SIZE)
     if shown:
         _draw_content(state)
     imgui.end()
-    state.messages.is_open = bool(stays)
+    state.messages.is_open = stays
 
 
 def _draw_content(state: AppState) -> None:

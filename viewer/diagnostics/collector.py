@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from viewer.diagnostics.diagnostic import Diagnostic
 
-_MOST = 100  # warnings of one file; more would not be read
+_MOST = 100  # warnings kept per file, as nobody reads more
 
 
 class Collector:
@@ -33,7 +33,7 @@ class Collector:
         return len(self._found)
 
     def add(self, found: Diagnostic) -> None:
-        """Keep an error, or a warning that is not kept yet."""
+        """Record an error, or a warning that has not been recorded yet."""
         if found.is_refusal:
             self._found.append(found)
             return

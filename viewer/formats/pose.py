@@ -8,7 +8,7 @@
             "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …], "up": "y",
             "dof_layout": word}
     .npz   the same arrays, dof_names and dofs apart
-    .txt   the model's own numbers, separated by blanks: 190 for PIG, 72 for SMPL …
+    .txt   the model's own numbers, separated by white space: 190 for PIG, 72 for SMPL …
 
 ``joint_turns`` are rotations as quaternions in the figure's axes, for figures with other DOFs than
 ``dof_layout`` names. Figures with the same DOFs use ``dofs``, edited or not, and the transforms
@@ -67,7 +67,8 @@ _BESIDES = (
     "markers_latent latent_labels markers_latent_vids"
 )
 _NOT_NEEDED = _BESIDES.split()  # keys of pose and motion files that posing does not need
-_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)  # here J x 3 numbers are one pose, not J frames
+# Keys whose J x 3 numbers are one pose rather than J frames.
+_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _VERSION = 1
 
 

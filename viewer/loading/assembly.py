@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -150,8 +151,8 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
         else:
             if problem is None:
                 raise RigError(Diagnostic("F004.morph-alone", path))
-            values = {"problem": str(problem)}
-            raise RigError(Diagnostic("F004.morph", path, values=values))
+            found = problem.diagnostic
+            raise problem if found is None else RigError(replace(found, path=path))
 
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:

@@ -165,7 +165,7 @@ def _give_body_motion(
     try:
         clip, notes = body_clip(motion, model)
     except RigError as problem:
-        values = {"problem": str(problem)}
+        values = {"problem": problem.cause}
         raise RigError(Diagnostic("F004.model", path, values=values)) from None
     cast.diagnostics += [replace(note, path=path) for note in notes]
     actor = Actor(model, clip=clip, called=cast.free_title(motion.name))

@@ -82,7 +82,7 @@ def give_skeleton_motion(
         try:
             clip, notes = retarget(motion, model)
         except RigError as problem:
-            values = {"problem": str(problem)}
+            values = {"problem": problem.cause}
             raise RigError(Diagnostic("F004.model", path, values=values)) from None
         cast.diagnostics += [replace(note, path=path) for note in notes]
         called = cast.free_title(motion.figure.name)
@@ -122,14 +122,14 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 
 def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
     """Assign a motion to the first figure with a mesh and no clip that it fits, if any."""
-    refusal = ""
+    refusal: str | Diagnostic = ""
     for actor in cast.actors:
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:
             actor.clip, notes = retarget(motion, actor.figure)
         except RigError as problem:
-            refusal = refusal or str(problem)
+            refusal = refusal or problem.cause
             continue
         actor.placement = placement @ actor.placement
         cast.diagnostics += [replace(note, path=path) for note in notes]

@@ -95,7 +95,8 @@ def test_figure_without_skeleton_is_refused():
     figure = Figure("bust", mesh([[0, 0, 0]]))
     with pytest.raises(RigError) as caught:
         apply_record(PoseRecord(), figure, rest_pose(skeleton([-1])))
-    assert str(caught.value) == "figure bust has no skeleton to pose"
+    assert caught.value.diagnostic.key == "F004.pose"
+    assert caught.value.diagnostic.values == {"figure": "bust"}
 
 
 @pytest.mark.parametrize("kind", ["smpl", "smplh", "smplx", "mano", "flame"])

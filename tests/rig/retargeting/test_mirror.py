@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 
+from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.pose import joint_rotations, rest_pose
@@ -238,32 +239,33 @@ def test_asymmetry_needs_a_map():
     assert str(caught.value) == "figure twin has no symmetry map"
 
 
-def refused(figure) -> str:
+def refused(figure):
     with pytest.raises(RigError) as caught:
         mirror_pose(figure, rest_pose(figure.skeleton))
-    return str(caught.value)
+    return caught.value.diagnostic.key, caught.value.diagnostic.values["joint"]
 
 
 def test_skeleton_that_is_not_symmetric_is_refused():
     places = PLACES.copy()
     places[5, 1] += 0.2
     bones = ball_skeleton(NAMES, PARENTS, places)
-    message = " has no partner on the other side: the skeleton is not symmetric"
-    assert refused(Figure("bent", skeleton=bones)) == f"l_elbow{message}"
+    assert refused(Figure("bent", skeleton=bones)) == ("F004.asymmetric", "l_elbow")
     lone = skeleton([-1, 0], offsets=[[0, 0, 0], [1, 0, 0]], names=["hips", "l_arm"])
-    assert refused(Figure("lone", skeleton=lone)) == f"l_arm{message}"
+    assert refused(Figure("lone", skeleton=lone)) == ("F004.asymmetric", "l_arm")
 
 
 def test_two_joints_for_one_partner_are_refused():
     places = [[0.0, 0, 0], [1, 0, 0], [1.01, 0, 0], [-1, 0, 0]]
     bones = ball_skeleton(("a", "b", "c", "d"), np.array([-1, 0, 0, 0]), np.array(places))
-    assert refused(Figure("double", skeleton=bones)).endswith("the skeleton is not symmetric")
+    key, joint = refused(Figure("double", skeleton=bones))
+    assert (key, joint) == ("F004.asymmetric", Phrase("two-joints"))
 
 
 def test_figure_without_skeleton_is_refused():
     with pytest.raises(RigError) as caught:
         joint_partners(Figure("bust", mesh([[0, 0, 0]])))
-    assert str(caught.value) == "figure bust has no skeleton to mirror"
+    assert caught.value.diagnostic.key == "F004.mirror"
+    assert caught.value.diagnostic.values == {"figure": "bust"}
 
 
 def test_mirrored_turn_of_the_hips_is_the_mirror_image_of_the_turn():

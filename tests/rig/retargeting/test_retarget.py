@@ -420,23 +420,31 @@ def test_equal_names_match_whatever_they_mean() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mapping", "message"),
+    ("mapping", "key", "values"),
     [
         (
             None,
-            "snake does not fit body: expected hips and a leg or an arm in both, found 0 joints "
-            "that match; unknown in snake: base, tail; in body: pelvis, left_hip, right_hip, "
-            "spine1, left_knee, right_knee, spine2, left_ankle and 12 more",
+            "F004.joints-unmatched",
+            {
+                "motion": "snake",
+                "figure": "body",
+                "n": 0,
+                "unused": ["base", "tail"],
+                "idle": list(BODY),
+            },
         ),
-        ({"tial": "head"}, 'the mapping names "tial", which snake does not have'),
-        ({"tail": "haed"}, 'the mapping names "haed", which body does not have'),
+        ({"tial": "head"}, "F004.mapping-joint", {"joint": "tial", "figure": "snake", "n": 0}),
+        ({"tail": "haed"}, "F004.mapping-joint", {"joint": "haed", "figure": "body", "n": 0}),
     ],
 )
-def test_what_does_not_fit_is_refused(mapping: dict[str, str] | None, message: str) -> None:
+def test_what_does_not_fit_is_refused(
+    mapping: dict[str, str] | None, key: str, values: dict[str, object]
+) -> None:
     snake = figure_of({"base": ("", (0, 0, 0)), "tail": ("base", (0, 0, 1))}, "snake")
     with pytest.raises(RigError) as caught:
         retarget(moving(snake), figure_of(BODY, "body"), mapping)
-    assert str(caught.value) == message
+    found = caught.value.diagnostic
+    assert found is not None and (found.key, found.values) == (key, values)
 
 
 def test_gaps_stay_where_they_are() -> None:

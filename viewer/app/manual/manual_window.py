@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import begin_menu, menu_item, note_item
+from viewer.app.core.widgets import begin_menu, begin_window, menu_item, note_item
 from viewer.app.manual.blocks import Block, blocks_of
 from viewer.errors import ViewerError
 from viewer.manual import PAGES, page_text
@@ -57,15 +57,7 @@ def draw_manual(state: AppState) -> None:
     manual = state.of(Manual)
     if not manual.topic:
         return
-    size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
-    room = (
-        min(_SIZE[0] * size, 0.95 * viewport.size.x),
-        min(_SIZE[1] * size, 0.9 * viewport.size.y),
-    )
-    imgui.set_next_window_size(room, imgui.Cond_.appearing)
-    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
-    shown, stays = imgui.begin("Manual", True, flags | imgui.WindowFlags_.no_collapse)
+    shown, stays = begin_window("Manual", _SIZE)
     if shown:
         _draw_topics(state, manual)
         imgui.same_line()

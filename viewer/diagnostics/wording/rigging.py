@@ -9,7 +9,7 @@ CODES = {
     "R002": Code(
         "warning",
         "unreliable alignment",
-        "give --up, --facing or landmarks, or pose the template like the target",
+        "specify --up, --facing or landmarks, or pose the template like the target",
     ),
     "R003": Code("note", "fitted pose and proportions", "none if they match the target"),
     "R004": Code(
@@ -40,7 +40,7 @@ MESSAGES = {
     "{z:.4g}",
     "R001.error": "alignment error: {error:.3f} % of the target's size (RMS of the best 90 %; "
     "template to target {away:.3f} %)",
-    "R002.error": "unreliable alignment, error above {limit:g} %: give --up, --facing or "
+    "R002.error": "unreliable alignment, error above {limit:g} %: specify --up, --facing or "
     "landmarks, or pose the template like the target",
     "R003.gap": "result: {gap}",
     "R003.not-fitted": "pose: not fitted, as that would give {gap}",

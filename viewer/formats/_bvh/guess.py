@@ -33,9 +33,9 @@ _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
 
 
 def frame_rate(source: Source, frame_time: bytes | None) -> float:
-    """Return frames a second: the standard rate that rounds to the frame time as written.
+    """Return frames per second: the standard rate that rounds to the frame time as written.
 
-    ``0.0333333`` is 30 a second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
+    ``0.0333333`` gives 30 per second, ``0.033367`` 30000/1001, ``0.1`` 10.
     """
     if frame_time is None:
         source.warn("F007.bvh-no-time", rate=DEFAULT_RATE)
@@ -108,7 +108,7 @@ def guess_up(
         As in ``SkeletonMotion.up_notes``; empty if y is up in the rest pose and in the frames.
     """
     skeleton = figure.skeleton
-    assert skeleton is not None  # the reader made it
+    assert skeleton is not None  # created by the reader
     names = canonical_names(skeleton.names, skeleton.parents)
     upper, lower = (
         [names.index(name) for name in part if name in names] for part in (_UPPER, _LOWER)

@@ -27,7 +27,7 @@ KEYS = (
 """Keys that are read; all are ignored if the first is missing."""
 
 _UPS = ("y", "z")
-_SHORTEST = 1e-6  # length of a quaternion; a shorter one has no reliable direction
+_SHORTEST = 1e-6  # length of a quaternion; a shorter one defines no reliable rotation
 _LONGEST_WORD = 200  # characters
 
 

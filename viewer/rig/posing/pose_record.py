@@ -175,7 +175,7 @@ def apply_record(
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(f"figure {figure.name} has no skeleton to pose")
+        raise RigError(Diagnostic("F004.pose", values={"figure": figure.name}))
     if record.turns is not None and not has_layout_of(record.turns, figure):
         work, notes = rotate_joints(record.turns, figure, pose)
         _take_over(work, pose)
