@@ -68,7 +68,7 @@ def open_capture(
     source : Source
         Output folder of EasyMocap, one of its subfolders, or a single frame file.
     frame_rate : float
-        Frames a second.
+        Frames per second.
     flat_hands : bool, optional
         Whether hand components exclude the mean hand; by default they do for SMPL-X and MANO, and
         do not for SMPL+H.
