@@ -106,7 +106,7 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
-    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` for options."""
+    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` as options."""
     joined: list[str] = []
     for argument in arguments:
         is_number = len(argument) > 1 and argument[0] == "-" and argument[1] in "0123456789."

@@ -1,4 +1,4 @@
-"""The exception hierarchy; callers catch at the level they need.
+"""Exception hierarchy; callers catch the level that they need.
 
 ::
 
@@ -106,6 +106,6 @@ class RenderError(ViewerError):
 
 
 class OutputError(ViewerError):
-    """A result could not be written; what was there before is untouched."""
+    """A result could not be written; the previous file is unchanged."""
 
     exit_code = 5

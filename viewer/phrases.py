@@ -10,7 +10,7 @@ _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 
 
 def printable(text: object, limit: int = 200) -> str:
-    r"""Return ``text`` on one line: control characters escaped, cut after ``limit`` characters.
+    r"""Return ``text`` on one line: control characters escaped, truncated to ``limit`` characters.
 
     >>> printable("two\nlines")
     'two\\nlines'

@@ -44,7 +44,7 @@ def test_reads_every_part() -> None:
     np.testing.assert_array_equal(skeleton.rest_translations, offsets)
     assert motion.clip.timing.frame_rate == 30.0
     assert motion.clip.timing.rows.tolist() == [0, 1]
-    assert ("frames", "2 at 30 a second") in motion.figure.facts
+    assert ("frames", "2 at 30 fps") in motion.figure.facts
 
 
 def test_joints_are_where_the_channels_put_them() -> None:

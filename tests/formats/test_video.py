@@ -194,8 +194,8 @@ def delays(path: Path) -> list[int]:
     [
         (25.0, [4] * 6, ""),
         (50.0, [2] * 6, ""),
-        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames a second on average"),
-        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames a second on average"),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames per second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames per second on average"),
     ],
 )
 def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
@@ -298,8 +298,8 @@ def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
     ("name", "rate", "quality", "words"),
     [
         ("x.mp4", 25.0, 101.0, "video quality: expected 0 to 100, found 101"),
-        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames a second, found 0"),
-        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames a second, found 60"),
+        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames per second, found 0"),
+        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames per second, found 60"),
     ],
 )
 def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words):

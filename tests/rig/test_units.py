@@ -6,12 +6,12 @@ import pytest
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import length_text, length_unit
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.units import METRES, SIZES, WORDS, is_metres, unit_of_scaled
+from viewer.rig.units import METRES, SIZES, UNIT_NAMES, is_metres, unit_of_scaled
 
 
 def test_factors_are_those_of_the_units():
     assert METRES == {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-    assert WORDS.keys() == METRES.keys() and SIZES.keys() < METRES.keys()
+    assert UNIT_NAMES.keys() == METRES.keys() and SIZES.keys() < METRES.keys()
 
 
 @pytest.mark.parametrize("unit", SIZES)

@@ -18,7 +18,7 @@ from viewer.rig.scene import Actor, Scene
 
 
 def check_frame_options(arguments: argparse.Namespace) -> None:
-    """Refuse a range of frames together with a single one.
+    """Check that a range of frames and a single one are not both given.
 
     Raises ViewerError if both are given.
     """

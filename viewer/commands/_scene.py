@@ -97,7 +97,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         help="show a BVH next to the figures instead of driving one",
     )
     group.add_argument(
-        "--fill-gaps", action="store_true", help="interpolate over the gaps of captures"
+        "--interpolate-gaps", action="store_true", help="interpolate over the gaps of captures"
     )
 
 

@@ -146,7 +146,7 @@ def _check_name(name: str) -> None:
 
 
 def _check_picture(output: Path) -> None:
-    """Refuse numbered pictures under the name of a video; a GIF may be either."""
+    """Check that numbered pictures do not have the name of a video; a GIF may be either."""
     suffix = output.suffix.lower()
     if suffix in VIDEOS and suffix not in PICTURES:
         raise UnsupportedFormatError(
@@ -244,7 +244,7 @@ def _recording(
         size,
         options,
         moves=shots.moves,
-        interpolate=arguments.fill_gaps,
+        interpolate=arguments.interpolate_gaps,
         turn=shots.turn,
         follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
     )

@@ -129,8 +129,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets([output], inputs, arguments.force)
     _print(arguments, rows, stream)
     if output is not None:
-        said = save_heat(heats, output, skinning)
-        print(said, file=sys.stderr if arguments.json else stream)
+        summary = save_heat(heats, output, skinning)
+        print(summary, file=sys.stderr if arguments.json else stream)
     if any(row.error for row in rows):
         return _UNREADABLE
     exceeds = tolerance is not None and any(row.exceeds(tolerance) for row in rows)
@@ -138,7 +138,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _checked_output(arguments: argparse.Namespace) -> Path | None:
-    """Refuse an invalid output picture before anything is compared."""
+    """Check the output picture before anything is compared."""
     if arguments.output is None:
         return None
     output = Path(arguments.output)

@@ -298,11 +298,11 @@ def test_lists_that_do_not_fit_the_skeleton_go_by_name() -> None:
     # Somebody took a joint out of the file's lists, and left the word that tells its DOFs.
     one = figure("ab", ["xyz", "x"], "cat")
     record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
-    named = record.turns
+    named = record.joint_rotations
     turns = replace(named, names=("a",), relative=named.relative[:1], shifts=named.shifts[:1],
                     rotations=np.array([[0, 0, 0, 1.0]]))  # fmt: skip
     found = posed(one, 0, 0, 0, 0.3)
-    notes = apply_record(replace(record, turns=turns), one, found)
+    notes = apply_record(replace(record, joint_rotations=turns), one, found)
     assert lines(notes) == ["transferred 1 of 1 joints of cat"]
     assert_allclose(found.dofs, [0.1, 0, 0, 0.3], atol=1e-12)
 

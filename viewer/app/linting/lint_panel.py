@@ -103,11 +103,11 @@ def _draw_limits(state: AppState) -> None:
         return
     view = state.of(Linting)
     options = view.options
-    turn = np.degrees(options.max_turn)
+    turn = np.degrees(options.max_rotation)
     moved = slider(state, "Largest rotation", turn, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
     explain("of a joint relative to its parent, between two frames")
     if moved != turn:
-        view.options = replace(view.options, max_turn=float(np.radians(max(moved, 0.0))))
+        view.options = replace(view.options, max_rotation=float(np.radians(max(moved, 0.0))))
     speed = options.max_speed or 0.0
     text = "%.2f units/s" if speed else "15 times its size"
     moved = slider(state, "Largest speed", speed, 0.0, _FASTEST, text)

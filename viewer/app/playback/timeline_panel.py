@@ -117,7 +117,7 @@ def _draw_settings(state: AppState) -> None:
     _draw_range(state)
     same_line_if_room("Interpolate gaps")
     gapless = no_gaps(state)
-    clock.fill_gaps = checkbox(state, "Interpolate gaps", clock.fill_gaps, gapless)
+    clock.interpolate_gaps = checkbox(state, "Interpolate gaps", clock.interpolate_gaps, gapless)
     text = "interpolate captures in their gaps, between the frames before and after"
     explain(text, gapless)
 

@@ -52,8 +52,8 @@ def amount(value: float, kind: str, difference: Difference) -> str:
         return f"{value:.4g}"
     if difference.unit in METRES:
         return f"{1000.0 * METRES[difference.unit] * value:.4g} mm"
-    share = 100.0 * value / difference.size if difference.size > 0.0 else math.nan
-    return f"{value:.4g} ({share:.3g} % of the size)"
+    percent = 100.0 * value / difference.size if difference.size > 0.0 else math.nan
+    return f"{value:.4g} ({percent:.3g} % of the size)"
 
 
 def lines_of(compared: Compared, tolerance: float | None) -> list[str]:

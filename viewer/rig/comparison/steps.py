@@ -132,7 +132,7 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
         mismatches.append(f"durations differ: {lasts[0]:.6g} s and {lasts[1]:.6g} s")
     notes = []
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
-        text = f"frame rates differ ({rates[0]:g} and {rates[1]:g} frames a second)"
+        text = f"frame rates differ ({rates[0]:g} and {rates[1]:g} fps)"
         notes.append(f"{text}: compared at that of the first")
     base = 0 if isinstance(clips[0], Clip) else clips[0].timing.first_frame
     last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
