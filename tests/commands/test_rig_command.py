@@ -79,7 +79,7 @@ def test_npz_opens_again_and_moves_as_the_template(folder, tmp_path, capsys):
     )
     with np.load(out) as arrays:
         assert arrays["field_0_values"].shape == (figure.mesh.n_vertices,)
-        assert arrays["field_0_names"].tolist() == ["matched", "filled", "rigid"]
+        assert arrays["field_0_names"].tolist() == ["matched", "inpainted", "rigid"]
         assert_allclose(arrays["alignment"][:3, :3], 100.0 * np.array([[0, 0, 1], [0, 1, 0],
                         [-1, 0, 0]]), atol=1e-9)  # fmt: skip
 

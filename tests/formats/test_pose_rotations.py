@@ -1,4 +1,4 @@
-"""Turns of joints in pose files: they come back to the bit, and broken ones are refused."""
+"""Joint rotations in pose files: bit-exact round trips, and refusal of invalid ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.retargeting.pose_transfer import JointRotations
 
 NAMES = ("root", "", "left knee", "knee", "knee")
 ROWS = np.array([[0.5, 0.5, 0.5, 0.5], [0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 1, 0, 0], [0, 0, -1, 0]])
-BENEATH = ROWS[::-1] / 3  # of any length: they come back as they are
+BENEATH = ROWS[::-1] / 3  # of any length: they are not normalised
 SHIFTS = np.arange(15.0).reshape(5, 3) / 7
 GOOD = {"dofs": {"a.x": 1.0}, "joint_names": ["a"], "joint_turns": [[0, 0, 0, 1]]}
 

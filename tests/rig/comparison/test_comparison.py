@@ -1,4 +1,4 @@
-"""Comparison of figures and motions: against differences that were put in by hand."""
+"""Comparison of figures and motions with known differences."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MIXED = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(1, 1.0)], [(0, 1.0)]]
 
 
 def arm(second=(1.0, 0.0, 0.0), low=-1.0):
-    """Two joints; the second, ``second`` away from the first, turns about z."""
+    """Two joints; the second, at distance ``second`` from the first, rotates about z."""
     return skeleton(
         [-1, 0], [(1, "z", 0.0, low, 1.0)], ("base", "tip"), np.array([[0.0, 0, 0], second])
     )
@@ -83,24 +83,24 @@ def test_weights_differ_by_the_l1_distance_of_rows_however_they_are_listed() -> 
     weights = measures(found)["weights"]
     assert_allclose(weights.item_maxima, [0.0, 0.6, 0.0, 2.0], atol=1e-12)
     assert (weights.item, weights.step) == ("vertex 3", "")  # they are the same in every pose
-    assert measures(found)["vertices"].maximum == 0.0  # at rest nothing shows
+    assert measures(found)["vertices"].maximum == 0.0  # no difference at rest
 
 
 def test_weights_that_are_the_same_at_rest_show_in_test_poses() -> None:
     other = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)]]
     vertices = measures(compare(Actor(figure()), Actor(figure(influences=other))))["vertices"]
-    # Vertex 1 lies in the joint: it stays. With one more vertex weighted otherwise it moves.
+    # Vertex 1 is at the joint and stays there; another vertex with different weights moves.
     assert vertices.maximum < 1e-12
     other = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(0, 1.0)], [(0, 1.0)]]
     moved = measures(compare(Actor(figure()), Actor(figure(influences=other)), n_poses=20))
-    # Vertex 2 is 1 from the joint, so a turn by a moves it by 2 sin(a / 2), a <= 0.7.
+    # Vertex 2 is 1 from the joint, so a rotation by a moves it by 2 sin(a / 2), a <= 0.7.
     assert 0.1 < moved["vertices"].maximum <= 2 * np.sin(0.35) + 1e-12
     assert moved["vertices"].step.startswith("test pose ")
     assert moved["vertices"].item == "vertex 2"
 
 
 def test_meshes_with_other_triangles_are_compared_by_closest_points_both_ways() -> None:
-    # The same square as four triangles about its middle, lifted by 0.1, weights as in between.
+    # The same square as four triangles around its centre, raised by 0.1, with interpolated weights.
     positions = np.array([*CORNERS, [0.5, 0.5, 0.0]]) + np.array([0.0, 0.0, 0.1])
     fan = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
     influences = [*MIXED, [(0, 0.625), (1, 0.375)]]
@@ -164,7 +164,7 @@ def test_other_limits_are_told_with_both() -> None:
 
 
 def walk(angles, rate=10.0, name="walk") -> SampledClip:
-    """Turn the arm's base about z."""
+    """Rotate the arm's base about z."""
     half = np.array(angles) / 2
     turns = np.zeros((len(half), 2, 4))
     turns[:, :, 3] = 1.0
@@ -214,7 +214,7 @@ def test_nan_is_never_within_a_tolerance() -> None:
 
 
 def test_actors_are_left_in_the_worst_pose_also_if_that_is_their_own() -> None:
-    # The vertex is off by the same at rest and turned, so the first pose is the worst.
+    # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]
     first, second = Actor(figure()), Actor(figure(moved))

@@ -1,4 +1,4 @@
-"""Scalar quantities: lengths per vertex, each worked out by hand on a few points."""
+"""Scalar quantities of a few points, worked out by hand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ POINTS = [[0.0, 3, 4], [0.0, 3, 4], [1.0, 1, 1]]
 
 
 def sliding(influences, **parts) -> Figure:
-    """Return three points bound to six joints that slide along x and turn about x."""
+    """Return three points bound to six joints that translate along x and rotate about x."""
     dofs = [(joint, kind, 0.0) for joint in range(6) for kind in ("tx", "x")]
     bones = skeleton([-1] * 6, dofs)
     skin = skin_from_lists(influences, np.tile(np.eye(4), (6, 1, 1)))
@@ -102,7 +102,7 @@ def test_asymmetry_of_a_posed_figure():
     figure = sliding([[(0, 1.0)], [(1, 1.0)], [(2, 1.0)]], symmetry=np.array([1, 0, 2]))
     figure = replace(figure, mesh=mesh(points))
     assert compute("asymmetry", figure, slid(figure), Skinning()).tolist() == [0, 0, 0]
-    # Both sides outwards by one is symmetric, one side alone is not; the middle counts twice.
+    # Moving both sides outwards by 1 is symmetric, one side alone is not; the middle counts twice.
     assert compute("asymmetry", figure, slid(figure, 1, -1), Skinning()).tolist() == [0, 0, 0]
     assert compute("asymmetry", figure, slid(figure, 1, 0, 0.5), Skinning()).tolist() == [1, 1, 1]
 
