@@ -214,8 +214,8 @@ def test_text_of_linear_blending():
         "        [  0.00   0.00   0.00   1.00 ]",
         "   M2 p             (  2.00   1.00   0.00 )",
         "   w2 M2 p          (  0.50   0.25   0.00 )",
-        "sum of w = 1.00",
-        "sum of w M p        (  1.25   0.25   0.00 )",
+        "sum w = 1.00",
+        "sum w M p           (  1.25   0.25   0.00 )",
         "position            (  1.25   0.25   0.00 )",
     ]
 
@@ -226,19 +226,19 @@ def test_text_of_dual_quaternions_and_placement():
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 1, 0)
     lines = explanation_text(explain(figure, pose, Skinning("dqs"), 0), digits=2)
     # Real (0, 0, sin 45, cos 45), dual (0, -2 sin 45, 0, 0): see the test of every term.
-    assert lines[lines.index("sum of w = 1.00") :] == [
-        "sum of w = 1.00",
-        "sum of w M p        (  2.00   1.00   0.00 )",
-        "q1: relative weight 1.00",
+    assert lines[lines.index("sum w = 1.00") :] == [
+        "sum w = 1.00",
+        "sum w M p           (  2.00   1.00   0.00 )",
+        "q1: normalised weight 1.00",
         "   real [  0.00   0.00   0.71   0.71 ]",
         "   dual [  0.00  -1.41   0.00   0.00 ]",
-        "q = sum of relative weight times q, with these signs",
+        "q = sum of normalised weight times q, with these signs",
         "   real [  0.00   0.00   0.71   0.71 ]",
         "   dual [  0.00  -1.41   0.00   0.00 ]",
-        "length of its real part = 1.00",
-        "moved by q / length (  2.00   1.00   0.00 )",
-        "figure: times 2.00, plus",
-        "                    (  0.00   1.00   0.00 )",
+        "length of the real part = 1.00",
+        "moved by q          (  2.00   1.00   0.00 )",
+        "scale = 2.00",
+        "translation         (  0.00   1.00   0.00 )",
         "position            (  4.00   3.00   0.00 )",
     ]
 
@@ -254,7 +254,7 @@ def test_text_says_what_is_special():
     pose = bent(both, np.deg2rad(170), np.deg2rad(170))
     mixed = explanation_text(explain(both, pose, Skinning("mix", 0.25), 0))
     assert any(
-        line == "q2: relative weight 0.5000, negated to the hemisphere of q1" for line in mixed
+        line == "q2: normalised weight 0.5000, negated to the hemisphere of q1" for line in mixed
     )
     assert any(line.startswith("0.2500 of the way   (") for line in mixed)
 
