@@ -15,11 +15,11 @@ from viewer.commands._diff.inputs import input_files
 from viewer.commands._diff.pairs import Pairing, pair_actors
 from viewer.commands._diff.picture import Heat, heat_of, save_heat
 from viewer.commands._diff.report import Compared, json_text, lines_of, table_of
-from viewer.commands._frame_numbers import parse_range
 from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
+from viewer.commands._sequence.frame_numbers import parse_range
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
