@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_line, posed_actors
+from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,

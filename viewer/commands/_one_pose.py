@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from viewer.commands._frame_numbers import numbering_of
+from viewer.commands._sequence.frame_numbers import numbering_of
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
 from viewer.rig.motion.clip import Clip

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.commands._frame_numbers import apply_time
 from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
+from viewer.commands._sequence.frame_numbers import apply_time
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect, read

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
@@ -28,6 +27,7 @@ from viewer.commands._scene import (
     add_file_arguments,
     open_scene,
 )
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export import EXPORTERS, export, files_written
 from viewer.export._motion_paths import motion_paths

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from viewer.commands._frame_numbers import rate
 from viewer.commands._numbers import number
 from viewer.commands._printing import print_line, table_lines
 from viewer.commands._progress import Progress
@@ -19,6 +18,7 @@ from viewer.commands._scene import (
     scene_files,
     size_limit,
 )
+from viewer.commands._sequence.frame_numbers import rate
 from viewer.commands._usage import require_files
 from viewer.errors import ViewerError
 from viewer.lint import (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
 from viewer.commands._scalar import choose_subject, scalar_text
@@ -15,7 +14,8 @@ from viewer.commands._scene import (
     open_scene,
     print_warnings,
 )
-from viewer.commands._sequence import add_sequence_arguments, draw_sequence, request_of
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,

@@ -18,12 +18,12 @@ from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError

@@ -19,7 +19,7 @@ from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.commands._shots import Turntable, parse_turntable
+from viewer.commands._sequence.shots import Turntable, parse_turntable
 from viewer.rig.motion.evaluation import pose_actor
 
 pytestmark = pytest.mark.slow

@@ -9,12 +9,12 @@ import string
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.commands._frame_numbers import parse_range
 from viewer.commands._numbers import number
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.commands._shots import Request, Shots, parse_turntable, shots_of
+from viewer.commands._sequence.frame_numbers import parse_range
+from viewer.commands._sequence.shots import Request, Shots, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.commands._frame_numbers import Numbering, Range, numbering_of
+from viewer.commands._sequence.frame_numbers import Numbering, Range, numbering_of
 from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
