@@ -109,7 +109,7 @@ def test_a_body_s_joints_are_where_a_second_reader_finds_them(body: Figure, tmp_
     found, notes = write(animation, tmp_path)
     assert_places(found, animation, 100.0)
     assert notes[0] == (
-        "PATH: 24 joints, 12 frames (0 to 11) at 30 per second, centimetres, y up, channels ZYX"
+        "PATH: 24 joints, 12 frames (0 to 11) at 30 fps, centimetres, y up, channels ZYX"
     )
     assert len(notes) == 1  # nothing is lost, so nothing is said
 
@@ -228,7 +228,7 @@ def test_a_shape_that_changes_is_said_with_its_size(tmp_path: Path) -> None:
     assert float(said[1]) == pytest.approx(10 * off.max(), rel=5e-3)  # three digits are told
     # Nobody else's bones or mesh: the skin in the shape of frame 0, on the joints of frame 7.
     assert float(said[3]) > float(said[1])
-    assert notes[2] == "the shape changes over time: bones are written as in frame 0"
+    assert notes[2] == "the shape changes over time: bone lengths are those of frame 0"
     # The root is where it was; the others hang from it in the first frame's shape.
     np.testing.assert_allclose(
         found.places(7)["pelvis"], 100 * joints_of(changing)[7, 0], atol=1e-5
@@ -320,9 +320,7 @@ def test_uneven_scales_give_position_channels(tmp_path: Path) -> None:
     found, notes = write(animation, tmp_path)
     assert_places(found, animation)
     assert [len(channels) for channels in found.channels] == [6, 3, 6, 6]
-    assert notes[1] == (
-        "2 joints below the root move within their parents and have position channels: c, d"
-    )
+    assert notes[1] == ("2 joints below the root translate and have position channels: c, d")
 
 
 def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_path: Path) -> None:
@@ -334,9 +332,7 @@ def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_p
     assert_places(found, animation)
     assert [len(channels) for channels in found.channels] == [6, 3, 3, 6]
     np.testing.assert_allclose(found.offsets[1], [0.25, 1.5, -0.5])
-    assert notes[1] == (
-        "1 joint below the root moves within its parent and has position channels: d"
-    )
+    assert notes[1] == ("1 joint below the root translates and has position channels: d")
 
 
 def test_scaled_figures(tmp_path: Path) -> None:
@@ -351,7 +347,7 @@ def test_scaled_figures(tmp_path: Path) -> None:
     notes = write(growing, tmp_path)[1]
     assert notes[1].startswith("PATH: joints differ from the motion by up to ")
     assert notes[1].endswith(" units (c, frame 5)")
-    assert notes[2] == ("the figure's scale changes from 1 to 2: bones are written at 1")
+    assert notes[2] == ("the figure's scale changes from 1 to 2: bone lengths are written with 1")
 
 
 def test_several_roots_hang_from_one(tmp_path: Path) -> None:
@@ -363,7 +359,7 @@ def test_several_roots_hang_from_one(tmp_path: Path) -> None:
     assert found.names[0] == "common_root" and found.parents == [-1, 0, 1, 0, 3]
     assert_places(found, animation, turn=TO_Y)
     assert [len(channels) for channels in found.channels] == [6, 3, 3, 6, 3]
-    assert notes[1] == "several roots: they hang from a joint common_root, which was added"
+    assert notes[1] == "several roots: a common parent joint common_root was added"
 
 
 def test_names_become_unique_and_plain(tmp_path: Path) -> None:
@@ -376,8 +372,8 @@ def test_lengths_of_a_figure_without_a_unit_stay(tmp_path: Path) -> None:
     animation = rig_animation(chain())
     found, notes = write(animation, tmp_path, unit="cm")
     assert_places(found, animation)
-    assert "the figure's own unit, y up" in notes[0]
-    assert notes[1] == "lengths stay as they are: rig does not say its unit"
+    assert "the figure's unit, y up" in notes[0]
+    assert notes[1] == "lengths are unchanged: the unit of rig is unknown"
 
 
 def test_end_sites_are_half_the_last_bone_or_reach_to_the_skin(tmp_path: Path) -> None:
@@ -480,7 +476,7 @@ def test_a_file_moves_the_body_it_was_made_from(body: Figure, tmp_path: Path) ->
         ),
         (
             {"gaps": "fill"},
-            'way to close gaps: expected one of hold, interpolate, split, found "fill"',
+            'handling of gaps: expected one of hold, interpolate, split, found "fill"',
         ),
         ({"digits": 0}, "digits: expected 1 to 15, found 0"),
     ],

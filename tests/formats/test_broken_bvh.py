@@ -1,4 +1,4 @@
-"""Broken ``.bvh`` files with what is said of them, and thousands of mutations."""
+"""Broken ``.bvh`` files with their messages, and thousands of mutations."""
 
 from __future__ import annotations
 
@@ -417,7 +417,7 @@ def test_a_name_with_control_characters_stays_on_one_line() -> None:
 
 
 def check(data: bytes) -> None:
-    """Read a file; whatever loads must also move."""
+    """Read a file; if it loads, it must also move."""
     source = Source("dir/a.bvh", data)
     try:
         motion = bvh.read(source)

@@ -1,4 +1,4 @@
-"""Broken frame files: each is named, becomes a gap, and the others are read."""
+"""Broken frame files: each is reported and becomes a gap, and the others are read."""
 
 import json
 import os
@@ -23,7 +23,7 @@ def refusal(path, **options):
 
 
 def gap(tmp_path, content, kind="smpl"):
-    """Read three frames, the second of which is broken; return what is said of it."""
+    """Read three frames, the second of which is broken; return the messages about it."""
     good = points(0) if kind == "keypoints3d" else body(0)
     folder = write_frames(tmp_path / "smpl", {0: [good], 1: content, 2: [good]})
     _, parts, _ = opened(tmp_path)
@@ -64,7 +64,7 @@ def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
 def test_file_that_is_no_text_is_a_gap(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
     (folder / "000001.json").write_bytes(b"[\n\xff\xfe]")
-    (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a mark is fine
+    (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a byte order mark is accepted
     _, parts, _ = opened(tmp_path)
     problem = ("F002.capture-text", None, {})
     found = noticed(parts, folder / "000001.json")
@@ -427,7 +427,7 @@ def test_the_line_of_the_key_at_fault_is_named(tmp_path, wrapper, key, value):
     people = [PEOPLE[0], {**PEOPLE[1], key: value}]
     content = {"note": [{"poses": 1}], wrapper: people} if wrapper else people
     text = json.dumps(content, indent=1)
-    # The second of the keys that is written so, as both people have it.
+    # The second occurrence of the key, as both people have it.
     rows = [number for number, row in enumerate(text.splitlines(), 1) if f'"{key}":' in row]
     write_frames(tmp_path / "smpl", {0: PEOPLE, 1: text})
     _, parts, _ = opened(tmp_path / "smpl")

@@ -1,4 +1,4 @@
-"""``.npz`` and ``.npy`` files: lazy, exact, and refused in one line where they lie."""
+"""``.npz`` and ``.npy`` files: read lazily and exactly, and refused if inconsistent."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from viewer.formats._archive.values import Archive, Opaque
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred
 
-BOUND = 64 << 20  # bytes that a refusal may take
+BOUND = 64 << 20  # bytes of memory that a refusal may need
 ROWS = np.arange(12.0).reshape(4, 3) / 8
 GIVEN = {
     "rows": ROWS,
@@ -314,7 +314,7 @@ def test_max_size_is_for_all_members_together() -> None:
 
 
 def test_many_directory_entries_on_one_member() -> None:
-    """The same data counted again and again, which unpacks to any size (Fifield 2019)."""
+    """Entries that share the same data can unpack to any size (Fifield 2019)."""
     data = npz(packed=True, v=np.zeros(1 << 20))
     start = data.index(b"PK\1\2")
     end = data.index(b"PK\5\6")

@@ -1,4 +1,4 @@
-"""Readers that go on: one fault of each kind, with its place and what it costs."""
+"""Readers that continue after faults: one fault of each kind, with its place and effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pickles that lie about sizes, repeat or contain themselves, or are damaged at random."""
+"""Pickles with false sizes, repeated or circular values, or random damage."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ from viewer.rig.arrays import Deferred
 
 pytestmark = pytest.mark.slow
 
-BOUND = 64 << 20  # bytes that a refusal may take
-PATIENCE = 5.0  # seconds for what should take a fraction of one, on a busy machine
+BOUND = 64 << 20  # bytes of memory that a refusal may need
+PATIENCE = 5.0  # seconds; far more than needed, even on a busy machine
 
 
 def is_too_long(fault: Fault) -> bool:
-    """Whether a pickle was refused for its number of steps."""
+    """Return whether a pickle was refused for its number of opcodes."""
     return fault[2]["problem"] == Phrase("pickle-steps", most=1_000_000)
 
 
@@ -53,7 +53,7 @@ ENDLESS = Opaque(Phrase("unread-endless"))
 
 
 def cost(action: Callable[[], Any]) -> int:
-    """Most bytes of memory that an action took at any time."""
+    """Return the peak memory of an action in bytes."""
     started = time.process_time()
     tracemalloc.start()
     try:
@@ -298,7 +298,7 @@ def test_long_text_used_again_and_again() -> None:
 
 
 def self_contained(data: bytes) -> None:
-    """Open bytes and look at everything, whether or not they are refused."""
+    """Open bytes and access all values, whether or not they are refused."""
     try:
         archive = opened(data)
     except FormatError as problem:

@@ -1,4 +1,4 @@
-"""Poses in files: written and read back, as smplx names them, broken, and opened with a figure."""
+"""Pose files: round trips, smplx's names, faults, and use with a figure."""
 
 import json
 from pathlib import Path
@@ -47,12 +47,12 @@ def text_refusal(text, name="a.json"):
     assert str(caught.value).isprintable()
     assert caught.value.path == Path(name)
     key, line, values = fault_of(caught.value.diagnostic)
-    # What Python calls a mistake differs between its versions.
+    # Python's wording of errors differs between versions.
     return key, line, {} if key == "F002.json" else values
 
 
 def parts(**values):
-    """Return a record as it is read from these values."""
+    """Return the record read from these values."""
     source = Source("a.json", json.dumps(values).encode())
     return pose.read(source), warnings_of(source.diagnostics)
 
@@ -66,7 +66,7 @@ def waves(count, seed=0.0):
 
 
 def some_pose(figure):
-    """Return a pose with every number odd."""
+    """Return a pose in which all numbers differ from the defaults."""
     posed = rest_pose(figure.skeleton)
     low, high = np.maximum(figure.skeleton.dof_limits.T[0], -1), figure.skeleton.dof_limits.T[1]
     posed.dofs[:] = np.clip(waves(len(posed.dofs)), low, high)
@@ -105,7 +105,7 @@ def test_own_numbers_come_back_as_text(figures, tmp_path, kind):
     assert warnings == []
     found = rest_pose(figure.skeleton)
     apply_record(record, figure, found)
-    # Through rotation vectors and back to angles, some roundings of numbers below 2.
+    # Conversion to rotation vectors and back: some rounding errors of numbers below 2.
     assert_allclose(turns(figure, found), turns(figure, given), rtol=0, atol=1e-14)
 
 
@@ -145,7 +145,7 @@ def test_writer_refuses_what_is_no_pose(figures, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-# As smplx names them
+# Names used by smplx
 
 
 def test_parts_turn_their_joints(figures):
@@ -258,7 +258,7 @@ def test_large_members_of_no_use_are_not_read(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, poses=np.zeros((1, 72)), marker_data=np.arange(1000.0))
     data = bytearray(path.read_bytes())
-    data[data.index(np.arange(1000.0).tobytes()) + 4000] ^= 1  # would be found when it is read
+    data[data.index(np.arange(1000.0).tobytes()) + 4000] ^= 1  # would be reported when it is read
     path.write_bytes(data)
     record, warnings = read(path)
     assert (len(record.vector), warnings) == (72, [])

@@ -1,4 +1,4 @@
-"""What is written is read back equal, and what the format cannot hold is refused."""
+"""Round trips of all writers, and refusal of content that a format cannot store."""
 
 import math
 import tempfile
@@ -270,7 +270,7 @@ def test_any_skin_comes_back(wanted):
     assert_equal_skins(found.skin, wanted.skin)
 
 
-# What does not fit
+# Unsupported content
 
 
 def refused_for(caught):

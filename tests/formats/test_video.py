@@ -1,4 +1,4 @@
-"""Videos: colours, sizes, rates and transparency come back; nothing broken is ever left."""
+"""Videos: colours, sizes, rates and transparency are preserved; no broken file is left."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def quarters(width: int, height: int) -> np.ndarray:
 
 
 def counting(frame: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
-    """Return a gray that says which frame it is."""
+    """Return a gray level that identifies the frame."""
     return np.full((size[1], size[0], 4), (20 * frame,) * 3 + (255,), dtype=np.uint8)
 
 
@@ -61,7 +61,7 @@ def test_colours_come_back(tmp_path, suffix):
     frames = decoded(path)
     assert len(frames) == 5
     middles = [frames[2][12, 16], frames[2][12, 48], frames[2][36, 16], frames[2][36, 48]]
-    # Rounding to 8 bits of limited range, twice, and what the encoder leaves out.
+    # Rounding to 8 bits of limited range, twice, and the encoder's losses.
     assert np.abs(np.array(middles, dtype=int) - list(COLORS.values())).max() <= 3
 
 
@@ -140,7 +140,7 @@ def test_webm_holds_transparency(tmp_path):
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         assert stream.metadata["alpha_mode"] == "1"
-        # FFmpeg's own decoder leaves the alpha out; libvpx's does not.
+        # FFmpeg's own decoder drops alpha; that of libvpx does not.
         decoder = av.CodecContext.create("libvpx-vp9", "r")
         packets = [packet for packet in container.demux(stream) if packet.size]
         frames = [frame for packet in packets for frame in decoder.decode(packet)]
@@ -161,7 +161,7 @@ def test_gif_holds_transparency(tmp_path):
         picture.seek(1)
         second = np.array(picture.convert("RGBA"))
     assert first[12, 16, 3] == 0 and (first[12, 48], first[36, 16])[0][3] == 255
-    # What the first frame showed there is gone.
+    # The pixels of the first frame are erased there.
     assert second[36, 16, 3] == 0 and second[12, 16, 3] == 255
 
 
@@ -181,7 +181,7 @@ def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
 
 
 def delays(path: Path) -> list[int]:
-    """Return what a GIF says of each frame, in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
+    """Return the delay of each frame of a GIF in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
     data, found, place = path.read_bytes(), [], 0
     while (place := data.find(b"\x21\xf9\x04", place)) >= 0:
         found.append(int.from_bytes(data[place + 4 : place + 6], "little"))
@@ -194,8 +194,8 @@ def delays(path: Path) -> list[int]:
     [
         (25.0, [4] * 6, ""),
         (50.0, [2] * 6, ""),
-        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames a second on average"),
-        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames a second on average"),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames per second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames per second on average"),
     ],
 )
 def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
@@ -245,7 +245,7 @@ def test_gif_of_gradients_with_a_moving_bar_is_right_in_every_frame(tmp_path, tr
             shown = np.array(animation.convert("RGBA")).astype(int)
             assert (shown[..., 3] == pixels[..., 3]).all(), index
             error = np.abs(shown - pixels)[pixels[..., 3] == 255].max(axis=-1)
-            # Ordered dither, and the noise: 80 pixels that have hardly a palette of their own.
+            # Ordered dithering and noise: 80 pixels that get few palette entries of their own.
             assert error.mean() <= 6 and (error > 60).sum() <= 40, index
 
 
@@ -298,8 +298,8 @@ def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
     ("name", "rate", "quality", "words"),
     [
         ("x.mp4", 25.0, 101.0, "video quality: expected 0 to 100, found 101"),
-        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames a second, found 0"),
-        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames a second, found 60"),
+        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames per second, found 0"),
+        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames per second, found 60"),
     ],
 )
 def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words):
@@ -330,7 +330,7 @@ def test_places_where_no_video_can_be_are_refused_at_once(tmp_path, name, words)
     assert str(caught.value).endswith(words)
 
 
-# Nothing broken stays
+# No broken file is left
 
 
 def test_video_appears_only_when_it_is_whole(tmp_path):
@@ -404,7 +404,7 @@ for limit in (0, 1000, size // 3, size - 40_000, size - 1000, size - 1):
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
 def test_full_disk_is_one_line_and_leaves_nothing(tmp_path, suffix):
-    """A limit on the size of files stands for the end of a disk."""
+    """A limit on the size of files simulates a full disk."""
     path = tmp_path / f"x{suffix}"
     run = subprocess.run(
         [sys.executable, "-c", _FULL, str(path)],

@@ -304,7 +304,7 @@ def test_time_makes_nothing_stale_but_posing_does(lint, texts):
 def test_recheck_sees_the_pose_and_other_limits(lint, texts):
     hand = lint(column())
     assert codes(hand) == []
-    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_turn=1.0)
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_rotation=1.0)
     assert stale(hand, texts)
     hand.state.actor.pose.dofs[4] = 3.5  # its limits are -3 and 3
     hand.click("Recheck")
@@ -317,7 +317,7 @@ def test_limits_are_set_in_their_window(lint):
     hand.click("Limits…")
     hand.step(2)
     hand.enter_value("Largest rotation", "180")
-    assert hand.state.of(Linting).options.max_turn == pytest.approx(np.pi)
+    assert hand.state.of(Linting).options.max_rotation == pytest.approx(np.pi)
     hand.enter_value("Low confidence", "0.5")
     assert hand.state.of(Linting).options.confidence == pytest.approx(0.5)
     hand.enter_value("Largest speed", "2.5")
@@ -326,7 +326,7 @@ def test_limits_are_set_in_their_window(lint):
     assert hand.state.of(Linting).options.max_speed is None
     for text in ("nan", "-5", "1e39"):
         hand.enter_value("Largest rotation", text)
-        assert 0.0 <= hand.state.of(Linting).options.max_turn < np.inf
+        assert 0.0 <= hand.state.of(Linting).options.max_rotation < np.inf
     hand.click("Default limits")
     assert hand.state.of(Linting).options == type(hand.state.of(Linting).options)()
 

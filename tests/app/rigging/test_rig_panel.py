@@ -435,7 +435,7 @@ def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
     assert asked["alignment"].facing is None and not asked["fits"]
     assert not asked["alignment"].refines
     assert_allclose(settings.alignment.matrix, TRUE, atol=1e-9)
-    assert settings.joints == "copied" and not settings.correctives and not settings.fits
+    assert settings.joints == "alignment" and not settings.correctives and not settings.fits
     assert settings.weights.match.max_angle == pytest.approx(np.radians(75.0))
     assert settings.weights.match.near_angle == pytest.approx(np.radians(75.0))
     assert (settings.weights.smoothing_rounds, settings.weights.max_influences) == (7, 3)
@@ -446,7 +446,7 @@ def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypat
     monkeypatch.setattr(imgui, "tree_node", lambda text: titles.append(text) or draw(text))
     hand = rigging(placed=False)
     assert titles[-1] == "Advanced###rig advanced" and "Smoothing" not in hand.state.item_rects
-    hand.state.of(Rigging).choices.smoothing, hand.state.of(Rigging).choices.joints = 3, "copied"
+    hand.state.of(Rigging).choices.smoothing, hand.state.of(Rigging).choices.joints = 3, "alignment"
     hand.step(2)
     assert titles[-1] == "Advanced (2 changed)###rig advanced"
     hand.click("rig advanced")

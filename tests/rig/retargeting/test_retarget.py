@@ -1,4 +1,4 @@
-"""Motions carried to other skeletons: the same look, whatever rest pose, axes, unit and names."""
+"""Retargeting of motions between skeletons with other rest poses, axes, units and names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.retarget import retarget, scaled_motion
 from viewer.rig.skeleton import ball_skeleton
 
-# A T-pose in centimetres, as mocap programs name it: name, parent, place.
+# A T-pose in centimetres with the names of capture software: name, parent, position.
 HIK = {
     "Hips": ("", (0, 100, 0)),
     "LeftUpLeg": ("Hips", (10, 95, 0)),
@@ -74,7 +74,7 @@ LIMBS = [
     (("RightArm", "RightForeArm"), ("right_shoulder", "right_elbow")),
     (("RightForeArm", "RightHand"), ("right_elbow", "right_wrist")),
 ]
-EXACT = 1e-12  # of directions and of rotations: rounding only
+EXACT = 1e-12  # rounding errors of directions and rotations
 
 
 def figure_of(table: dict, name: str, turn: np.ndarray | None = None, up: str = "y") -> Figure:
@@ -105,7 +105,7 @@ def quaternions(vectors: np.ndarray) -> np.ndarray:
 
 
 def places(figure: Figure, clip: SampledClip) -> dict[str, np.ndarray]:
-    """Return where joints are: by name, (N, 3) each."""
+    """Return the positions of joints by name, (N, 3) each."""
     times = np.arange(clip.n_rows) / clip.timing.frame_rate
     worlds = world_frames(figure, frames_of(figure, clip, times))[..., :3, 3]
     return dict(zip(figure.skeleton.names, np.swapaxes(worlds, 0, 1), strict=True))
@@ -183,7 +183,7 @@ def test_limbs_point_as_the_source_s_do_from_a_pose_to_t_pose() -> None:
 def test_trunk_and_feet_keep_their_own_bend() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
-    # In the source's rest pose the spine, a little bent in the figure, is as in its own.
+    # In the source's rest pose the slightly bent spine of the figure keeps its own shape.
     still = {"pelvis": 0, "spine1": 3, "spine3": 9, "neck": 10, "head": 13, "left_collar": 11}
     for name, joint in still.items():
         np.testing.assert_allclose(
@@ -196,7 +196,7 @@ def test_axes_of_the_figure_s_joints_do_not_matter() -> None:
     rng = np.random.default_rng(1)
     skeleton = plain.skeleton
     turns = quaternions(rng.uniform(-2, 2, (skeleton.n_joints, 3)))
-    # The same places with turned joints: offsets are seen from the parent's axes.
+    # The same positions with rotated joints: offsets are relative to the parent's axes.
     worlds, offsets = [], []
     for joint, parent in enumerate(skeleton.parents):
         above = np.eye(3) if parent < 0 else worlds[parent]
@@ -235,7 +235,7 @@ def test_a_source_with_z_up_is_turned_upright() -> None:
 
 
 def path_scale() -> float:
-    """Return the ratio of the legs of BODY to those of HIK, both sides being alike."""
+    """Return the ratio of the leg lengths of BODY and HIK, which are equal on both sides."""
     mine = [np.array(BODY[name][1]) for name in ("left_hip", "left_knee", "left_ankle")]
     theirs = [np.array(HIK[name][1]) for name in ("LeftUpLeg", "LeftLeg", "LeftFoot")]
     lengths = [
@@ -265,13 +265,13 @@ def test_a_skinned_figure_moves_as_a_whole() -> None:
 
 
 def test_a_source_that_looks_elsewhere_at_rest_turns_the_figure() -> None:
-    quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z, where it looked, is now x
+    quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z, its front, is now x
     source = moving(figure_of(HIK, "mocap", quarter))
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
     where = places(figure, clip)
-    # The hips' line of the figure, along x at rest, lies as the source's: along -z.
+    # The line between the figure's hips, along x at rest, is aligned with the source's: along -z.
     np.testing.assert_allclose(bones(where, ("right_hip", "left_hip"))[0], [0, 0, -1], atol=EXACT)
 
 
@@ -324,7 +324,7 @@ def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
 
     hik = ["LeftHandIndex1", "LeftHandIndex2", "LeftHandPinky1", "LeftHandPinky2"]
     own = ["left_index1", "left_index2", "left_pinky1", "left_pinky2"]
-    # The figure's hand hangs down with its palm to the body, the source's is held out, palm down.
+    # The figure's hand hangs down, palm to the body; the source's is stretched out, palm down.
     hang = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     source = moving(figure_of(with_fingers(HIK, "LeftHand", hik, np.eye(3)), "mocap"))
     figure = figure_of(with_fingers(BODY, "left_wrist", own, hang), "body")
@@ -343,7 +343,7 @@ def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
 def test_same_hierarchy_with_other_proportions_takes_rotations_over() -> None:
     source = moving(figure_of(BODY, "one"))
     names = list(BODY)
-    # Depth first instead of breadth first, and everything half as wide and a tenth higher.
+    # Depth-first instead of breadth-first, with 0.9 times the width and 1.1 times the height.
     order = [
         "pelvis",
         "spine1",

@@ -19,7 +19,7 @@ from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.commands._shots import Turntable, parse_turntable
+from viewer.commands._sequence.shots import Turntable, parse_turntable
 from viewer.rig.motion.evaluation import pose_actor
 
 pytestmark = pytest.mark.slow
@@ -166,7 +166,7 @@ def test_frames_are_counted_from_0_as_fps_counts(draw, walk, tmp_path, options, 
 
 def test_frames_behind_the_end_are_drawn_and_said(draw, walk, tmp_path):
     said = draw(walk, "{frame}.png", "--frames", "29:33", size="16x16")
-    assert said.err == "warning: --frames: frames 31 to 32 are after the motion's end\n"
+    assert said.err == "warning: --frames: frames 31 to 32 are beyond the motion's end\n"
     assert len(names(tmp_path, ".png")) == 4
 
 
@@ -221,7 +221,8 @@ def test_turntables_are_read():
 def test_bad_turntables_are_one_line(draw, walk, text):
     said = draw(walk, "x.mp4", f"--turntable={text}", code=2)
     assert said.err == (
-        f'viewer: --turntable: expected seconds, as 6, or degrees, as 90deg, found "{text}"\n'
+        "viewer: --turntable: expected seconds such as 6, or degrees such as 90deg, "
+        f'found "{text}"\n'
     )
 
 
