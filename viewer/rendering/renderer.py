@@ -155,7 +155,7 @@ class Renderer:
         for index in range(count) if passes is None else passes:
             one = sample(index, count)
             shifted = jittered(view, one.shift, target.size)
-            lit = self.lighting.light(casters, shifted, one, strength)
+            lit = self.lighting.light(casters, shifted, target.size, one, strength)
             self._prepare(target)
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
