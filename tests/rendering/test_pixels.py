@@ -153,7 +153,7 @@ def test_a_mesh_without_texture_has_the_skin_colour(offscreen):
     meshes = [
         square(),
         replace(square(material=picture([[RED]])), uvs=None),
-        replace(square(material=replace(picture([[RED]]), image=None))),
+        replace(square(material=replace(picture([[RED]]), base_texture=None))),
     ]
     for mesh in meshes:
         assert near(draw(offscreen, scene_of(mesh))[50, 50], wanted, tolerance=1)
