@@ -1,4 +1,4 @@
-"""Videos whose file fails, at each write and each fill level: one line, no file left."""
+"""Videos whose file fails, at every write and at every fill level: one line, nothing left."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ FULL = "No space left on device"
 
 
 def noisy_frames(n_frames: int, n_more: int = 0) -> list[np.ndarray]:
-    """Return frames that compress badly, and further frames of a single colour."""
+    """Return frames that no encoder makes small, and more of a plain colour."""
     noise = np.random.default_rng(1).integers(0, 255, (n_frames, *SIZE[::-1], 4), dtype=np.uint8)
     noise[..., 3] = 255
     return [*noise, *[np.full((*SIZE[::-1], 4), 255, dtype=np.uint8)] * n_more]
 
 
 def record(path: Path, frames: list[np.ndarray]) -> list[str]:
-    """Write a video like the recorder, whose queue still contains frames after a failure."""
+    """Write a video as the recorder does, whose queue still holds frames when one has failed."""
     sink, said = VideoSink(path, SIZE, 25.0), []
     for index, pixels in enumerate(frames):
         try:
@@ -52,7 +52,7 @@ def record(path: Path, frames: list[np.ndarray]) -> list[str]:
 
 
 class Disk:
-    """Replacement for the raw file: full from the n-th write on, of which half still fits."""
+    """Stands in for the raw file: full from the n-th write on, of which half still fits."""
 
     def __init__(self, number: int, is_kept: bool = True) -> None:
         self.calls, self.number, self.is_kept = 0, number, is_kept
@@ -95,7 +95,7 @@ def test_fault_at_every_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, 
             said = record(path, frames)
         if not said:
             break
-        # All frames after the first error fail with the same one.
+        # Every frame that is tried after the first error meets the same one.
         assert set(said) == {f"{path}: {FULL}"}
         assert [each.name for each in tmp_path.iterdir()] == [path.name]
         assert path.read_bytes() == b"precious"
@@ -106,7 +106,7 @@ def test_fault_at_every_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_fault_of_closing_counts(tmp_path, monkeypatch, suffix):
-    """Network drives report a full disk only when the file is closed."""
+    """Network drives report a full disk only there."""
     path = tmp_path / f"x{suffix}"
     path.write_bytes(b"precious")
 
@@ -157,8 +157,8 @@ for level in range(17):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_fill_level_is_one_line_or_a_video(tiny_disk, suffix):
-    """Runs in a separate process, as FFmpeg used to crash with a segmentation fault."""
-    folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "formats")])
+    """In a process of its own, which FFmpeg used to end with a segmentation fault."""
+    folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
     run = subprocess.run(
         [sys.executable, "-c", _LEVELS, str(tiny_disk), suffix],
         env={**os.environ, "PYTHONPATH": folders},
