@@ -17,7 +17,7 @@ from viewer.rendering.passes.contact_pass import Contact, ContactPass
 from viewer.rendering.passes.ground_pass import ground_axes
 from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
 from viewer.rendering.passes.occlusion_pass import OcclusionPass
-from viewer.rendering.passes.shadow_pass import ShadowPass
+from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
 from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import View, key_direction
 from viewer.rig.arrays import Floats
@@ -46,13 +46,9 @@ class Lighting:
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
         self._size = 0.0  # of the largest figure, scene units
+        self._shadow: ShadowPass | None = None
         self._occlusion: OcclusionPass | None = None
-        self._made: list[ShadowPass | ContactPass | GroundShadowPass] = []
-
-    @cached_property
-    def _shadow_pass(self) -> ShadowPass:
-        self._made.append(made := ShadowPass(self.context))
-        return made
+        self._made: list[ContactPass | GroundShadowPass] = []
 
     @cached_property
     def _contact_pass(self) -> ContactPass:
@@ -116,7 +112,7 @@ class Lighting:
         options, shadow, occlusion = casters.options, None, None
         if self._spheres is not None and options.lights.key.strength > 0.0:
             direction = tilted(key_direction(view, options.lights), sample.light)
-            shadow = self._shadow_pass.draw(
+            shadow = self._shadow_pass(size).draw(
                 casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
             )
             # Shadows of the passes lie beside each other on the ground: they must overlap.
@@ -127,6 +123,15 @@ class Lighting:
                 casters.draw, view, self._size, sample.phase, strength
             )
         return replace(view, effects=Effects(shadow, occlusion))
+
+    def _shadow_pass(self, size: tuple[int, int]) -> ShadowPass:
+        side = map_side(size)
+        if self._shadow is None or self._shadow.side != side:
+            if self._shadow is not None:
+                self._shadow.release()
+            self._shadow = None
+            self._shadow = ShadowPass(self.context, side)
+        return self._shadow
 
     def _occlusion_pass(self, size: tuple[int, int]) -> OcclusionPass:
         if self._occlusion is None or self._occlusion.size != size:
@@ -149,10 +154,9 @@ class Lighting:
 
     def release(self) -> None:
         """Free all passes that were created."""
-        for item in self._made:
-            item.release()
-        if self._occlusion is not None:
-            self._occlusion.release()
+        for item in (*self._made, self._shadow, self._occlusion):
+            if item is not None:
+                item.release()
 
 
 def _ground(up: str, box: Floats) -> tuple[Floats, float]:

@@ -23,9 +23,9 @@ BACKGROUNDS = ("gradient", "transparent")
 
 
 QUALITIES = {
-    "draft": "Draft, no shadows",
-    "normal": "Normal, shadows",
-    "final": "Final, soft shadows and occlusion",
+    "draft": "Draft",
+    "normal": "Normal",
+    "final": "Final",
 }
 """Qualities of a picture, with labels for menus."""
 

@@ -20,7 +20,7 @@ from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import SHOWN
+from viewer.rendering.options import QUALITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
 from viewer.rendering.passes.ground_pass import grid_step, parse_color
 from viewer.rig.annotations import BodyParts
@@ -68,6 +68,10 @@ def draw(state: AppState) -> None:
     _draw_background(state)
     imgui.separator()
     _draw_joint_toggles(state)
+    imgui.separator()
+    options.quality = choice(state, "Quality", options.quality, QUALITIES)
+    if options.quality != "draft":
+        options.shadows = checkbox(state, "Shadows", options.shadows)
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
