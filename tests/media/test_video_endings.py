@@ -12,7 +12,7 @@ import pytest
 from media.small_videos import counting, decoded, write
 
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
-from viewer.media import video_kinds as _video_kinds
+from viewer.media import video_kinds
 from viewer.media.video import VideoSink
 from viewer.media.video_kinds import video_kind
 
@@ -29,8 +29,8 @@ def names(folder: Path) -> list[str]:
 
 
 def test_missing_encoder_is_one_line(tmp_path, monkeypatch):
-    kind = _video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
-    monkeypatch.setitem(_video_kinds.VIDEOS, ".mp4", kind)
+    kind = video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
+    monkeypatch.setitem(video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"
     with pytest.raises(ViewerError) as caught:
         VideoSink(path, (64, 48), 25.0)
