@@ -97,7 +97,9 @@ def test_distance_is_taken_as_given(draw, rig):
     camera = Camera()
     fit(camera, scene_points(scene), 64 / 48)
     camera.distance = 12.5
-    assert (draw("--distance", "12.5") == viewer.render(scene, (64, 48), camera, DisplayOptions())).all()
+    assert (
+        draw("--distance", "12.5") == viewer.render(scene, (64, 48), camera, DisplayOptions())
+    ).all()
 
 
 @pytest.mark.parametrize(
