@@ -21,6 +21,7 @@ NAMES = [
     "lint",
     "transfer",
     "video",
+    "quality",
 ]
 
 ROOT = Path(__file__).resolve().parents[2]
