@@ -167,8 +167,8 @@ def delays(path: Path) -> list[int]:
     [
         (25.0, [4] * 6, ""),
         (50.0, [2] * 6, ""),
-        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames a second on average"),
-        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames a second on average"),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames per second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames per second on average"),
     ],
 )
 def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):

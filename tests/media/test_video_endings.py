@@ -50,8 +50,8 @@ def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
     ("name", "rate", "quality", "words"),
     [
         ("x.mp4", 25.0, 101.0, "video quality: expected 0 to 100, found 101"),
-        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames a second, found 0"),
-        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames a second, found 60"),
+        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames per second, found 0"),
+        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames per second, found 60"),
     ],
 )
 def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words):
