@@ -11,10 +11,12 @@ from viewer.errors import RenderError
 from viewer.interrupts import deferred
 from viewer.resources import resource
 
-__all__ = ["SHADING", "Programs", "set_uniforms"]
+__all__ = ["SHADING", "SHADING_CHOICES", "Programs", "set_uniforms"]
 
 SHADING = {
     "phong": "Blinn-Phong, two lights",
+    "pbr": "Metallic-roughness, studio",
+    "matcap": "Matcap",
     "normals": "Normals as colours",
     "checker": "UV checker",
     "parts": "Body parts as colours",
@@ -22,8 +24,12 @@ SHADING = {
 }
 """Chunks in ``shaders/shade``, with labels for menus."""
 
+SHADING_CHOICES = {"auto": "Blinn-Phong, or by material", **SHADING}
+"""Shadings that can be chosen, with labels for menus."""
+
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
+_INCLUDES = re.compile(r"^#pragma include (\w+)[ \t]*$", re.MULTILINE)
 _CHUNK_MARK = "#pragma chunk"
 _LINES_PER_FILE = 10_000
 _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
@@ -70,6 +76,7 @@ class Programs:
         skin: str = "",
         geometry: str = "",
         affine: bool = False,
+        materials: bool = False,
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
@@ -87,13 +94,16 @@ class Programs:
             Name of the geometry shader between the two, if any.
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
+        materials : bool
+            Surfaces have more than a picture each, see ``include/surface.glsl``.
 
         Raises
         ------
         RenderError
             If the driver rejects a shader; the message names the file and its line.
         """
-        return self._get((name, skin, fragment or name, chunk, geometry, affine), ())
+        key = (name, skin, fragment or name, chunk, geometry, affine, materials)
+        return self._get(key, ())
 
     def feedback(
         self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
@@ -102,16 +112,19 @@ class Programs:
 
         The chunk is a skinning method; ``affine`` tells whether joints may scale or shear.
         """
-        return self._get((name, chunk, "", "", "", affine), outputs)
+        return self._get((name, chunk, "", "", "", affine, False), outputs)
 
     def _get(
-        self, key: tuple[str, str, str, str, str, bool], outputs: tuple[str, ...]
+        self, key: tuple[str, str, str, str, str, bool, bool], outputs: tuple[str, ...]
     ) -> moderngl.Program:
         if key not in self._cache:
-            name, skin, fragment_name, chunk, middle, affine = key
+            name, skin, fragment_name, chunk, middle, affine, materials = key
             files: list[str] = []
-            vertex = _compose(f"{name}.vert", skin, files, "AFFINE_PALETTE" if affine else "")
-            fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
+            defines = ("AFFINE_PALETTE",) * affine + ("MATERIALS",) * materials
+            vertex = _compose(f"{name}.vert", skin, files, defines)
+            fragment = (
+                _compose(f"{fragment_name}.frag", chunk, files, defines) if fragment_name else None
+            )
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
                 # Both stages output the fragment shader's inputs: the vertex shader's are renamed.
@@ -153,7 +166,7 @@ class Programs:
         self._cache.clear()
 
 
-def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
+def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] = ()) -> str:
     """Return a shader's text with its chunk and includes, with line numbers of the original files.
 
     Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
@@ -171,8 +184,8 @@ def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
             parts.append(_chunk(folder, chunk, files))
         else:
             parts.append(f"{line}\n")
-        if define and line.startswith("#version"):
-            parts.append(f"#define {define}\n")
+        if line.startswith("#version"):
+            parts += [f"#define {define}\n" for define in defines]
         if include or line.startswith(("#version", _CHUNK_MARK)):
             parts.append(f"#line {base + number + 1}\n")
     return "".join(parts)
@@ -189,13 +202,14 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
     """Return a chunk's text after the chunks it needs, whose functions get a suffix: their name."""
     inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     needs = _NEEDS.match(inner)
-    parts = []
+    parts = [_included(name, files) for name in _INCLUDES.findall(inner)]
     for name in needs[1].split() if needs else []:
         parts.append(f"#define {folder} {folder}_{name}\n")
         parts.append(_chunk(folder, name, files))
         parts.append(f"#undef {folder}\n")
     if needs:
         inner = f"\n{inner[needs.end() :]}"  # keep the line, so that line numbers stay correct
+    inner = _INCLUDES.sub("", inner)
     parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
     files.append(f"{folder}/{chunk}.glsl")
     return "".join(parts)
