@@ -108,9 +108,9 @@ def split_sum(size: int, n_samples: int) -> np.ndarray:
 
 
 def _spread(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return points that fill the unit square evenly (Roberts 2018, the R2 sequence)."""
+    """Return points that fill the unit square evenly: a Fibonacci lattice."""
     index = np.arange(count)
-    golden = 1.32471795724474602596
+    golden = 0.5 * (1.0 + 5.0**0.5)
     return (0.5 + index / golden) % 1.0, (index + 0.5) / count
 
 

@@ -61,27 +61,7 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         default="skin",
         help="parts of the figures; binding is the skin in the bind pose (default: skin)",
     )
-    group.add_argument(
-        "--shading",
-        choices=SHADING_CHOICES,
-        default="auto",
-        help="shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
-        "phong (default: auto)",
-    )
-    for name, default in (("metallic", 0.0), ("roughness", 0.6)):
-        group.add_argument(
-            f"--{name}",
-            type=number,
-            default=default,
-            metavar="0..1",
-            help=f"with --shading pbr, of materials that do not state it (default: {default:g})",
-        )
-    group.add_argument(
-        "--matcap",
-        choices=MATCAPS,
-        default="clay",
-        help="picture for --shading matcap (default: clay)",
-    )
+    _add_shading_arguments(group)
     add_scalar_arguments(group)
     group.add_argument(
         "--background",
@@ -112,6 +92,31 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME",
         help="leave out a body part; may be repeated",
+    )
+
+
+def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options of surfaces."""
+    group.add_argument(
+        "--shading",
+        choices=SHADING_CHOICES,
+        default="auto",
+        help="shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
+        "phong (default: auto)",
+    )
+    for name, default in (("metallic", 0.0), ("roughness", 0.6)):
+        group.add_argument(
+            f"--{name}",
+            type=number,
+            default=default,
+            metavar="0..1",
+            help=f"with --shading pbr, of materials that do not state it (default: {default:g})",
+        )
+    group.add_argument(
+        "--matcap",
+        choices=MATCAPS,
+        default="clay",
+        help="picture for --shading matcap (default: clay)",
     )
 
 
