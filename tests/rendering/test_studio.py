@@ -62,7 +62,7 @@ def test_the_bundled_light_is_what_the_script_makes(generator, bundled):
 
 
 def test_borders_continue_the_octahedral_map(generator):
-    """Beyond an edge lies the texel that the map, folded back there, has beside its mirror image."""
+    """Beyond an edge lies the edge's own texel at the place mirrored about its middle."""
     points = generator.octahedral_directions(8)
     assert_allclose(points[0, 1:-1], points[1, 1:-1][::-1], atol=1e-12)
     assert_allclose(points[1:-1, -1], points[1:-1, -2][::-1], atol=1e-12)

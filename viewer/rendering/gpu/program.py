@@ -16,7 +16,7 @@ __all__ = ["SHADING", "SHADING_CHOICES", "Programs", "set_uniforms"]
 SHADING = {
     "phong": "Blinn-Phong, two lights",
     "pbr": "Metallic-roughness, studio",
-    "matcap": "Matcap",
+    "matcap": "Matcap (lit sphere)",
     "normals": "Normals as colours",
     "checker": "UV checker",
     "parts": "Body parts as colours",
@@ -50,7 +50,8 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
             uniform = program[name]
             assert isinstance(uniform, moderngl.Uniform)  # by the prefix u_
             if isinstance(value, bytes):
-                uniform.write(value)
+                # Compilers drop the end of an array that is unused.
+                uniform.write(value[: 4 * uniform.dimension * uniform.array_length])
             else:
                 uniform.value = value
 

@@ -177,7 +177,7 @@ def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict
         "u_alpha_mode": ALPHA_MODES.index(material.alpha_mode),
         "u_alpha_cutoff": material.alpha_cutoff,
         "u_places": np.stack([_place(texture) for texture in placed]).tobytes(),
-        "u_uv_sets": tuple(texture.uv_set for texture in placed),
+        "u_uv_sets": np.array([texture.uv_set for texture in placed], dtype="i4").tobytes(),
         "u_channels": channels.tobytes(),
         "u_has_metallic_map": "metallic_texture" in textures,
         "u_has_roughness_map": "roughness_texture" in textures,
