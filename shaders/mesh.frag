@@ -3,6 +3,9 @@
 // as it is: lit chunks apply the tone curve, those that show numbers do not.
 
 #pragma include tone
+#ifdef SHADOWS
+#pragma include shadow
+#endif
 #pragma include lights
 #pragma include surface
 

@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +13,12 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+TESTS = ROOT / "tests"
+TEST_FILES = sorted(TESTS.rglob("*.py"))
+# Folders of tests with more files than others: a file of tests per quirk of a format.
+LARGE_FOLDERS = {"formats": 75, "commands": 35}
+# Folders of tests that mirror no folder of sources.
+OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, beside itself and what every part may.
 EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
@@ -145,6 +152,26 @@ def test_folders_stay_small() -> None:
     folders = {path.parent for path in SOURCES}
     counts = {str(path.relative_to(PACKAGE)): len([*path.glob("*.py")]) for path in folders}
     assert not {name for name, count in counts.items() if count > 30}
+
+
+def test_files_of_tests_stay_short_in_folders_that_mirror_the_sources() -> None:
+    for path in TEST_FILES:
+        assert path.read_text().count("\n") <= 400, path
+    counts = Counter(path.parent.relative_to(TESTS).as_posix() for path in TEST_FILES)
+    for folder, count in counts.items():
+        assert count <= LARGE_FOLDERS.get(folder, 30), folder
+        mirrored = PACKAGE / folder
+        # What is private in the sources has its tests in a folder without the underscore.
+        private = mirrored.parent / f"_{mirrored.name}"
+        assert folder in OTHER_FOLDERS or mirrored.is_dir() or private.is_dir(), folder
+
+
+def test_tests_of_a_folder_lie_in_its_mirror() -> None:
+    """A file of tests that imports nothing but one folder's modules lies in that folder's tests."""
+    for path in TEST_FILES:
+        used = set(re.findall(r"^ *(?:from|import) viewer\.(\w+)", path.read_text(), re.MULTILINE))
+        if path.name.startswith("test_") and used - EVERYWHERE == {"media"}:
+            assert path.parent == TESTS / "media", path
 
 
 def test_third_party_modules_have_one_home() -> None:

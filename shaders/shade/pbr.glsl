@@ -16,12 +16,13 @@ uniform vec4 u_channels[6];     // which number of a texel counts
 uniform bool u_has_metallic_map;
 uniform bool u_has_roughness_map;
 uniform bool u_has_emissive_map;
-uniform float u_occlusion_strength;  // 0: no map
+uniform float u_occlusion_map_strength;  // 0: no map
 uniform vec3 u_emissive;        // linear
 #endif
 
 const float PI = 3.14159265358979;
 const float LIGHTS = 0.30;      // of the two lights beside the studio's
+const float BOX = 0.5;          // of the studio's light on a surface that faces its key box
 const float SMOOTHEST = 0.045;  // roughness at which highlights of points are still seen
 
 struct Surface {
@@ -86,14 +87,20 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     float occlusion = 1.0;
     vec3 color = vec3(0.0);
 #ifdef MATERIALS
-    if (u_occlusion_strength > 0.0)
-        occlusion = mix(1.0, number(u_occlusion_map, OCCLUSION), u_occlusion_strength);
+    if (u_occlusion_map_strength > 0.0)
+        occlusion = mix(1.0, number(u_occlusion_map, OCCLUSION), u_occlusion_map_strength);
     color = u_emissive;
     if (u_has_emissive_map)
         color *= texture(u_emissive_map, place(EMISSIVE)).rgb;
 #endif
+    occlusion *= ambient_visibility(position.z);
+    for (int i = 0; i < 2; ++i) {
+        float cosine = max(dot(normal, u_light_directions[i]), 0.0);
+        float seen = visibility(i, position, normal, cosine);
+        color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
+        // The studio's key box hangs about where the key light is, and the same things hide it.
+        occlusion *= 1.0 - BOX * cosine * (1.0 - seen);
+    }
     color += surrounding(s, normal, to_eye, occlusion);
-    for (int i = 0; i < 2; ++i)
-        color += LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
     return toned(color);
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from app import box_body
+from app.curves.plotted import SIZE, clip_text
 from app.driver import Driver
 from app.tiny import write_rig
 from formats.synthetic_smpl import model
@@ -55,6 +56,19 @@ def drive_body(drive, tmp_path):
         return drive(path, size=size, samples=1)
 
     return open_body
+
+
+@pytest.fixture
+def curves(drive, rig, tmp_path):
+    """A hand on the Curves panel of the tiny rig; the arm's curves are shown."""
+    (tmp_path / "wave.anim").write_text(clip_text())
+    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
+    hand.show_panel("Curves")
+    hand.state.selected_joint = 1
+    hand.step(3)
+    hand.click("curve arm.x")
+    hand.step(3)
+    return hand
 
 
 @pytest.fixture

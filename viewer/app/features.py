@@ -1,4 +1,4 @@
-"""Table of the panels and keys that features add to the window.
+"""Tables of the panels and keys that features add to the window.
 
 A panel is a module ``<name>_panel.py`` of its feature's folder with ``draw(state)``; a key runs a
 function of the state. Both are imported when they are first used.
@@ -21,6 +21,7 @@ _K = imgui.Key
 _OPTION = "view.display_actions.toggle_option"
 _LOOK = "view.camera_actions.look"
 _TOOL = "posing.tool_actions.choose_tool"
+_UNDO = "core.undo_actions"
 _STEP = "playback.actions.step"
 
 
@@ -37,10 +38,10 @@ class Panel:
     place : str
         Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
-        Part of ``Figure`` without which the panel is hidden; ``"motion"`` or ``"actors"``:
-        a motion, or a motion or several actors; empty for none.
+        Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
+        ``"actors"`` a motion or several actors; empty if the panel is always available.
     leads : bool
-        Whether it comes to the front of its tabs when a scene makes it available.
+        Whether it is brought to the front of its tabs when a scene makes it available.
     on_demand : bool
         Whether it is closed until the user opens it.
     """
@@ -60,13 +61,13 @@ class Shortcut:
     Attributes
     ----------
     chords : tuple of int
-        ImGui's key codes with their modifiers.
+        ImGui's key codes with modifiers.
     label : str
         Name of the key.
     text : str
-        Its effect, as shown in lists of keys.
+        Effect of the key, as shown in lists of keys.
     action : str
-        Module and function within ``viewer.app``; called with the state.
+        Module and function within ``viewer.app``, called with the state.
     arguments : tuple
         Further arguments of the action.
     """
@@ -103,12 +104,12 @@ PANELS = {
 """Panels in the order in which they are docked and listed in the menu."""
 
 KEYS = (
-    Shortcut((_K.r,), "R", "reset every DOF to the file's pose", "posing.pose_actions.reset_pose"),
+    Shortcut((_K.r,), "R", "reset the pose to that of the file", "posing.pose_actions.reset_pose"),
     Shortcut((_K.s,), "S", "show or hide the skeleton", "view.display_actions.toggle_skeleton"),
     Shortcut(
         (_K.k,),
         "K",
-        "attached skin or skin in binding space",
+        "attached skin, or skin in binding space",
         "view.display_actions.toggle_binding",
     ),
     Shortcut((_K.w,), "W", "wireframe", _OPTION, ("wireframe", "Wireframe")),
@@ -135,8 +136,10 @@ KEYS = (
     Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", "window_actions.toggle_messages"),
     Shortcut((_K.f12,), "F12", "save a screenshot", "window_actions.want", ("screenshot",)),
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", "window_actions.want", ("open dialog",)),
-    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", "core.undo.undo"),
-    Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo.redo"),
+    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", f"{_UNDO}.undo"),
+    Shortcut(
+        (_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo_actions.redo"
+    ),
     Shortcut((_K.q,), "Q", "Select tool: click selects", _TOOL, ("select",)),
     Shortcut((_K.e,), "E", "Rotate tool: rotate the selected joint", _TOOL, ("rotate",)),
     Shortcut((_K.d,), "D", "Move tool: drag a joint (IK)", _TOOL, ("move",)),
@@ -173,7 +176,7 @@ MOUSE = (
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),
-    ("Alt drag of the time line", "go between whole frames"),
+    ("Alt drag in the timeline", "seek between whole frames"),
     ("Drop files", "open them"),
 )
 """Actions of the mouse, listed with the keys."""

@@ -19,7 +19,7 @@ __all__ = ["draw_error", "draw_message_window"]
 
 _ERROR_TITLE = "Error"
 _TITLE = "Messages"
-_SIZE = (42.0, 22.0)  # letters' heights
+_SIZE = (42.0, 22.0)  # in font sizes
 _ERROR_COLOR = (1.0, 0.5, 0.42, 1.0)
 _LONGEST = 1000  # longest message shown, characters
 
@@ -39,12 +39,12 @@ def _draw_content(state: AppState) -> None:
     listed = state.messages.log.listed(state.messages.lists_status)
     if button(state, "Copy all", "" if listed else "no messages yet"):
         imgui.set_clipboard_text("\n".join(map(message_line, listed)))
-    explain("to the clipboard, one per line")
+    explain("copy the messages to the clipboard, one per line")
     text = "Results of keys and buttons"
     same_line_if_room(text)
     state.messages.lists_status = checkbox(state, text, state.messages.lists_status)
     if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
-        # New messages come at the end, which stays in view unless the user scrolls away.
+        # New messages are appended; the end stays visible unless the user scrolls away.
         follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
         if not listed:
             imgui.text_disabled("no messages yet")

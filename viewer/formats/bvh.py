@@ -85,7 +85,7 @@ def read(source: Source) -> SkeletonMotion:
     unit, facts, unit_note = guess_unit(points)
     figure = Figure(source.path.stem, skeleton=skeleton, unit=unit)
     up, more, up_notes = guess_up(figure, clip, points)
-    facts += (*more, ("frames", f"{len(motion.values)} at {rate:g} a second"))
+    facts += (*more, ("frames", f"{len(motion.values)} at {rate:g} fps"))
     return SkeletonMotion(replace(figure, up=up, facts=facts), clip, unit_note, up_notes)
 
 

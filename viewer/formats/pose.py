@@ -149,7 +149,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         scale=_single(named, "scale"),
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
-        turns=read_rotations(named),
+        joint_rotations=read_rotations(named),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
@@ -182,7 +182,11 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
         where = [odd] if odd else []
         near = did_you_mean(odd, known)
         raise named.fault("F002.pose-keys", *where, keys=list(named.values), near=near)
-    used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+    used = (
+        (*_KNOWN, *_NOT_NEEDED)
+        if record.joint_rotations is None
+        else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+    )
     unread = [key for key in named.values if key not in used]
     if unread:
         named.warn("F007.pose-keys", unread[0], keys=[*map(_with_hint, unread)])
@@ -276,7 +280,9 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     ):
         if single is not None:
             named[name] = single
-    return named if record.turns is None else named | named_rotations(record.turns)
+    return (
+        named if record.joint_rotations is None else named | named_rotations(record.joint_rotations)
+    )
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:

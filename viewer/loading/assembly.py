@@ -215,7 +215,7 @@ def _place_side_by_side(cast: Cast) -> None:
     placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
     if len(cast.actors) < 2 or not loose:
         return
-    # A stray vertex far outside must not displace the next actor.
+    # Bounds of the drawn scene exclude stray vertices, which would displace the next actor.
     spans = [scene_box(Scene([actor]))[:, 0] for actor in loose]
     if placed:
         before = scene_box(Scene(placed))[:, 0]

@@ -1,4 +1,4 @@
-"""Assignment of motions to actors: clips by channels, captured bodies a model, BVH by joints."""
+"""Assignment of motions to actors: clips by channels, BVH by joints, captures with a model."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: 
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale skeletons to metres that stand beside others of another unit; record the guesses.
+    """Scale separate skeletons to metres if other actors have another unit; record the guesses.
 
     A lone skeleton, or one among others in its own unit, keeps the numbers of its file.
 

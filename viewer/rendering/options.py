@@ -6,7 +6,16 @@ from dataclasses import dataclass, field
 
 from viewer.rig.skinning import Skinning
 
-__all__ = ["BACKGROUNDS", "MATCAPS", "SHOWN", "Color", "DisplayOptions", "Light", "Lights"]
+__all__ = [
+    "BACKGROUNDS",
+    "MATCAPS",
+    "QUALITIES",
+    "SHOWN",
+    "Color",
+    "DisplayOptions",
+    "Light",
+    "Lights",
+]
 
 Color = tuple[float, float, float]
 
@@ -23,6 +32,14 @@ MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
 
 BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
+
+
+QUALITIES = {
+    "draft": "Draft, no shadows",
+    "normal": "Normal, shadows",
+    "final": "Final, soft shadows and occlusion",
+}
+"""Qualities of a picture, with labels for menus."""
 
 
 @dataclass(slots=True)
@@ -102,6 +119,13 @@ class DisplayOptions:
         Opacity of the skeleton over the skin.
     samples : int
         Samples per pixel, limited by the driver's maximum.
+    quality : str
+        A key of ``QUALITIES``: draft is fastest; normal draws shadows; final averages ``passes``
+        pictures, for soft shadows, ambient occlusion and smooth edges.
+    shadows : bool
+        Draw shadows, unless the quality is draft.
+    passes : int
+        Pictures that are averaged in final quality.
     lights : Lights
         The two lights.
     skinning : Skinning
@@ -150,6 +174,9 @@ class DisplayOptions:
     background: str = "gradient"
     skeleton_opacity: float = 0.35
     samples: int = 4
+    quality: str = "draft"
+    shadows: bool = True
+    passes: int = 8
     lights: Lights = field(default_factory=Lights)
     skinning: Skinning = field(default_factory=Skinning)
     scalar: str = "weight"
@@ -165,3 +192,8 @@ class DisplayOptions:
     xray: bool = False
     joint_names: bool = False
     joint_axes: bool = False
+
+    @property
+    def has_shadows(self) -> bool:
+        """Whether shadows are drawn."""
+        return self.shadows and self.quality != "draft"

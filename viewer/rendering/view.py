@@ -9,22 +9,27 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.camera import Camera, camera_axes
+from viewer.rendering.effects import NO_EFFECTS, Effects
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.options import Light, Lights
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
 
-__all__ = ["View", "in_front", "set_lights", "set_model", "view_of"]
+__all__ = ["View", "in_front", "key_direction", "set_lights", "set_model", "view_of"]
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A camera's matrices for one picture, (4, 4) for column vectors, and the camera itself."""
+    """A camera's matrices for one picture, (4, 4) for column vectors, and the camera itself.
+
+    Effects change the light on what is drawn with this view.
+    """
 
     matrix: Floats
     projection: Floats
     camera: Camera
+    effects: Effects = NO_EFFECTS
 
 
 def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
@@ -71,6 +76,12 @@ def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
         "u_studio_strength": lights.studio,
     }
     set_uniforms(program, values)
+    view.effects.bind(program, view.matrix)
+
+
+def key_direction(view: View, lights: Lights) -> Floats:
+    """Return the unit vector towards the key light in scene space: (3,)."""
+    return _direction(lights.key, lights.follow_camera, view) @ view.matrix[:3, :3]
 
 
 def _studio_axes(view: View, follows: bool) -> Floats:

@@ -7,13 +7,12 @@ import math
 import numpy as np
 import pytest
 from app.captured import dots, people
-from app.curves import test_curves_panel
-from app.curves.test_curves_panel import ARM_X, SIZE, _at, _center, clip_text
+from app.curves.plotted import ARM_X, SIZE, _at, _center, clip_text
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.app.actors.following import start_following
-from viewer.app.core.undo import undo
+from viewer.app.core.undo_actions import undo
 from viewer.app.curves.clip_actions import key_present_pose, new_clip
 from viewer.app.curves.editing import (
     add_key_at,
@@ -30,9 +29,6 @@ from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene
 
 KEY = (ARM_X, 1)  # at 1 s: 0.6
-
-
-curves = test_curves_panel.curves  # the fixture
 
 
 def go(hand, time):

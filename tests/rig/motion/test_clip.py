@@ -147,7 +147,7 @@ def test_check_fit_names_both_numbers() -> None:
 
 
 def test_check_fit_refuses_skeletons_that_move_otherwise() -> None:
-    """A body of 24 ball joints has 72 DOFs too, as the wasp's 23 joints and root have."""
+    """A body of 24 ball joints has 72 DOFs, like the wasp with 23 joints and a root."""
     skeleton = hand_made.skeleton([-1, 0], [(j, axis, 0.0) for j in (0, 1) for axis in "xyz"])
     assert not is_course_rig(skeleton)
     with pytest.raises(RigError) as caught:

@@ -7,7 +7,9 @@ CODES = {
     "C002": Code("warning", "duplicate key times", "keep one of them"),
     "C003": Code("warning", "joint jumps between frames", "look for a bad frame or a cut there"),
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
-    "C005": Code("warning", "missing frames", "interpolate them (--fill-gaps) or capture again"),
+    "C005": Code(
+        "warning", "missing frames", "interpolate them (--interpolate-gaps) or capture again"
+    ),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
     "C007": Code("warning", "foot sliding", "lock the foot or adjust the root motion"),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),

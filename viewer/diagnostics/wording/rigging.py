@@ -56,7 +56,7 @@ MESSAGES = {
     "a gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use --scale axes",
     "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all take the weights of the "
     "nearest vertex",
-    "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {filled}",
+    "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
     "R005.nearest": "nearest vertex within the limit for {n} of {all} vertices",
     "R005.negative-weights": "negative weights of the template treated as 0: {n}",
     "R005.reversed": "{n:#part} of the target with winding opposite to the template: matched with "

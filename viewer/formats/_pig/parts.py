@@ -103,7 +103,7 @@ class PigFiles:
 
 
 def open_parts(source: Source) -> PigFiles:
-    """Read every array of a text folder, pickle or ``.npz``.
+    """Read all arrays of a text folder, pickle or ``.npz``.
 
     Raises
     ------

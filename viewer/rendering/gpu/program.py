@@ -78,6 +78,7 @@ class Programs:
         geometry: str = "",
         affine: bool = False,
         materials: bool = False,
+        effects: tuple[str, ...] = (),
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
@@ -97,14 +98,16 @@ class Programs:
             Whether joints may scale or shear, for vertex shaders that skin.
         materials : bool
             Surfaces have more than a picture each, see ``include/surface.glsl``.
+        effects : tuple of str
+            Macros of the fragment shader, see ``viewer.rendering.effects``.
 
         Raises
         ------
         RenderError
             If the driver rejects a shader; the message names the file and its line.
         """
-        key = (name, skin, fragment or name, chunk, geometry, affine, materials)
-        return self._get(key, ())
+        files = name, skin, fragment or name, chunk, geometry
+        return self._get((*files, affine, materials, *effects), ())
 
     def feedback(
         self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
@@ -115,14 +118,15 @@ class Programs:
         """
         return self._get((name, chunk, "", "", "", affine, False), outputs)
 
-    def _get(
-        self, key: tuple[str, str, str, str, str, bool, bool], outputs: tuple[str, ...]
-    ) -> moderngl.Program:
+    def _get(self, key: tuple[str | bool, ...], outputs: tuple[str, ...]) -> moderngl.Program:
         if key not in self._cache:
-            name, skin, fragment_name, chunk, middle, affine, materials = key
+            name, skin, fragment_name, chunk, middle = (str(part) for part in key[:5])
+            affine, materials, effects = key[5], key[6], tuple(str(part) for part in key[7:])
             files: list[str] = []
-            defines = ("AFFINE_PALETTE",) * affine + ("MATERIALS",) * materials
+            common = ("MATERIALS",) if materials else ()
+            defines = (*common, "AFFINE_PALETTE") if affine else common
             vertex = _compose(f"{name}.vert", skin, files, defines)
+            defines = *common, *effects
             fragment = (
                 _compose(f"{fragment_name}.frag", chunk, files, defines) if fragment_name else None
             )
@@ -186,7 +190,7 @@ def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] =
         else:
             parts.append(f"{line}\n")
         if line.startswith("#version"):
-            parts += [f"#define {define}\n" for define in defines]
+            parts += [f"#define {macro}\n" for macro in defines]
         if include or line.startswith(("#version", _CHUNK_MARK)):
             parts.append(f"#line {base + number + 1}\n")
     return "".join(parts)

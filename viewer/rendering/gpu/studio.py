@@ -11,8 +11,8 @@ from viewer.resources import resource
 
 __all__ = ["STUDIO_SAMPLERS", "Matcaps", "Studio"]
 
-STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 14, "u_matcap": 15}
-"""Texture units; those before are the skinning shader's and the materials'."""
+STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
+"""Texture units beside those of materials and effects; no program has the last two."""
 
 _SRGB8 = 0x8C41
 

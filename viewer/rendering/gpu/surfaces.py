@@ -25,7 +25,7 @@ SAMPLERS = {
     "u_occlusion_map": 11,
     "u_emissive_map": 12,
 }
-"""Texture unit of each entry of ``TEXTURES``; those before 5 are the skinning shader's."""
+"""Texture unit of each entry of ``TEXTURES``; lower ones are the skinning shader's."""
 
 _UNITS = tuple(SAMPLERS.values())
 _COLORS = ("base_texture", "emissive_texture")  # sRGB
@@ -34,7 +34,7 @@ _UNTEXTURED: dict[str, Any] = {
     "u_has_metallic_map": False,
     "u_has_roughness_map": False,
     "u_normal_scale": 0.0,
-    "u_occlusion_strength": 0.0,
+    "u_occlusion_map_strength": 0.0,
     "u_has_emissive_map": False,
 }
 
@@ -182,7 +182,7 @@ def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict
         "u_has_metallic_map": "metallic_texture" in textures,
         "u_has_roughness_map": "roughness_texture" in textures,
         "u_normal_scale": material.normal_scale if "normal_texture" in textures else 0.0,
-        "u_occlusion_strength": (
+        "u_occlusion_map_strength": (
             material.occlusion_strength if "occlusion_texture" in textures else 0.0
         ),
         "u_has_emissive_map": "emissive_texture" in textures,

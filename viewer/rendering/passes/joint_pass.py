@@ -111,7 +111,9 @@ class JointPass:
         """
         overlays = opacity < 1.0
         view = in_front(view) if overlays else view
-        program = self.programs.drawing("joint", "phong", fragment="mesh")
+        program = self.programs.drawing(
+            "joint", "phong", fragment="mesh", effects=view.effects.defines
+        )
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_boxes, program, skeleton.boxes, *how)
         if overlays:

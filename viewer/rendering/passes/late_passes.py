@@ -15,6 +15,7 @@ from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.mesh_pass import MeshPass, shading_of
 
 if TYPE_CHECKING:
+    from viewer.rendering.gpu.accumulation import Accumulation
     from viewer.rendering.gpu.mesh_buffers import MeshBuffers
     from viewer.rendering.gpu.studio import Matcaps, Studio
     from viewer.rendering.passes.annotation_pass import AnnotationPass
@@ -65,6 +66,7 @@ class LatePasses:
     ) -> None:
         self._context, self._programs, self._buffers = context, programs, buffers
         self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
+        self._sum: Accumulation | None = None
         self._made: list[_Made] = []
 
     @cached_property
@@ -161,7 +163,20 @@ class LatePasses:
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):
             self.studio.use()
 
+    def accumulation(self, size: tuple[int, int]) -> Accumulation:
+        """Return the sum of passes of a picture of this size."""
+        from viewer.rendering.gpu.accumulation import Accumulation
+
+        if self._sum is None or self._sum.size != size:
+            if self._sum is not None:
+                self._sum.release()
+            self._sum = None
+            self._sum = Accumulation(self._context, self._programs, size)
+        return self._sum
+
     def release(self) -> None:
         """Free all passes that were created."""
         for item in self._made:
             item.release()
+        if self._sum is not None:
+            self._sum.release()

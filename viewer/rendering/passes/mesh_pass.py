@@ -30,7 +30,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # of the figure's size
-_COLORMAP_UNIT = 6  # those before are the materials' and the skinning shader's
+_COLORMAP_UNIT = 6
 
 
 class MeshPass:
@@ -79,6 +79,7 @@ class MeshPass:
             "scalar" if look is not None else shading_of(mesh.mesh, options),
             geometry=corners,
             materials=look is None and mesh.mesh.has_materials,
+            effects=view.effects.defines,
         )
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
@@ -89,6 +90,20 @@ class MeshPass:
             mesh.scalars.use(_COLORMAP_UNIT)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
         draw_runs(self.array(mesh, program, indices), indices, options, blended=blended)
+
+    def draw_shape(
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        fragment: str,
+    ) -> None:
+        """Draw the surface with a fragment shader that needs no material."""
+        program = self.programs.drawing("mesh", fragment=fragment)
+        set_model(program, view, placement, mesh.center)
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
 
     def draw_lines(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions

@@ -236,7 +236,7 @@ def _rotate_joints(
     world = np.empty((skeleton.n_joints, 3, 3))
     present = joint_rotations(skeleton, start)
     for joint, parent in enumerate(skeleton.parents.tolist()):
-        # The wanted parent rotation, not the limited one, so that local rotations are preserved.
+        # The target rotation of the parent, not the limited one, preserves local rotations.
         above = world[parent] if parent >= 0 else np.eye(3)
         world[joint] = wanted.get(joint, above @ present[joint])
         if joint in wanted:
