@@ -12,8 +12,8 @@ from viewer.errors import ViewerError
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BACKGROUNDS, QUALITIES, SHOWN, DisplayOptions
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.options import BACKGROUNDS, MATCAPS, QUALITIES, SHOWN, DisplayOptions
 from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.arrays import Floats
@@ -74,15 +74,14 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         default="skin",
         help="parts of the figures; binding is the skin in the bind pose (default: skin)",
     )
-    group.add_argument(
-        "--shading", choices=SHADING, default="phong", help="shading of surfaces (default: phong)"
-    )
+    _add_shading_arguments(group)
     add_scalar_arguments(group)
     group.add_argument(
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
-        help="gradient, transparent or a colour (default: gradient)",
+        help="gradient, white, environment (the studio, out of focus), transparent or a colour "
+        "(default: gradient)",
     )
     group.add_argument(
         "--samples", type=int, default=4, metavar="N", help="samples per pixel (default: 4)"
@@ -102,6 +101,31 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME",
         help="hide a body part; may be repeated",
+    )
+
+
+def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options of surfaces."""
+    group.add_argument(
+        "--shading",
+        choices=SHADING_CHOICES,
+        default="auto",
+        help="shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
+        "phong (default: auto)",
+    )
+    for name, default in (("metallic", 0.0), ("roughness", 0.6)):
+        group.add_argument(
+            f"--{name}",
+            type=number,
+            default=default,
+            metavar="0..1",
+            help=f"with --shading pbr, of materials that do not state it (default: {default:g})",
+        )
+    group.add_argument(
+        "--matcap",
+        choices=MATCAPS,
+        default="clay",
+        help="picture for --shading matcap (default: clay)",
     )
 
 
@@ -173,9 +197,15 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
+    for name in ("metallic", "roughness"):
+        if not 0.0 <= getattr(arguments, name) <= 1.0:
+            raise ViewerError(f"--{name}: expected 0 to 1, found {getattr(arguments, name):g}")
     options = DisplayOptions(
         show=arguments.show,
         shading=arguments.shading,
+        matcap=arguments.matcap,
+        metallic=arguments.metallic,
+        roughness=arguments.roughness,
         flat=arguments.flat,
         wireframe=arguments.wireframe,
         normals=arguments.normals,

@@ -6,7 +6,16 @@ from dataclasses import dataclass, field
 
 from viewer.rig.skinning import Skinning
 
-__all__ = ["BACKGROUNDS", "QUALITIES", "SHOWN", "Color", "DisplayOptions", "Light", "Lights"]
+__all__ = [
+    "BACKGROUNDS",
+    "MATCAPS",
+    "QUALITIES",
+    "SHOWN",
+    "Color",
+    "DisplayOptions",
+    "Light",
+    "Lights",
+]
 
 Color = tuple[float, float, float]
 
@@ -18,7 +27,10 @@ SHOWN = {
 }
 """Parts of a figure that are drawn, with labels for menus."""
 
-BACKGROUNDS = ("gradient", "transparent")
+MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
+"""Pictures of lit spheres for the shading ``"matcap"``, with labels for menus."""
+
+BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
 
 
@@ -65,6 +77,8 @@ class Lights:
         Colours of the ambient light on surfaces that face up and down, linear.
     specular, shininess : float
         Strength and exponent of the Blinn-Phong highlight.
+    studio : float
+        Strength of the studio that lights metallic-roughness surfaces.
     follow_camera : bool
         Whether the directions rotate with the camera.
     """
@@ -76,6 +90,7 @@ class Lights:
     ground: Color = (0.44, 0.36, 0.31)
     specular: float = 0.18
     shininess: float = 32.0
+    studio: float = 1.0
     follow_camera: bool = True
 
 
@@ -89,12 +104,17 @@ class DisplayOptions:
         A key of ``SHOWN``. A figure without a mesh always shows its skeleton, one without a
         skeleton its mesh.
     shading : str
-        A key of ``viewer.rendering.gpu.program.SHADING``.
+        A key of ``viewer.rendering.gpu.program.SHADING_CHOICES``; ``"auto"`` is metallic-roughness
+        for figures whose files describe such materials, otherwise Blinn-Phong.
+    matcap : str
+        A key of ``MATCAPS``, for the shading ``"matcap"``.
+    metallic, roughness : float
+        0 to 1, for the shading ``"pbr"`` of materials that do not state them.
     flat, wireframe, normals, texture, grid, cull : bool
         Use one normal per triangle; draw edges; draw vertex normals as lines; use the texture;
         draw the ground grid; cull back faces.
     background : str
-        ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
+        An entry of ``BACKGROUNDS`` or ``"#rrggbb"``.
     skeleton_opacity : float
         Opacity of the skeleton over the skin.
     samples : int
@@ -141,7 +161,10 @@ class DisplayOptions:
     """
 
     show: str = "skin"
-    shading: str = "phong"
+    shading: str = "auto"
+    matcap: str = "clay"
+    metallic: float = 0.0
+    roughness: float = 0.6
     flat: bool = False
     wireframe: bool = False
     normals: bool = False

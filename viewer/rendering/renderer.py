@@ -11,6 +11,7 @@ import moderngl
 from viewer.rendering.camera import Camera
 from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
@@ -26,6 +27,7 @@ from viewer.rendering.sampling import jittered, n_passes, sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.shown import (
     Meshes,
+    far_first,
     has_joint_marks,
     has_markers,
     has_points,
@@ -270,19 +272,33 @@ class Renderer:
 
     def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         """Draw background and surfaces."""
-        self.ground_pass.draw_background(options.background)
+        if options.background == "environment":
+            self.late.backdrop_pass.draw(view, options.lights)
+        else:
+            self.ground_pass.draw_background(options.background)
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
         for actor, mesh in meshes.singles:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        if options.cull:
-            self.context.enable(moderngl.CULL_FACE)
+        drawn = [mesh.mesh for _, mesh in meshes.singles]
+        drawn += [instances.mesh for _, instances in meshes.instanced]
+        self.late.use_pictures(drawn, options)
+        self._draw_layer(meshes, view, options, blended=False)
+        if any(mesh.is_blended for mesh in drawn):
+            with without_depth_writes(self.context):
+                self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
+
+    def _draw_layer(
+        self, meshes: Meshes, view: View, options: DisplayOptions, blended: bool
+    ) -> None:
         for actor, mesh in meshes.singles:
-            self.mesh_pass.draw(mesh, placement_of(actor, options), view, options, actor.color)
+            if mesh.mesh.is_blended or not blended:
+                placement = placement_of(actor, options)
+                self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended)
         for actors, instances in meshes.instanced:
-            draw_instances(self.programs, instances, actors, view, options)
-        self.context.disable(moderngl.CULL_FACE)
+            if instances.mesh.is_blended or not blended:
+                draw_instances(self.programs, instances, actors, view, options, blended)
 
     def _prepare(self, target: Target) -> None:
         """Bind and clear a target."""
