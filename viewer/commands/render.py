@@ -165,9 +165,9 @@ def draw_scene(
     from viewer.rendering.software_limits import limit_passes
 
     with deferred(), Offscreen(device) as offscreen:
-        if not is_chosen:
-            print_warnings(limit_passes(options, scene, size, offscreen.context))
+        notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)
         pixels = offscreen.render(scene, size, camera, options, box)
+        print_warnings(notes)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:
             left_out, n_seen = offscreen.renderer.names_left_out
