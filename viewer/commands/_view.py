@@ -12,7 +12,7 @@ from viewer.errors import ViewerError, printable
 from viewer.near_names import name_hint
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
+from viewer.rendering.options import BACKGROUNDS, BONES, SHOWN, DisplayOptions
 from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.arrays import Floats
@@ -65,6 +65,13 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_scalar_arguments(group)
     group.add_argument(
+        "--bones",
+        choices=BONES,
+        default="auto",
+        help="style of skeletons (default: auto, the boxes of files that have them, otherwise "
+        "octahedra)",
+    )
+    group.add_argument(
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
@@ -73,6 +80,18 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--samples", type=int, default=4, metavar="N", help="samples per pixel (default: 4)"
     )
+    _add_flags(group)
+    group.add_argument(
+        "--hide-part",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="leave out a body part; may be repeated",
+    )
+
+
+def _add_flags(group: argparse._ArgumentGroup) -> None:
+    """Add the options that take no value."""
     for name, text in (
         ("flat", "use one normal per triangle"),
         ("wireframe", "draw triangle edges"),
@@ -86,13 +105,6 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
     ):
         group.add_argument(f"--{name}", action="store_true", help=text)
-    group.add_argument(
-        "--hide-part",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="leave out a body part; may be repeated",
-    )
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -171,6 +183,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         normals=arguments.normals,
         texture=not arguments.no_texture,
         grid=not arguments.no_grid,
+        bones=arguments.bones,
         background=arguments.background,
         samples=arguments.samples,
         skinning=skinning_of(arguments),

@@ -6,7 +6,16 @@ from dataclasses import dataclass, field
 
 from viewer.rig.skinning import Skinning
 
-__all__ = ["BACKGROUNDS", "SHOWN", "Color", "DisplayOptions", "Light", "Lights"]
+__all__ = [
+    "BACKGROUNDS",
+    "BONES",
+    "OPACITIES",
+    "SHOWN",
+    "Color",
+    "DisplayOptions",
+    "Light",
+    "Lights",
+]
 
 Color = tuple[float, float, float]
 
@@ -17,6 +26,18 @@ SHOWN = {
     "binding": "Skin in binding space",
 }
 """Parts of a figure that are drawn, with labels for menus."""
+
+BONES = {
+    "auto": "Automatic",
+    "boxes": "Boxes",
+    "octahedra": "Octahedra",
+    "sticks": "Sticks",
+    "axes": "Axes",
+}
+"""Styles of skeletons, with labels for menus: see ``DisplayOptions.bones``."""
+
+OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
+"""Default opacity of a skeleton over the skin: boxes often enclose it, thin shapes do not."""
 
 BACKGROUNDS = ("gradient", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
@@ -83,8 +104,12 @@ class DisplayOptions:
         grid; cull back faces.
     background : str
         ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
-    skeleton_opacity : float
-        Of the skeleton when it is shown over the skin.
+    bones : str
+        Style of skeletons, a key of ``BONES``: boxes as a file has them, or small cubes; octahedra,
+        sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
+        them, otherwise octahedra.
+    skeleton_opacity : float or None
+        Of the skeleton when it is shown over the skin; None for ``OPACITIES`` by style.
     samples : int
         Multisampling; the driver's maximum if that is smaller.
     lights : Lights
@@ -130,7 +155,8 @@ class DisplayOptions:
     grid: bool = True
     cull: bool = False
     background: str = "gradient"
-    skeleton_opacity: float = 0.35
+    bones: str = "auto"
+    skeleton_opacity: float | None = None
     samples: int = 4
     lights: Lights = field(default_factory=Lights)
     skinning: Skinning = field(default_factory=Skinning)

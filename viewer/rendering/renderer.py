@@ -154,7 +154,8 @@ class Renderer:
         self._draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, joint, options.skeleton_opacity)
+                opacity = self.buffers.skeleton(actor).opacity(options)
+                self._draw_skeleton(actor, view, options, joint, opacity)
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)

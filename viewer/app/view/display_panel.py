@@ -20,9 +20,11 @@ from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
 from viewer.errors import printable
 from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import SHOWN
+from viewer.rendering.options import BONES, OPACITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
+from viewer.rendering.passes.bone_style import skeleton_opacity
 from viewer.rendering.passes.ground_pass import grid_step, parse_color
+from viewer.rendering.shown import shows_skeleton
 from viewer.rig.annotations import BodyParts
 
 __all__ = ["draw"]
@@ -45,10 +47,11 @@ def draw(state: AppState) -> None:
                 show(state, key)
             note_item(state, text)
             explain("", missing[key])
+    if any(shows_skeleton(actor, options) for actor in state.scene.actors):
+        options.bones = choice(state, "Bones", options.bones, BONES)
+        explain("style of the skeleton; automatic: the boxes of its file, otherwise octahedra")
     if options.show == "both":
-        options.skeleton_opacity = slider(
-            state, "Skeleton opacity", options.skeleton_opacity, 0.0, 1.0, flags=_CLAMP
-        )
+        _draw_opacity(state)
     imgui.separator()
     before = options.shading
     options.shading = choice(state, "Shading", before, SHADING)
@@ -71,6 +74,16 @@ def draw(state: AppState) -> None:
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_opacity(state: AppState) -> None:
+    """Draw the opacity of the skeleton, which has a default for each style until it is moved."""
+    options, skeleton = state.options, state.actor.figure.skeleton
+    usual = OPACITIES["boxes"] if skeleton is None else skeleton_opacity(skeleton, options)
+    shown = usual if options.skeleton_opacity is None else options.skeleton_opacity
+    moved = slider(state, "Skeleton opacity", shown, 0.0, 1.0, flags=_CLAMP)
+    if moved != shown:
+        options.skeleton_opacity = moved
 
 
 def _draw_joint_toggles(state: AppState) -> None:
