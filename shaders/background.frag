@@ -1,5 +1,5 @@
 #version 330
-// A vertical gradient with half a step of noise, so that 8 bits show no bands.
+// Vertical gradient, dithered by half a quantization step so that 8 bits show no banding.
 
 in float v_height;
 

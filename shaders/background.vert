@@ -1,5 +1,5 @@
 #version 330
-// One triangle that covers the picture.
+// A single triangle that covers the whole picture.
 
 out float v_height;     // 0 at the bottom, 1 at the top
 

@@ -13,11 +13,11 @@ uniform mat4 u_model_view;     // figure space, minus the skeleton's centre, to 
 uniform mat3 u_normal_matrix;
 uniform mat4 u_projection;
 uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
-uniform int u_selected;        // this joint is drawn in u_highlight; -1 for none
-uniform int u_only;            // draw this joint alone; -1 for all
+uniform int u_selected;        // joint to draw in u_highlight; -1 for none
+uniform int u_only;            // joint to draw alone; -1 for all
 uniform float u_height;         // of the picture, pixels
 uniform vec3 u_highlight;      // linear
-uniform bool u_has_color;      // u_color counts, not in_color
+uniform bool u_has_color;      // use u_color instead of in_color
 uniform vec3 u_color;          // linear
 
 out vec3 v_position;    // camera space

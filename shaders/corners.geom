@@ -1,6 +1,6 @@
 #version 330
-// Hands a triangle's three numbers on to its pixels, and how near each pixel is to each corner.
-// What the vertex shader calls v_name arrives here as v_vertex_name: see program.py.
+// Passes the scalars of a triangle's three corners and barycentric coordinates to its fragments.
+// program.py renames the vertex shader's output v_name to v_vertex_name.
 
 layout(triangles) in;
 layout(triangle_strip, max_vertices = 3) out;
@@ -20,8 +20,8 @@ out vec3 v_color;
 out float v_scalar;
 flat out float v_opacity;
 flat out int v_instance;
-flat out vec3 v_corners;    // the numbers at the triangle's corners
-out vec3 v_shares;          // barycentric coordinates
+flat out vec3 v_corners;    // scalars at the triangle's corners
+out vec3 v_barycentric;     // barycentric coordinates
 
 void main() {
     for (int corner = 0; corner < 3; corner++) {
@@ -33,7 +33,7 @@ void main() {
         v_opacity = v_vertex_opacity[corner];
         v_instance = v_vertex_instance[corner];
         v_corners = vec3(v_vertex_scalar[0], v_vertex_scalar[1], v_vertex_scalar[2]);
-        v_shares = vec3(corner == 0, corner == 1, corner == 2);
+        v_barycentric = vec3(corner == 0, corner == 1, corner == 2);
         gl_Position = gl_in[corner].gl_Position;
         EmitVertex();
     }

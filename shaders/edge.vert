@@ -1,5 +1,5 @@
 #version 330
-// Edges of a posed mesh, drawn a little nearer than its surface.
+// Edges of a posed mesh, with a depth bias that puts them in front of its surface.
 
 in vec3 in_position;    // figure units, minus the posed centre
 

@@ -1,16 +1,16 @@
 #version 330
-// Grid lines one pixel wide whatever the distance; every tenth is stronger; all fade far away.
+// Ground grid: lines one pixel wide at any distance, every tenth one stronger; all fade out.
 
 in vec2 v_ground;
 
-uniform float u_step;       // between lines, scene units
-uniform vec2 u_origin;      // of the scene, in grid steps from v_ground's zero
-uniform float u_fade;       // distance at which nothing is left, scene units
+uniform float u_step;       // distance between lines, scene units
+uniform vec2 u_origin;      // the scene's origin, in grid steps from v_ground = 0
+uniform float u_fade;       // distance at which the grid has faded out, scene units
 uniform vec3 u_line_color;  // sRGB
 
-out vec4 f_color;           // sRGB, multiplied by alpha
+out vec4 f_color;           // sRGB, premultiplied by alpha
 
-// Coverage of lines at whole numbers, and 0 where they are closer than pixels.
+// Coverage of lines at integers; 0 where the lines are less than a pixel apart.
 float lines(vec2 place) {
     vec2 width = max(fwidth(place), vec2(1e-6));
     vec2 distance = abs(fract(place - 0.5) - 0.5) / width;

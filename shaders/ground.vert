@@ -5,9 +5,9 @@ in vec2 in_corner;      // -1 or 1
 
 uniform mat4 u_model_view;  // ground space (x right, y up the picture seen from above) to camera
 uniform mat4 u_projection;
-uniform float u_extent;     // half the square's side, scene units
+uniform float u_extent;     // half the side length of the square, scene units
 
-out vec2 v_ground;          // scene units from the grid's own origin, a crossing of lines
+out vec2 v_ground;          // scene units from the grid's centre, a line crossing
 
 void main() {
     v_ground = u_extent * in_corner;

@@ -1,5 +1,5 @@
 #version 330
-// Skins and places a vertex of one of many actors that share a figure: instances of its mesh.
+// Skins and transforms a vertex of an instanced mesh: one instance per actor of a shared figure.
 
 #pragma include normals
 #pragma include skinning
@@ -17,7 +17,7 @@ in float in_is_rigid;       // per instance: 1 if no joint scales or shears, els
 #endif
 
 uniform mat4 u_projection;
-uniform bool u_has_colors;  // in_color counts
+uniform bool u_has_colors;  // use in_color instead of in_actor_color
 
 out vec3 v_position;        // camera space
 out vec3 v_normal;          // camera space, any length

@@ -1,10 +1,10 @@
 #version 330
-// Places one box per joint: instances of a cube from 0 to 1.
+// Transforms one box per joint, an instance of a cube from 0 to 1.
 
 #pragma include normals
 
 in vec3 in_corner;      // corner of the cube
-in vec3 in_normal;      // of its face
+in vec3 in_normal;      // normal of its face
 in vec3 in_low;         // per joint: lowest corner of the box, joint space
 in vec3 in_high;        // per joint: highest corner
 in vec3 in_color;       // per joint, linear
@@ -13,10 +13,10 @@ uniform mat4 u_model_view;     // figure space, minus the skeleton's centre, to 
 uniform mat3 u_normal_matrix;
 uniform mat4 u_projection;
 uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
-uniform int u_selected;        // this joint is drawn in u_highlight; -1 for none
-uniform int u_only;            // draw this joint alone; -1 for all
+uniform int u_selected;        // joint to draw in u_highlight; -1 for none
+uniform int u_only;            // joint to draw alone; -1 for all
 uniform vec3 u_highlight;      // linear
-uniform bool u_has_color;      // u_color counts, not in_color
+uniform bool u_has_color;      // use u_color instead of in_color
 uniform vec3 u_color;          // linear
 
 out vec3 v_position;    // camera space
@@ -28,7 +28,7 @@ flat out float v_opacity;
 flat out int v_instance;
 
 vec4 world_row(int row) {
-    // upload.py's rows hold 256 matrices.
+    // The texture rows of upload.py hold 256 matrices.
     return texelFetch(u_world, ivec2(3 * (gl_InstanceID & 255) + row, gl_InstanceID >> 8), 0);
 }
 

@@ -1,12 +1,12 @@
 #version 330
-// Letters in one colour with a dark rim.
+// Text in one colour with a dark outline.
 
-in vec2 v_pixel;                // of the texture
-flat in vec3 v_color;           // sRGB: what white becomes
+in vec2 v_pixel;                // texel coordinates
+flat in vec3 v_color;           // sRGB colour of the letters
 
-uniform sampler2D u_texture;    // grey and opacity, the first multiplied by the second
+uniform sampler2D u_texture;    // grey, premultiplied by opacity, and opacity
 
-out vec4 f_color;               // sRGB, multiplied by alpha
+out vec4 f_color;               // sRGB, premultiplied by alpha
 
 void main() {
     vec2 ink = texelFetch(u_texture, ivec2(v_pixel), 0).rg;

@@ -1,14 +1,14 @@
 #version 330
-// One rectangle of a texture per instance, pixel by pixel.
+// One rectangle of a texture per instance, drawn at its size in pixels.
 
-in vec2 in_corner;          // per instance: left upper corner in the picture, pixels
-in vec2 in_source;          // the same in the texture, rows counted from the first
+in vec2 in_corner;          // per instance: top left corner in the picture, pixels
+in vec2 in_source;          // top left corner in the texture, texels
 in vec2 in_extent;          // width and height, pixels
-in vec3 in_color;           // sRGB: what white becomes
+in vec3 in_color;           // sRGB colour of the letters
 
 uniform vec2 u_picture;     // size of the picture, pixels
 
-out vec2 v_pixel;           // of the texture
+out vec2 v_pixel;           // texel coordinates
 flat out vec3 v_color;
 
 void main() {

@@ -1,5 +1,5 @@
 #version 330
-// One colour, sRGB, multiplied by alpha.
+// Uniform colour: sRGB, premultiplied by alpha.
 
 uniform vec4 u_line_color;
 

@@ -1,5 +1,5 @@
 #version 330
-// One line per vertex along its normal: two vertices an instance.
+// Vertex normals as lines: each instance is one line of two vertices.
 
 in vec3 in_position;    // figure units, minus the posed centre
 in vec3 in_normal;      // unit length

@@ -1,5 +1,5 @@
 #version 330
-// Shades a surface from both sides; everything is in camera space, colours are linear.
+// Two-sided shading of a surface in camera space, with linear colours.
 
 in vec3 v_position;
 in vec3 v_normal;
@@ -15,7 +15,7 @@ uniform bool u_has_uv;
 uniform bool u_textured;
 uniform sampler2D u_texture;    // sRGB, decoded by the sampler
 
-out vec4 f_color;               // sRGB, multiplied by alpha
+out vec4 f_color;               // sRGB, premultiplied by alpha
 
 // Linear to sRGB, IEC 61966-2-1.
 vec3 encode(vec3 color) {
@@ -33,11 +33,13 @@ vec4 base_color() {
 void main() {
     vec3 to_eye = u_orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_position);
     vec3 face = cross(dFdx(v_position), dFdy(v_position));
-    // The side that is seen decides, not the winding: some files are clockwise.
+    // Orient the face normal towards the eye instead of trusting the winding: some files are
+    // clockwise.
     face *= dot(face, to_eye) < 0.0 ? -1.0 : 1.0;
     face = dot(face, face) > 0.0 ? normalize(face) : to_eye;
     vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : normalize(v_normal);
-    // Well beyond a right angle: at one, rounding would turn every other pixel.
+    // Flip normals that face away. The threshold is well beyond 90 degrees: at exactly 90 degrees
+    // rounding would flip pixels at random.
     normal = dot(normal, face) < -0.1 ? -normal : normal;
     float opacity = u_opacity * v_opacity;
     f_color = vec4(encode(shade(v_position, normal, to_eye)) * opacity, opacity);

@@ -1,16 +1,16 @@
 #version 330
-// Places a posed mesh before the camera. It was skinned before: see skin.vert.
+// Transforms a mesh that skin.vert has already skinned to camera and clip space.
 
 in vec3 in_position;    // figure units, minus the posed centre
 in vec3 in_normal;      // unit length
 in vec2 in_uv;          // v = 0 at the bottom row of the texture
 in vec3 in_color;       // linear
-in float in_scalar;     // what a scalar quantity shows
+in float in_scalar;     // value of the scalar quantity
 
 uniform mat4 u_model_view;     // to camera space
-uniform mat3 u_normal_matrix;  // its inverse transpose
+uniform mat3 u_normal_matrix;  // inverse transpose of the model-view matrix
 uniform mat4 u_projection;
-uniform bool u_has_colors;     // in_color counts
+uniform bool u_has_colors;     // use in_color instead of u_color
 uniform vec3 u_color;          // linear
 
 out vec3 v_position;    // camera space

@@ -1,11 +1,11 @@
 #version 330
-// A colour that fades away from the present, sRGB; the result is multiplied by alpha.
+// Motion path that fades with the time difference to the current frame; premultiplied sRGB.
 
 in vec3 v_color;
-in float v_time;        // seconds of the scene's clock
+in float v_time;        // scene time, seconds
 
 uniform float u_now;    // seconds
-uniform float u_reach;  // seconds back and forth at which nothing is left; 0: all is as strong
+uniform float u_reach;  // seconds before and after u_now at which it has faded out; 0: no fading
 uniform float u_opacity;
 
 out vec4 f_color;

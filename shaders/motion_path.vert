@@ -1,9 +1,9 @@
 #version 330
-// One segment of a path per instance: a strip of four vertices, as wide on the screen wherever.
+// One segment of a motion path per instance: a strip of four vertices of constant screen width.
 
 in vec3 in_start;       // figure space minus centre
 in vec3 in_end;
-in vec2 in_times;       // of both ends, seconds of the scene's clock
+in vec2 in_times;       // of both ends, scene time in seconds
 in vec3 in_color;       // sRGB
 
 uniform mat4 u_model_view;
@@ -14,8 +14,8 @@ uniform float u_width;  // of the line, pixels
 out vec3 v_color;       // sRGB
 out float v_time;
 
-// Where the segment from a to b, with a behind the near plane, crosses it.
-vec4 cut(vec4 a, vec4 b) {
+// Clips end a of the segment from a to b at the near plane.
+vec4 clip_near(vec4 a, vec4 b) {
     float distance_a = a.z + a.w, distance_b = b.z + b.w;
     return distance_a < 0.0 && distance_b > 0.0
         ? mix(a, b, distance_a / (distance_a - distance_b)) : a;
@@ -24,13 +24,13 @@ vec4 cut(vec4 a, vec4 b) {
 void main() {
     mat4 matrix = u_projection * u_model_view;
     vec4 first = matrix * vec4(in_start, 1.0), second = matrix * vec4(in_end, 1.0);
-    vec4 start = cut(first, second), end = cut(second, first);
+    vec4 start = clip_near(first, second), end = clip_near(second, first);
     bool at_end = gl_VertexID >= 2;
     vec2 way = (end.xy / end.w - start.xy / start.w) * u_size;
     way = dot(way, way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
     float side = gl_VertexID % 2 == 0 ? -1.0 : 1.0;
     vec4 place = at_end ? end : start;
-    // Half a width to either side; a picture is 2 wide in this space.
+    // Half a width to each side; the picture is 2 units wide in normalized device coordinates.
     place.xy += u_width / u_size * side * vec2(-way.y, way.x) * place.w;
     gl_Position = place;
     v_time = at_end ? in_times.y : in_times.x;

@@ -1,5 +1,5 @@
 #version 330
-// A rectangle of a picture, pixel by pixel.
+// A rectangle of the picture, drawn at its size in pixels.
 
 uniform vec2 u_place;       // lower left corner, pixels
 uniform vec2 u_extent;      // width and height, pixels

@@ -1,12 +1,12 @@
 #version 330
-// What is seen at a pixel, in numbers.
+// Identifies the object at a pixel by indices instead of a colour.
 
 in vec3 v_position;     // camera space
 flat in int v_instance;
 
-uniform int u_item;     // which draw, from 1 on
+uniform int u_item;     // number of the draw call, from 1
 
-out ivec4 f_id;         // draw, instance, triangle, depth in camera space as the bits of a float
+out ivec4 f_id;         // draw call, instance, triangle, bits of the camera-space z
 
 void main() {
     f_id = ivec4(u_item, v_instance, gl_PrimitiveID, floatBitsToInt(v_position.z));

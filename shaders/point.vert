@@ -1,12 +1,12 @@
 #version 330
-// One capsule per instance: a sphere cut in two whose halves lie at both ends. A keypoint is one
-// with both ends in one place, a limb reaches from one keypoint to another.
+// One capsule per instance: two hemispheres, one at each end. A keypoint is a capsule whose ends
+// coincide; a limb connects two keypoints.
 
-in vec4 in_corner;      // of the unit sphere, in w 0 at the start and 1 at the end
+in vec4 in_corner;      // xyz: on the unit sphere; w: 0 at the start, 1 at the end
 in vec3 in_start;       // per instance: figure space minus centre
 in vec3 in_end;
 in float in_radius;     // per instance, figure units
-in vec4 in_color;       // per instance: linear, and opacity
+in vec4 in_color;       // per instance: linear colour and opacity
 
 uniform mat4 u_model_view;     // figure space, minus centre, to camera space
 uniform mat3 u_normal_matrix;

@@ -1,9 +1,9 @@
 #version 330
-// A line with round ends and perhaps a border, whose edges fade over a pixel; the result is
-// multiplied by alpha.
+// A line with round caps and an optional border, antialiased over one pixel; premultiplied by
+// alpha.
 
 in vec4 v_color;                // sRGB and opacity
-noperspective in vec2 v_place;  // pixels along the segment and beside it
+noperspective in vec2 v_place;  // pixels along and across the segment
 flat in float v_length;         // pixels
 flat in float v_radius;         // pixels
 

@@ -1,6 +1,6 @@
 #version 330
-// One segment per instance: a strip of four vertices around it, as wide on the screen wherever. A
-// segment of length 0 is a dot.
+// One segment per instance: a strip of four vertices of constant screen width. A segment of
+// length 0 is a dot.
 
 in vec3 in_start;       // scene space minus centre
 in vec3 in_end;
@@ -10,25 +10,26 @@ in float in_width;      // pixels
 uniform mat4 u_model_view;
 uniform mat4 u_projection;
 uniform vec2 u_size;        // of the picture, pixels
-uniform float u_border;     // pixels around it
-uniform float u_lift;       // share of the way to the eye by which it lies before its place
-uniform float u_height;     // the same for parallel projections: scene units
+uniform float u_border;     // width of the border, pixels
+uniform float u_lift;       // fraction of the distance to the eye by which it is moved forward
+uniform float u_height;     // the same for parallel projections, scene units
 uniform bool u_orthographic;
 
 out vec4 v_color;
-noperspective out vec2 v_place;     // pixels along the segment and beside it
+noperspective out vec2 v_place;     // pixels along and across the segment
 flat out float v_length;            // pixels
 flat out float v_radius;            // pixels
 
-// What lies on a surface is drawn a little before it, at the same place of the picture.
+// Moves a point towards the eye without changing its pixel, so that it is not hidden by the
+// surface that it lies on.
 vec4 lifted(vec3 place) {
     vec3 seen = (u_model_view * vec4(place, 1.0)).xyz;
     seen = u_orthographic ? seen + vec3(0.0, 0.0, u_height) : seen * (1.0 - u_lift);
     return u_projection * vec4(seen, 1.0);
 }
 
-// Where the segment from a to b, with a behind the near plane, crosses it.
-vec4 cut(vec4 a, vec4 b) {
+// Clips end a of the segment from a to b at the near plane.
+vec4 clip_near(vec4 a, vec4 b) {
     float distance_a = a.z + a.w, distance_b = b.z + b.w;
     return distance_a < 0.0 && distance_b > 0.0
         ? mix(a, b, distance_a / (distance_a - distance_b)) : a;
@@ -36,13 +37,13 @@ vec4 cut(vec4 a, vec4 b) {
 
 void main() {
     vec4 first = lifted(in_start), second = lifted(in_end);
-    vec4 start = cut(first, second), end = cut(second, first);
+    vec4 start = clip_near(first, second), end = clip_near(second, first);
     vec2 way = 0.5 * (end.xy / end.w - start.xy / start.w) * u_size;
     v_length = length(way);
     way = v_length > 0.0 ? way / v_length : vec2(1.0, 0.0);
     v_radius = 0.5 * in_width;
     bool at_end = gl_VertexID >= 2;
-    // Half a pixel more all around, for edges that fade.
+    // Half a pixel more on all sides, for antialiased edges.
     float reach = v_radius + u_border + 0.5;
     float along = at_end ? reach : -reach, side = gl_VertexID % 2 == 0 ? -reach : reach;
     vec4 place = at_end ? end : start;

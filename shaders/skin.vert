@@ -1,5 +1,5 @@
 #version 330
-// Skins a vertex once per changed pose; its outputs are captured by transform feedback.
+// Skins a vertex once per changed pose; transform feedback captures the outputs.
 
 #pragma include normals
 #pragma include skinning

@@ -4,7 +4,8 @@ import pytest
 
 from viewer import errors
 from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError, OutputError, RenderError, ViewerError, printable
+from viewer.errors import FormatError, OutputError, RenderError, ViewerError
+from viewer.phrases import printable
 
 
 def wrong(path, line=None):

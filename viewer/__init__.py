@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from viewer.rendering.options import DisplayOptions, Light, Lights
     from viewer.rig.blendshapes import BlendShapes
     from viewer.rig.figure import Figure
-    from viewer.rig.mesh import Material, Mesh
+    from viewer.rig.material import Material, Texture
+    from viewer.rig.mesh import Mesh
     from viewer.rig.motion.clip import Channel, Clip
     from viewer.rig.motion.clip_sampling import evaluate, sample
     from viewer.rig.pose import Pose, rest_pose
@@ -57,6 +58,7 @@ __all__ = [
     "Skeleton",
     "Skin",
     "Skinning",
+    "Texture",
     "ViewerError",
     "apply_record",
     "deform",
@@ -86,7 +88,7 @@ _HOMES = {
     "Figure": "rig.figure",
     "Light": "rendering.options",
     "Lights": "rendering.options",
-    "Material": "rig.mesh",
+    "Material": "rig.material",
     "Mesh": "rig.mesh",
     "Pose": "rig.pose",
     "PoseRecord": "rig.posing.pose_record",
@@ -94,6 +96,7 @@ _HOMES = {
     "Skeleton": "rig.skeleton",
     "Skin": "rig.skin",
     "Skinning": "rig.skinning",
+    "Texture": "rig.material",
     "ViewerError": "errors",
     "apply_record": "rig.posing.pose_record",
     "deform": "rig.skinning",

@@ -13,8 +13,9 @@ from importlib import import_module
 import viewer
 from viewer.commands import COMMANDS
 from viewer.commands._usage import Parser, check_command, command_parser
-from viewer.errors import FormatError, ViewerError, printable
+from viewer.errors import FormatError, ViewerError
 from viewer.interrupts import Interrupted, watched
+from viewer.phrases import printable
 from viewer.streams import standard_streams
 
 __all__ = ["run"]

@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from viewer.diagnostics.diagnostic import Diagnostic
-from viewer.phrases import counted, one_of, printable
+from viewer.phrases import printable
 
 __all__ = [
     "FormatError",
@@ -25,11 +25,7 @@ __all__ = [
     "RigError",
     "UnsupportedFormatError",
     "ViewerError",
-    "counted",
-    "one_of",
-    "printable",
 ]
-
 
 _LONGEST = 1000  # characters of a message with names in it
 

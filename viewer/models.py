@@ -7,9 +7,10 @@ import os
 import re
 from pathlib import Path
 
-from viewer.errors import OutputError, ViewerError, printable
+from viewer.errors import OutputError, ViewerError
 from viewer.formats import save_bytes
 from viewer.interrupts import deferred
+from viewer.phrases import printable
 
 __all__ = [
     "find_model",

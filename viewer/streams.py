@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO, cast
 
-from viewer.errors import OutputError, printable
+from viewer.errors import OutputError
+from viewer.phrases import printable
 
 __all__ = ["is_stdout", "require_stdout", "standard_streams", "summary_stream", "write_stdout"]
 

@@ -1,27 +1,27 @@
-// What skin.vert and instance.vert share: a vertex at rest, its influences, what joints do to it.
-// Positions are in figure units, relative to the rest centre on the way in and to the posed
-// centre on the way out, so that float32 keeps its digits far from the origin.
+// Skinning of one vertex, shared by skin.vert and instance.vert. Positions are in figure units;
+// inputs are relative to the rest centre and results to the posed centre, so that float32 keeps
+// its precision far from the origin.
 
 in vec3 in_position;     // bind space, minus the rest centre
 in vec3 in_normal;       // bind space, any length
-in uvec4 in_bindings;    // first pair, number of pairs, the vertex in u_offsets, and the bits of
-                         // a float: the sum of the weights, minus 1
+in uvec4 in_bindings;    // first pair, number of pairs, index of the vertex in u_offsets, and the
+                         // bits of a float: the sum of the weights minus 1
 
-uniform sampler2D u_palette;    // skinning matrices, three rows each, instance after instance
-uniform sampler2D u_pairs;      // joint and weight, each vertex's strongest first
+uniform sampler2D u_palette;    // skinning matrices, three rows each, for each instance in turn
+uniform sampler2D u_pairs;      // joint and weight, strongest first for each vertex
 uniform int u_n_joints;         // matrices of one instance
-uniform int u_n_summed;         // 1: u_offsets has the sum for each instance, 0: it has not
-uniform int u_n_offsets;        // rows of u_offset_list for one instance; 0: none
+uniform int u_n_summed;         // 1 if u_offsets holds one summed row per instance, else 0
+uniform int u_n_offsets;        // entries of u_offset_list per instance; 0 for none
 uniform int u_n_sources;        // vertices in each row of u_offsets
-uniform sampler2D u_offset_list;  // row of u_offsets and its weight, instance after instance
-uniform sampler2D u_offsets;    // pose correctives, row after row
+uniform sampler2D u_offset_list;  // row of u_offsets and weight, for each instance in turn
+uniform sampler2D u_offsets;    // pose correctives, row by row
 
-// Of the instance; main sets them before anything is called.
+// Properties of the instance, set by main before it calls any function.
 vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
 #ifdef AFFINE_PALETTE  // some joint of some instance scales or shears
-bool is_rigid;       // none of this instance does
-mat3 linear;         // what skin() did to directions; it sets it
+bool is_rigid;       // true if no joint of this instance scales or shears
+mat3 linear;         // linear part of the blended transform, set by skin()
 #endif
 
 // Sum of the vertex's weights, minus 1.
@@ -29,8 +29,8 @@ float excess() {
     return uintBitsToFloat(in_bindings.w);
 }
 
-// Shifts, as processors have no division of eight integers at once: upload.py's rows hold 1024
-// pairs or 256 matrices.
+// The texture rows of upload.py hold 1024 pairs or 256 matrices: powers of two, so that shifts and
+// masks replace integer division, which has no SIMD instruction on CPUs.
 
 // Joint index and weight of one pair.
 vec2 influence(uint index) {
@@ -48,12 +48,12 @@ vec3 unit(vec3 v) {
     return size > 0.0 ? v / size : v;
 }
 
-// A normal under a blended matrix, given as rows; any length.
+// Transforms a normal by a blended matrix with rows x, y, z; the result has any length.
 vec3 blended_normal(vec3 x, vec3 y, vec3 z, vec3 normal) {
 #ifdef AFFINE_PALETTE
     if (!is_rigid) {
-        // Scaled to entries of at most 1, as only directions count: no scale overflows, and
-        // rounding reaches 1e-5 of the determinant.
+        // Only the direction matters, so the matrix is scaled to entries of at most 1: this
+        // avoids overflow and bounds the rounding error of the determinant by 1e-5.
         vec3 sizes = max(max(abs(x), abs(y)), abs(z));
         float size = max(max(sizes.x, sizes.y), sizes.z);
         size = size > 0.0 ? size : 1.0;
@@ -63,13 +63,14 @@ vec3 blended_normal(vec3 x, vec3 y, vec3 z, vec3 normal) {
     return vec3(dot(x, normal), dot(y, normal), dot(z, normal));
 }
 
-// One offset of a vertex: upload.py's rows hold 4096.
+// One offset of a vertex; the texture rows of upload.py hold 4096.
 vec3 offset(int row, int vertex) {
     int index = row * u_n_sources + vertex;
     return texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
 }
 
-// Sum of the pose correctives of one vertex. Loops, as processors run what a condition skips.
+// Sum of the pose correctives of one vertex. A loop with zero iterations skips the texture reads;
+// software drivers execute both sides of a condition.
 vec3 corrective(int vertex) {
     vec3 sum = vec3(0.0);
     for (int i = 0; i < u_n_summed; ++i) {
@@ -83,7 +84,7 @@ vec3 corrective(int vertex) {
     return sum;
 }
 
-void skin(inout vec3 position, inout vec3 normal);  // of the chunk
+void skin(inout vec3 position, inout vec3 normal);  // defined by the skinning method's chunk
 
 // Position in figure space minus the posed centre, and unit normal.
 void pose_vertex(bool attached, out vec3 position, out vec3 normal) {

@@ -1,4 +1,4 @@
-// Squares in texture space, sixteen to the picture, to judge stretching and seams.
+// Checkerboard of 16 x 16 squares in texture space, to judge stretching and seams.
 vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     float light = 0.25 + 0.75 * max(dot(normal, to_eye), 0.0);
     if (!u_has_uv) {

@@ -1,6 +1,6 @@
 // Blinn-Phong with two directional lights (Blinn 1977) and constant ambient light.
 uniform vec3 u_light_directions[2];  // towards each light, unit length, camera space
-uniform vec3 u_light_colors[2];      // linear, times strength
+uniform vec3 u_light_colors[2];      // linear, multiplied by strength
 uniform float u_ambient;
 uniform float u_specular;
 uniform float u_shininess;

@@ -1,12 +1,12 @@
-// A number per vertex as a colour, lit so lightly that colours can be compared.
-flat in vec3 v_corners;          // the numbers at the triangle's corners
-in vec3 v_shares;                // barycentric coordinates
+// Scalar quantity as a colour, with weak lighting so that colours remain comparable.
+flat in vec3 v_corners;          // scalars at the triangle's corners
+in vec3 v_barycentric;           // barycentric coordinates
 
 uniform vec2 u_scalar_range;     // lowest and highest value shown
 uniform sampler2D u_colormap;    // one row, sRGB, decoded by the sampler
-uniform bool u_categories;       // whole numbers, each a column of u_colormap; none below 0
-uniform bool u_dark_zero;        // what is exactly 0 is no colour of the map
-uniform bool u_isolines;         // lines at every tenth of the range
+uniform bool u_categories;       // integers, each a column of u_colormap; negative for no category
+uniform bool u_dark_zero;        // exactly 0 has the colour u_nothing instead of the map's
+uniform bool u_isolines;         // draw lines at every tenth of the range
 uniform vec3 u_nothing;          // linear
 
 vec3 category_color(float number) {
@@ -14,30 +14,31 @@ vec3 category_color(float number) {
     return column < 0 ? u_nothing : texelFetch(u_colormap, ivec2(column, 0), 0).rgb;
 }
 
-// The category that has most of the triangle here; numbers in between would be other categories.
+// Colour of the category with the largest barycentric weight here. Interpolated numbers would be
+// other categories.
 vec3 category() {
     bvec3 same = equal(v_corners.xyz, v_corners.yzx);  // first and second, second and third, …
-    vec3 shares = v_shares;
-    shares += mix(vec3(0.0), v_shares.yzx, same);
-    shares += mix(vec3(0.0), v_shares.zxy, same.zxy);
-    int best = shares.x >= shares.y ? (shares.x >= shares.z ? 0 : 2) : (shares.y >= shares.z ? 1 : 2);
+    vec3 w = v_barycentric;  // summed over corners of equal category
+    w += mix(vec3(0.0), v_barycentric.yzx, same);
+    w += mix(vec3(0.0), v_barycentric.zxy, same.zxy);
+    int best = w.x >= w.y ? (w.x >= w.z ? 0 : 2) : (w.y >= w.z ? 1 : 2);
     int next = best;
     float second = -1.0;
     for (int corner = 0; corner < 3; corner++)
-        if (v_corners[corner] != v_corners[best] && shares[corner] > second) {
+        if (v_corners[corner] != v_corners[best] && w[corner] > second) {
             next = corner;
-            second = shares[corner];
+            second = w[corner];
         }
-    // Mixed over the one pixel that the border lies in.
-    vec3 widths = fwidth(v_shares);
+    // Blend the two categories across one pixel at their border.
+    vec3 widths = fwidth(v_barycentric);
     float width = 2.0 * max(widths.x, max(widths.y, widths.z));
-    float share = clamp(0.5 + (shares[best] - second) / max(width, 1e-6), 0.5, 1.0);
+    float blend = clamp(0.5 + (w[best] - second) / max(width, 1e-6), 0.5, 1.0);
     vec3 color = category_color(v_corners[best]);
-    return next == best ? color : mix(category_color(v_corners[next]), color, share);
+    return next == best ? color : mix(category_color(v_corners[next]), color, blend);
 }
 
-// How much of a pixel a line at whole numbers covers, about one and a half pixels wide; none at
-// the range's ends, and none where they lie so close that they would hide the colours.
+// Pixel coverage of isolines at integers, about 1.5 pixels wide; 0 at the ends of the range and
+// where the lines are so dense that they would hide the colours.
 float isoline(float tenths) {
     float width = fwidth(tenths);
     float nearest = floor(tenths + 0.5);
@@ -49,8 +50,8 @@ float isoline(float tenths) {
 vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     float extent = max(u_scalar_range.y - u_scalar_range.x, 1e-30);
     float place = (v_scalar - u_scalar_range.x) / extent;
-    float share = clamp(place, 0.0, 1.0);
-    vec3 color = texture(u_colormap, vec2((0.5 + 255.0 * share) / 256.0, 0.5)).rgb;
+    float fraction = clamp(place, 0.0, 1.0);
+    vec3 color = texture(u_colormap, vec2((0.5 + 255.0 * fraction) / 256.0, 0.5)).rgb;
     if (u_dark_zero && v_corners == vec3(0.0))
         color = u_nothing;
     float line = isoline(10.0 * place);

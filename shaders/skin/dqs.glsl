@@ -1,8 +1,8 @@
-// Dual quaternion skinning (Kavan et al. 2008): stretch linearly, then move rigidly.
-uniform sampler2D u_rigid;      // five texels a joint: real part, dual part, stretch rows,
-                                // instance after instance
+// Dual quaternion skinning (Kavan et al. 2008): a linear stretch, then a rigid motion.
+uniform sampler2D u_rigid;      // five texels per joint: real part, dual part, three stretch rows;
+                                // for each instance in turn
 
-// Texels of a joint in u_rigid: upload.py's rows hold 128 joints.
+// One texel of a joint in u_rigid; the texture rows of upload.py hold 128 joints.
 vec4 rigid_texel(int joint, int texel) {
     int index = gl_InstanceID * u_n_joints + joint;
     return texelFetch(u_rigid, ivec2(5 * (index & 127) + texel, index >> 7), 0);
@@ -16,31 +16,32 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec4 real = vec4(0.0), dual = vec4(0.0), first = vec4(0.0);
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
     uint end = in_bindings.x + in_bindings.y;
-    float sum = 0.0;  // weights count relative to it
+    float sum = 0.0;  // the blended stretch is divided by it
     for (uint index = in_bindings.x; index < end; ++index) {
         vec2 pair = influence(index);
         int joint = int(pair.x);
         float weight = pair.y;
         sum += weight;
         vec4 q = rigid_texel(joint, 0);
-        // Quaternions are added on the strongest influence's side of the sphere; it comes first.
+        // q and -q are the same rotation: flip q to the hemisphere of the strongest influence,
+        // which comes first.
         first = index == in_bindings.x ? q : first;
-        float turned = dot(q, first) < 0.0 ? -weight : weight;
-        real += turned * q;
-        dual += turned * rigid_texel(joint, 1);
+        float signed_weight = dot(q, first) < 0.0 ? -weight : weight;
+        real += signed_weight * q;
+        dual += signed_weight * rigid_texel(joint, 1);
         x += weight * rigid_texel(joint, 2);
         y += weight * rigid_texel(joint, 3);
         z += weight * rigid_texel(joint, 4);
     }
     float size = length(real);
     if (abs(1.0 + excess()) < 1e-12 || size < 1e-12 * abs(sum)) {
-        position += rest_shift;  // influences that cancel out give no rotation
+        position += rest_shift;  // influences that cancel out define no rotation
 #ifdef AFFINE_PALETTE
         linear = mat3(1.0);
 #endif
         return;
     }
-    // A negative sum turns the blended quaternion around, which is the same rotation.
+    // A negative sum would only negate the blended quaternion, which is the same rotation.
     real /= size;
     dual /= size;
     x /= sum;

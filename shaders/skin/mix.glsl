@@ -1,5 +1,5 @@
 #pragma needs lbs dqs
-// Between linear blend and dual quaternion skinning: (1 - blend factor) LBS + blend factor DQS.
+// Blend of linear blend and dual quaternion skinning: (1 - blend factor) LBS + blend factor DQS.
 uniform float u_blend_factor;   // of DQS, 0 to 1
 
 void skin(inout vec3 position, inout vec3 normal) {
@@ -13,7 +13,7 @@ void skin(inout vec3 position, inout vec3 normal) {
     normal = mix(unit(normal), unit(dual_normal), u_blend_factor);
 #ifdef AFFINE_PALETTE
     if (!is_rigid) {
-        // Of the map as a whole: normals of scaled joints do not mix.
+        // Use the Jacobian of the blended map: blending the two normals would be wrong here.
         mixed = transpose(mixed + u_blend_factor * linear);
         normal = blended_normal(mixed[0], mixed[1], mixed[2], rest_normal);
     }

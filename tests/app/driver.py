@@ -8,6 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 import viewer
+from viewer.app.core.jobs import CountedJob, ThreadJob
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.headless import HeadlessApp
@@ -222,6 +223,14 @@ class Driver:
         loader = self.state.of(Files).loader
         if loader is not None:
             loader.wait()
+        self.step(3)
+
+    def finish_job(self):
+        """Run frames until the job is done and its result shown; few while a thread works."""
+        while (job := self.state.job) is not None:
+            if isinstance(job, ThreadJob | CountedJob):
+                job.wait()
+            self.step()
         self.step(3)
 
     def screen(self):

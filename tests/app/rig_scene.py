@@ -48,11 +48,3 @@ def scene(with_template=True, with_clip=False) -> Scene:
         clip = swing(figure) if with_clip else None
         actors.append(Actor(figure, pose.copy(), clip))
     return Scene(actors)
-
-
-def finish(hand):
-    """Run frames until the thread's work is done and taken over."""
-    while hand.state.job is not None:
-        hand.state.job.wait()
-        hand.step()
-    hand.step(3)

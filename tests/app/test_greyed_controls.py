@@ -104,7 +104,7 @@ def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
     hand.key("escape")
     hand.click("menu File")
     rest(hand, "Export motion…")
-    assert tooltips[-1] == "only captured points move, no joints"
+    assert tooltips[-1] == "only captured points move; there are no joints to export"
 
 
 def test_ways_to_draw_what_is_not_there_are_greyed(drive, tooltips):
@@ -113,7 +113,7 @@ def test_ways_to_draw_what_is_not_there_are_greyed(drive, tooltips):
     for label, why in (
         ("Attached skin", "there is no mesh"),
         ("Skeleton", "there is no skeleton"),
-        ("Skin in binding space", "there is no skin that follows a skeleton"),
+        ("Skin in binding space", "there is no skin attached to a skeleton"),
         ("Wireframe", "there is no mesh"),
     ):
         hand.click(label)

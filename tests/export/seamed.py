@@ -6,7 +6,8 @@ import numpy as np
 
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
@@ -24,7 +25,7 @@ JOINTS = np.array([[0, 0, 0], [1, 0, 0]], dtype=float)
 
 def materials(*pictures: np.ndarray | None) -> tuple[Material, ...]:
     return tuple(
-        Material(f"cloth {k}", f"cloth{k}.png" if picture is not None else None, picture)
+        Material(f"cloth {k}", None if picture is None else Texture(f"cloth{k}.png", picture))
         for k, picture in enumerate(pictures)
     )
 

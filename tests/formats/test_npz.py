@@ -66,7 +66,7 @@ def header(descr: str = "'<f8'", order: str = "False", shape: str = "(1,)") -> s
 
 
 def opened(data: bytes, max_size: int = 2 << 30) -> Archive:
-    return open_archive(Source("x.npz", data), max_size)
+    return open_archive(Source("x.npz", data, max_size))
 
 
 def look(data: bytes, max_size: int = 2 << 30) -> None:
@@ -308,7 +308,7 @@ def test_max_size_is_for_all_members_together() -> None:
     stream = io.BytesIO()
     np.save(stream, np.zeros(0))
     with pytest.raises(FormatError) as caught:
-        open_archive(Source("x.npy", stream.getvalue()), 100)
+        open_archive(Source("x.npy", stream.getvalue(), 100))
     found = fault_of(caught.value.diagnostic)
     assert found == ("F001.too-large", None, {"most": 100, "size": 128})
 

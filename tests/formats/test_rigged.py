@@ -18,10 +18,33 @@ from viewer.rig.annotations import VertexField
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
-from viewer.rig.mesh import Material, Mesh, vertex_normals
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
+
+
+def glazed() -> Material:
+    """Return a material without a base texture, and with everything else."""
+    picture = np.arange(32, dtype=np.uint8).reshape(4, 2, 4)
+    rough = Texture("orm.png", picture, channel=1, wrap=("repeat", "mirror"), is_smooth=False)
+    bumps = Texture("gone.png", uv_set=1, transform=[[0.5, 0.0, 0.25], [0.0, 2.0, -1.0]])
+    return Material(
+        "glazed",
+        base_color=(1.0, 0.5, 0.25, 0.125),
+        metallic=1.0,
+        roughness=0.1,
+        metallic_texture=replace(rough, channel=2),
+        roughness_texture=rough,
+        normal_texture=bumps,
+        normal_scale=-0.5,
+        emissive=(0.0, 3.0, 0.0),
+        alpha_mode="mask",
+        alpha_cutoff=0.75,
+        double_sided=False,
+        is_physical=True,
+    )
 
 
 def figure() -> Figure:
@@ -34,9 +57,10 @@ def figure() -> Figure:
         triangles,
         uvs=np.arange(10.0).reshape(5, 2),
         uv_triangles=np.array([[0, 1, 2], [0, 2, 4]]),
+        second_uvs=np.arange(10.0)[::-1].reshape(5, 2),
         materials=(
-            Material("skin", "skin.png", np.arange(48, dtype=np.uint8).reshape(3, 4, 4)),
-            Material("plain"),
+            Material("skin", Texture("skin.png", np.arange(48, dtype=np.uint8).reshape(3, 4, 4))),
+            glazed(),
         ),
         triangle_materials=np.array([1, 0]),
     )
@@ -71,6 +95,8 @@ def same(found, wanted):
         one, other = getattr(found, part.name), getattr(wanted, part.name)
         if isinstance(other, np.ndarray):
             assert_array_equal(one, other, err_msg=part.name)
+        elif isinstance(other, Texture):
+            same(one, other)
         else:
             assert one == other, part.name
 
@@ -89,12 +115,21 @@ def test_everything_that_is_written_is_read(tmp_path):
     assert len(found.fields) == 2
     for one, other in zip(found.fields, wanted.fields, strict=True):
         same(one, other)
-    for part in ("positions", "normals", "triangles", "uvs", "uv_triangles", "triangle_materials"):
+    for part in (
+        "positions",
+        "normals",
+        "triangles",
+        "uvs",
+        "uv_triangles",
+        "second_uvs",
+        "triangle_materials",
+    ):
         assert_array_equal(getattr(found.mesh, part), getattr(wanted.mesh, part))
     assert [(m.name, m.texture) for m in found.mesh.materials] == [
         ("skin", "skin.png"),
-        ("plain", None),
+        ("glazed", None),
     ]
+    same(found.mesh.materials[1], wanted.mesh.materials[1])
     assert_array_equal(found.mesh.materials[0].image, wanted.mesh.materials[0].image)
     assert found.mesh.materials[1].image is None
     # Eighths are exact in float32, too.
@@ -214,6 +249,22 @@ BROKEN = {
     "textures": (
         {"material_textures": np.array(["a"])},
         ("F002.value", None, {"item": "material_textures", "expected": 2, "found": 1}),
+    ),
+    "material rows": (
+        {"material_records": np.array(["{}"])},
+        ("F002.value", None, {"item": "material_records", "expected": 2, "found": 1}),
+    ),
+    "material": (
+        {"material_records": np.array(["{}", '{"metallic": 2}'])},
+        (
+            "F002.rig-material",
+            None,
+            {
+                "item": "material_records",
+                "index": 1,
+                "problem": "metallic: expected 0 to 1, found 2",
+            },
+        ),
     ),
     "layout": (
         {"layout_starts": np.array([3, 8])},

@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats import Source, skel, skin, write
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import skin_from_lists
 
@@ -122,8 +123,8 @@ def test_hand_made_skin_comes_back():
         uvs=[[0.1, 0.2], [1.07, -3], [0, 1]],
         triangles=[[0, 1, 2], [2, 1, 0], [0, 0, 1], [1, 2, 2]],
         materials=(
-            Material("face", "a b.png", image),
-            Material("unused one", "x\\b.png"),
+            Material("face", Texture("a b.png", image)),
+            Material("unused one", Texture("x\\b.png")),
             Material(),
         ),
         triangle_materials=[-1, 0, 0, 2],
@@ -147,7 +148,7 @@ def test_mesh_without_skin_comes_back():
 
 def test_other_pictures_are_not_replaced(tmp_path):
     (tmp_path / "a.png").write_bytes(b"mine")
-    textured = mesh(materials=(Material("", "a.png", np.zeros((1, 1, 4), np.uint8)),))
+    textured = mesh(materials=(Material("", Texture("a.png", np.zeros((1, 1, 4), np.uint8))),))
     with pytest.raises(OutputError, match=r"a\.png: a different picture exists already"):
         write(Figure("a", textured), tmp_path / "a.skin")
     assert (tmp_path / "a.png").read_bytes() == b"mine"
@@ -156,7 +157,7 @@ def test_other_pictures_are_not_replaced(tmp_path):
 
 def test_pictures_in_folders_come_back(tmp_path):
     image = np.arange(16, dtype=np.uint8).reshape(2, 2, 4)
-    textured = mesh(materials=(Material("", "sub/b.png", image),))
+    textured = mesh(materials=(Material("", Texture("sub/b.png", image)),))
     for _ in range(2):  # the second time the same picture is there already
         write(Figure("a", textured), tmp_path / "a.skin")
     found = skin.read(Source.open(tmp_path / "a.skin")).mesh.materials[0]
@@ -165,7 +166,7 @@ def test_pictures_in_folders_come_back(tmp_path):
 
 def test_pictures_outside_the_folder_are_not_written(tmp_path):
     image = np.zeros((1, 1, 4), np.uint8)
-    textured = mesh(materials=(Material("", "../b.png", image),))
+    textured = mesh(materials=(Material("", Texture("../b.png", image)),))
     (tmp_path / "here").mkdir()
     with pytest.raises(UnsupportedFormatError, match="outside the folder"):
         write(Figure("a", textured), tmp_path / "here" / "a.skin")
@@ -358,31 +359,31 @@ def test_skeleton_with_fewer_dofs_is_refused(tmp_path):
             ".skin cannot return to an earlier material",
         ),
         (
-            {"materials": (Material("a{", "b.png"),)},
+            {"materials": (Material("a{", Texture("b.png")),)},
             '.skin cannot hold the material "a{" with the texture "b.png"',
         ),
         (
-            {"materials": (Material("my normals", "b.png"),)},
+            {"materials": (Material("my normals", Texture("b.png")),)},
             '.skin cannot hold the material "my normals" with the texture "b.png"',
         ),
         (
-            {"materials": (Material("a", "b}.png"),)},
+            {"materials": (Material("a", Texture("b}.png")),)},
             '.skin cannot hold the material "a" with the texture "b}.png"',
         ),
         (
-            {"materials": (Material("a", " b.png"),)},
+            {"materials": (Material("a", Texture(" b.png")),)},
             '.skin cannot hold the material "a" with the texture " b.png"',
         ),
         (
-            {"materials": (Material("a", "b\nc.png"),)},
+            {"materials": (Material("a", Texture("b\nc.png")),)},
             '.skin cannot hold the material "a" with the texture "b\\nc.png"',
         ),
         (
-            {"materials": (Material("a", ""),)},
+            {"materials": (Material("a", Texture("")),)},
             '.skin cannot hold the material "a" with the texture ""',
         ),
         (
-            {"materials": (Material("\ud800", "\ud800"),)},
+            {"materials": (Material("\ud800", Texture("\ud800")),)},
             '.skin cannot hold the material "\\ud800" with the texture "\\ud800"',
         ),
     ],

@@ -8,7 +8,8 @@ import numpy as np
 
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import Skeleton
@@ -124,7 +125,7 @@ def picture(rows) -> Material:
     """Return a material whose texture has these rows of (r, g, b), the first at the top."""
     colors = np.array(rows, dtype=np.uint8)
     alpha = np.full((*colors.shape[:2], 1), 255, dtype=np.uint8)
-    return Material("paint", "paint.png", np.concatenate([colors, alpha], axis=2))
+    return Material("paint", Texture("paint.png", np.concatenate([colors, alpha], axis=2)))
 
 
 def checker(n=8, first=(230, 200, 60), second=(40, 70, 160)) -> Material:

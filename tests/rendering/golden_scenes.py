@@ -24,7 +24,8 @@ from viewer.rendering.camera import VIEWS, Camera, fit
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_points
 
 SIZE = 300, 300

@@ -386,5 +386,5 @@ def test_figure_without_what_is_shown_is_drawn_as_usual(offscreen):
     np.testing.assert_array_equal(alone_now[:, half:], apart[1][:, half:])
     legend = offscreen.renderer.legend
     assert legend.title == "Effect of pose correctives"
-    assert legend.note == "not known of what is shown"
+    assert legend.note == "not available for the visible figures"
     assert offscreen.renderer.scalar_range == (0.0, 0.0)

@@ -4,8 +4,8 @@ from numpy.testing import assert_allclose
 from rig.hand_made import mesh
 
 from viewer.errors import RigError
+from viewer.rig.material import Texture
 from viewer.rig.mesh import (
-    Material,
     Mesh,
     bounding_box,
     box_size,
@@ -53,7 +53,7 @@ def test_mesh_refuses_parts_that_do_not_fit(changes, message):
 
 def test_material_picture_needs_four_channels():
     with pytest.raises(RigError) as caught:
-        Material("skin", "a.png", np.zeros((2, 2, 3), np.uint8))
+        Texture("a.png", np.zeros((2, 2, 3), np.uint8))
     assert str(caught.value) == "image: expected shape any x any x 4, found 2 x 2 x 3"
 
 

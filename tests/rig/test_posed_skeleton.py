@@ -13,6 +13,7 @@ from viewer.rig import kinematics
 from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matrices
 from viewer.rig.motion.instances import posed_worlds
 from viewer.rig.number_key import NumberKey
+from viewer.rig.pose import pose_key, pose_of
 
 ARRAYS = ("dofs", "translations", "rotations", "scales", "shape_weights")
 
@@ -112,23 +113,36 @@ def test_poses_computed_together_keep_theirs(actor, runs):
     assert len(runs) == 1 and posed_skeleton(skeleton, poses[0]) is kept[0]
 
 
-def test_poses_with_the_same_numbers_are_alike(actor):
-    pose, other = actor.pose, actor.pose.copy()
-    assert pose.is_like(other) and other.is_like(pose)
+def test_keys_of_poses_tell_every_number_and_restore_it(actor):
+    pose, key = actor.pose, pose_key(actor.pose)
+    again = pose_of(key)
+    assert pose_key(again) == key
     for name in (*ARRAYS, "figure_translation"):
-        other = pose.copy()
-        getattr(other, name)[-1] += 0.25
-        assert not pose.is_like(other) and not other.is_like(pose)
-    other = pose.copy()
-    other.figure_scale = 2.0
-    assert not pose.is_like(other)
+        assert_array_equal(getattr(again, name), getattr(pose, name))
+        getattr(again, name)[-1] += 0.25
+        assert pose_key(again) != key and pose_key(pose) == key
+        again = pose_of(key)
+    again.figure_scale = 2.0
+    assert pose_key(again) != key
 
 
 def test_keys_know_arrays_of_other_layout_and_count():
     square = np.arange(9.0).reshape(3, 3)
     key = NumberKey(square[:, ::2], np.zeros(0))
-    assert key.is_of(square[:, ::2], np.zeros(0)) and key.is_of(square[:, ::2].copy(), np.zeros(0))
-    assert not key.is_of(square[:, 1::2], np.zeros(0))
-    assert not key.is_of(square[:, ::2]) and not key.is_of(square[:, ::2], np.zeros(1))
+    assert key.updated(square[:, ::2], np.zeros(0)) is key
+    assert key.updated(square[:, ::2].copy(), np.zeros(0)) is key
+    for others in (square[:, 1::2], np.zeros(0)), (square[:, ::2],), (square[:, ::2], np.zeros(1)):
+        assert key.updated(*others) == NumberKey(*others) != key
     assert key == NumberKey(square[:, ::2], np.zeros(0)) and key != NumberKey(square)
     assert hash(key) == hash(NumberKey(square[:, ::2], np.zeros(0))) and key != 1
+
+
+def test_updated_keys_keep_the_old_contents():
+    first, second = np.arange(3.0), np.arange(2.0)
+    key = NumberKey(first, second)
+    second[1] = -0.0
+    changed = key.updated(first, second)
+    assert_array_equal(key.array(1), [0.0, 1.0])
+    assert_array_equal(np.signbit(changed.array(1)), [False, True])
+    second[1] = 1.0
+    assert changed.updated(first, second) == key

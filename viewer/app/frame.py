@@ -34,10 +34,11 @@ from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
-from viewer.errors import RenderError, ViewerError, printable
+from viewer.errors import RenderError, ViewerError
 from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
+from viewer.phrases import printable
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Bytes

@@ -38,10 +38,11 @@ from viewer.app.posing.pose_actions import (
 from viewer.app.recording.state import Recording, RecordSettings
 from viewer.app.shown_panels import ShownPanels, is_open, set_open
 from viewer.app.view.view_menu import draw_view_menu
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, files_written
 from viewer.formats import FORMATS, file_stem, opened_text
 from viewer.models import known_models, load_model_folder, save_model_folder
+from viewer.phrases import printable
 
 __all__ = ["draw_menus"]
 

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.messages import Message, message_line
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, same_line_if_room
-from viewer.errors import printable
+from viewer.phrases import printable
 
 __all__ = ["draw_error", "draw_message_window"]
 

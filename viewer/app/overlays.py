@@ -19,7 +19,7 @@ from viewer.app.keys_list import draw_keys
 from viewer.app.posing.toolbar import draw_toolbar
 from viewer.app.weights.hover_text import draw_hover_text
 from viewer.app.weights.legend import draw_legend
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
 
 __all__ = ["draw_hints", "draw_overlays"]

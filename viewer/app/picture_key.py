@@ -68,8 +68,8 @@ class PictureKeys:
             arrays = [actor.placement] if actor.points is None else [actor.placement, actor.points]
             if row == len(self._places):
                 self._places.append(NumberKey(*arrays))
-            elif not self._places[row].is_of(*arrays):
-                self._places[row] = NumberKey(*arrays)
+            else:
+                self._places[row] = self._places[row].updated(*arrays)
             look = (actor, actor.figure, actor.is_drawn, actor.color, actor.clip, actor.offset)
             pose = None if actor.pose is None else pose_key(actor.pose)
             found.append((look, self._places[row], pose))

@@ -31,11 +31,12 @@ from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
-from viewer.errors import RenderError, printable  # noqa: E402
+from viewer.errors import RenderError  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
+from viewer.phrases import printable  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.gpu.context import explain  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402

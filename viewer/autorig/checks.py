@@ -44,7 +44,7 @@ def newly_outside(
     joints : (J, 3) or None
         In the target's frame; None if they are the template's.
     transferred : (J,) bool or None
-        Joints that are expected inside: not those of a part that the target lacks. None for all.
+        Joints that are expected inside, unlike those of a part that the target lacks. None for all.
     """
     own = joint_matrices(template, pose)[:, :3, 3]
     before = outside(posed, template.require_mesh().triangles, own)
@@ -92,7 +92,7 @@ def check_lines(
     lines = []
     if out:
         skeleton = figure.skeleton
-        assert skeleton is not None  # it has joints
+        assert skeleton is not None  # only joints of a skeleton are listed
         names = [joint_label(skeleton, joint) for joint in out]
         joints = np.array(out, dtype=np.int32)
         lines.append(Diagnostic("R009.joints", None, None, "joints", joints, {"names": names}))

@@ -63,7 +63,7 @@ def transfer(
     if target.n_triangles == 0:
         raise RigError("expected a target with triangles, found none")
     figure = shaped(template, pose.shape_weights)
-    # From here on the shape is part of the mesh.
+    # The shape has become part of the mesh.
     plain = pose.copy()
     plain.shape_weights = np.zeros(0)
     if how.method == "nearest":

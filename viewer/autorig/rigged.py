@@ -20,8 +20,8 @@ from viewer.rig.pose import Pose
 __all__ = ["CONFIDENCE", "Rigged", "clip_for", "with_fields"]
 
 CONFIDENCE = ("matched", "filled", "rigid")
-"""Origin of a vertex's weights: the template's surface under it, its neighbours,
-or the island that it belongs to, which is attached rigidly to the template."""
+"""Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours, or
+the rigid attachment of the island that it belongs to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -37,7 +37,7 @@ from viewer.rig.units import WORDS, unit_of_scaled
 
 __all__ = ["robust"]
 
-_JOINT_REACH = 0.08  # of the target's size: maximum distance of a surface from the template's
+_JOINT_REACH = 0.08  # fraction of the target's size; maximum distance between the two surfaces
 
 
 def robust(
@@ -83,7 +83,7 @@ def robust(
         *lines,
         *rest.lines,
         *_judged(template, figure, weights),
-        *_lost(template, figure, how),
+        *_dropped_parts(template, figure, how),
         *check_lines(figure, guarded, out, residual),
     ]
     return Rigged(
@@ -221,9 +221,9 @@ def _correctives(
 def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[Diagnostic]:
     """Return messages about the target's winding and unit."""
     lines = []
-    turned = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
-    if turned:
-        lines.append(Diagnostic("R014.wound", values={"n": turned}))
+    n_reversed = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
+    if n_reversed:
+        lines.append(Diagnostic("R014.wound", values={"n": n_reversed}))
     if template.unit in WORDS:
         lines.append(
             Diagnostic("R014.unit", values={"unit": WORDS[figure.unit]})
@@ -233,7 +233,7 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[D
     return lines
 
 
-def _lost(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
+def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
     """Return messages about parts of the template that the new figure lacks."""
     lines = []
     if template.blend_shapes is not None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import counted, printable
+from viewer.phrases import counted, printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from viewer.commands._numbers import number
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rig.scene import Actor, Scene
 
 _SLOWEST, _FASTEST = 0.001, 100_000.0  # frames per second

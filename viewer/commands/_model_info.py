@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import counted, printable
+from viewer.phrases import counted, printable
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.number_text import number_text

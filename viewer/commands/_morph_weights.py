@@ -7,8 +7,9 @@ import argparse
 import numpy as np
 
 from viewer.commands._numbers import number
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.near_names import name_hint
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MORPH_GROUP

@@ -10,7 +10,7 @@ from pathlib import Path
 from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_line, posed_actors
-from viewer.errors import RigError, UnsupportedFormatError, ViewerError, printable
+from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
@@ -23,6 +23,7 @@ from viewer.export._motion_paths import animation_files, motion_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
+from viewer.phrases import printable
 from viewer.rig.arrays import Bools
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip

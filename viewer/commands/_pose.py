@@ -13,11 +13,12 @@ from viewer.commands._frame_numbers import apply_time
 from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect, read
 from viewer.formats.pose import pose_error
 from viewer.formats.pose import read as read_pose
 from viewer.near_names import near_names
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.hands import hand_vectors

@@ -6,7 +6,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from viewer.errors import printable
+from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.near_names import name_hint, near_names
+from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -14,11 +14,12 @@ from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
 from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError, ViewerError, printable
+from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.models import known_models, load_model_folder, resolve, save_model_folder
 from viewer.near_names import did_you_mean
+from viewer.phrases import printable
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
 

@@ -6,21 +6,21 @@ import argparse
 import contextlib
 import re
 import string
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.commands._frame_numbers import Range, parse_range
+from viewer.commands._frame_numbers import parse_range
 from viewer.commands._numbers import number
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.commands._shots import Shots, Turntable, parse_turntable, shots_of
+from viewer.commands._shots import Request, Shots, parse_turntable, shots_of
 from viewer.commands._view import camera_of
-from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.interrupts import hold, poll
 from viewer.media.video_kinds import VIDEOS
+from viewer.phrases import printable
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -31,31 +31,6 @@ if TYPE_CHECKING:
 
 _FIELD = re.compile(r"\{frame[:!}]")
 _MOST_CELLS = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """Requested output, checked as far as possible before anything is opened.
-
-    Attributes
-    ----------
-    kind : "pictures", "video" or "sheet"
-        One file per frame, one video file, or one picture of all frames.
-    output : Path
-        As given; includes ``{frame}`` for pictures.
-    range : Range or None
-        Range of frames; None for the whole motion.
-    turntable : Turntable or None
-        Rotation of the camera; None if it does not rotate.
-    is_certain : bool
-        False for a GIF, which is a still picture if nothing moves.
-    """
-
-    kind: str
-    output: Path
-    range: Range | None
-    turntable: Turntable | None
-    is_certain: bool = True
 
 
 def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:

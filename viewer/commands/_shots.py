@@ -6,18 +6,16 @@ import argparse
 import math
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
-from viewer.commands._frame_numbers import Numbering, numbering_of
-from viewer.errors import ViewerError, printable
+from viewer.commands._frame_numbers import Numbering, Range, numbering_of
+from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Scene
-
-if TYPE_CHECKING:
-    from viewer.commands._sequence import Request
 
 _MOST_FRAMES = 1_000_000
 _TURN_SECONDS = 6.0  # of a turntable of a still scene
@@ -30,6 +28,31 @@ class Turntable:
 
     degrees: float
     seconds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Requested output, checked as far as possible before anything is opened.
+
+    Attributes
+    ----------
+    kind : "pictures", "video" or "sheet"
+        One file per frame, one video file, or one picture of all frames.
+    output : Path
+        As given; includes ``{frame}`` for pictures.
+    range : Range or None
+        Range of frames; None for the whole motion.
+    turntable : Turntable or None
+        Rotation of the camera; None if it does not rotate.
+    is_certain : bool
+        False for a GIF, which is a still picture if nothing moves.
+    """
+
+    kind: str
+    output: Path
+    range: Range | None
+    turntable: Turntable | None
+    is_certain: bool = True
 
 
 @dataclass(slots=True, eq=False)

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from viewer.autorig.rigged import Rigged, clip_for
 from viewer.commands._scene import print_warnings
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.export import MotionOptions, animation_for, export_animation
 from viewer.loading import MotionSettings, load
 from viewer.models import resolve
+from viewer.phrases import printable
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_clip import SampledClip

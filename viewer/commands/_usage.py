@@ -11,9 +11,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from viewer.commands import COMMANDS
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.models import resolve
 from viewer.near_names import did_you_mean, near_names, question
+from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite

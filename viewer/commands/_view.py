@@ -8,8 +8,9 @@ import re
 from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.near_names import name_hint
+from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BACKGROUNDS, BONES, SHOWN, DisplayOptions

@@ -28,11 +28,12 @@ from viewer.commands._scene import (
     add_file_arguments,
     open_scene,
 )
-from viewer.errors import RigError, UnsupportedFormatError, printable
+from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export import EXPORTERS, export, files_written
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
+from viewer.phrases import printable
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Scene
 from viewer.rig.skinning import Skinning

@@ -20,9 +20,10 @@ from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
+from viewer.phrases import printable
 from viewer.rig.comparison import Difference, compare
 from viewer.rig.comparison.steps import FrameRange
 from viewer.rig.scene import Actor, Scene

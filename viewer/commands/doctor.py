@@ -14,7 +14,8 @@ from pathlib import Path
 
 import viewer
 from viewer.commands._printing import print_line
-from viewer.errors import RenderError, printable
+from viewer.errors import RenderError
+from viewer.phrases import printable
 
 __all__ = ["Finding", "add_arguments", "examine", "run"]
 

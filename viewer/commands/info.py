@@ -15,7 +15,7 @@ from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
-from viewer.errors import counted, printable
+from viewer.phrases import counted, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.morph_target import MORPH_GROUP

@@ -20,7 +20,7 @@ from viewer.commands._scene import (
     size_limit,
 )
 from viewer.commands._usage import require_files
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.lint import (
     CODES,
     MAX_TURN,
@@ -33,6 +33,7 @@ from viewer.lint import (
     worst_first,
 )
 from viewer.near_names import did_you_mean
+from viewer.phrases import printable
 from viewer.rig.motion.evaluation import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]

@@ -26,10 +26,11 @@ from viewer.commands._view import (
     parse_size,
     warn_of_missing,
 )
-from viewer.errors import UnsupportedFormatError, ViewerError, printable
+from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.interrupts import deferred
 from viewer.media.video_kinds import VIDEOS
+from viewer.phrases import printable
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats

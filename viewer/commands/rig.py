@@ -26,12 +26,13 @@ from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
 from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError, RigError, ViewerError, printable
+from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import resolve
 from viewer.near_names import did_you_mean
+from viewer.phrases import printable
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform

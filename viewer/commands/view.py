@@ -25,8 +25,8 @@ from viewer.commands._view import (
     hide_parts,
     warn_of_missing,
 )
-from viewer.errors import printable
 from viewer.formats import free_path
+from viewer.phrases import printable
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats

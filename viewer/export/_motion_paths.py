@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, printable
+from viewer.errors import OutputError
 from viewer.export._gaps import runs
 from viewer.export._options import MotionOptions
+from viewer.phrases import printable
 from viewer.rig.captures.person import person_name
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.motion.sampled_animation import SampledAnimation

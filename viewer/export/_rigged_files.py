@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.autorig.rigged import Rigged
-from viewer.errors import UnsupportedFormatError, printable
+from viewer.errors import UnsupportedFormatError
 from viewer.export import export
 from viewer.formats import all_or_none
+from viewer.phrases import printable
 from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -33,6 +33,7 @@ from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
+from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.sampled_animation import SampledAnimation
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, counted, printable
+from viewer.errors import RigError
 from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._losses.between import between_losses
@@ -15,6 +15,7 @@ from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, read, write
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, counted, printable
+from viewer.errors import RigError
 from viewer.export._bvh.angles import unrolled
 from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh.ends import end_offsets
@@ -19,6 +19,7 @@ from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, RigError, printable
+from viewer.errors import OutputError, RigError
 from viewer.export._family_frames import (
     FamilyFrames,
     check_unit,
@@ -36,6 +36,7 @@ from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
 from viewer.interrupts import hold, poll
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_label
 from viewer.rig.motion.evaluation import frames_between

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from viewer.errors import RigError, counted, printable
+from viewer.errors import RigError
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf.document import Document, text_of
 from viewer.export._gltf.losses import Written, gltf_losses, not_held, vertices_text
@@ -27,6 +27,7 @@ from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
+from viewer.phrases import counted, printable
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation

@@ -24,10 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
 from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
 from viewer.formats import save_arrays
+from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import counted, printable
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._motion_paths import numbered_paths
 from viewer.formats import all_or_none, free_path, save_bytes, save_text
 from viewer.media.image import encode_png
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.evaluation import pose_of

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import counted, printable
 from viewer.export import require_mesh
 from viewer.formats import save_bytes
+from viewer.phrases import counted, printable
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform

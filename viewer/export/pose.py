@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
 from viewer.formats import write
+from viewer.phrases import printable
 from viewer.rig.posing.pose_record import record_of
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import RigError, counted, printable
+from viewer.errors import RigError
 from viewer.export._course_rig import course_skeleton
 from viewer.export._losses.apart import Apart, Farthest, apart_lines, negligible
 from viewer.formats import Source, all_or_none, keeping_written, read, write
+from viewer.phrases import counted, printable
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import world_matrices

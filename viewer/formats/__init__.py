@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError, UnsupportedFormatError, printable
+from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._references import referenced_path
 from viewer.formats._source import MAX_SIZE, Source
@@ -26,6 +26,7 @@ from viewer.media.saving import (
     save_text,
 )
 from viewer.media.targets import check_folder_target, check_targets
+from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from viewer.formats._archive.values import Archive

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,10 +17,9 @@ from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_
 from viewer.formats._numbers import word_begins
 from viewer.rig.arrays import Ints
 
-if TYPE_CHECKING:
-    from viewer.formats._archive.values import Archive
-
 __all__ = ["MAX_SIZE", "Source", "read_bytes"]
+
+Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
@@ -73,7 +72,7 @@ class Source:
         self.max_size = max_size
         self.diagnostics = Collector() if diagnostics is None else diagnostics
         self.also_read: list[Path] = []
-        self.archive: Archive | None = None  # opened once, on first use
+        self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
         self._counted = (0, 1)  # an offset with a known line, and that line
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
@@ -100,6 +99,12 @@ class Source:
     def peek(self, size: int) -> bytes:
         """Return the first bytes, without reading the rest unless that has been done already."""
         return read_head(self.path, size) if self._data is None else self._data[:size]
+
+    def once(self, opened: Callable[[Source], Content]) -> Content:
+        """Return what a function makes of this file; called on first use only."""
+        if opened not in self._opened:
+            self._opened[opened] = opened(self)
+        return cast("Content", self._opened[opened])
 
     def inside(self, name: str) -> Source:
         """Return a file of this folder, which shares the diagnostics of this source."""

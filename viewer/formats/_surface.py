@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import counted
 from viewer.formats._source import Source
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import vertex_normals
 

@@ -27,7 +27,8 @@ from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh
 
 __all__ = ["read"]
 

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
-from viewer.errors import printable
 from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._ply.header import CORNERS, Header, read_header
@@ -29,9 +28,11 @@ from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
 from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._texture import load_image
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
 
 __all__ = ["read"]
 
@@ -258,7 +259,7 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     if len(named) > 1:
         source.warn("F007.ply-textures", named[1][1], n=len(named))
     name, offset = named[0]
-    return (Material(name, name, load_image(source, name, offset)),)
+    return (Material(name, Texture(name, load_image(source, name, offset))),)
 
 
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:

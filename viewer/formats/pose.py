@@ -34,6 +34,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.opening import is_archive
 from viewer.formats._archive.values import describe
 from viewer.formats._pose.named_values import NamedValues, described, parse_json
 from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
@@ -88,7 +89,8 @@ def read(source: Source) -> PoseRecord:
     FormatError
         If a value is not a number, or the file has several poses.
     """
-    if source.peek(2).startswith((b"PK", b"\x80")) or source.archive is not None:
+    head = source.peek(4096)
+    if head.startswith((b"PK", b"\x80")) or is_archive(head):
         return _from_values(_archive_values(source))
     if source.head(1) == b"{" or source.path.suffix.lower() == ".json":
         return _from_values(parse_json(source))

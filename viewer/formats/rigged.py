@@ -4,7 +4,7 @@
 
     viewer_rig ()   name ()   up ()   unit ()
     positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
-    material_names (M,)   material_textures (M,)   triangle_materials (T,)   image_0 (H, W, 4) …
+    second_uvs (U, 2)   triangle_materials (T,)   and the materials, see ``_rigged_materials.py``
     joint_names (J,)   parents (J,)   rest_translations (J, 3)   rest_rotations (J, 4)
     rest_scales (J, 3)   dof_joints (D,)   dof_kinds (D,)   rest_dofs (D,)   dof_limits (D, 2)
     boxes (J, 2, 3)   skin_starts (V + 1,)   skin_joints (N,)   skin_weights (N,)
@@ -35,6 +35,7 @@ from viewer.errors import FormatError, RigError
 from viewer.formats._archive.checking import archive_of, corners_of, finite
 from viewer.formats._archive.values import Archive
 from viewer.formats._neutral import neutral_positions
+from viewer.formats._rigged_materials import material_arrays, read_materials
 from viewer.formats._source import Source
 from viewer.media.saving import save_arrays
 from viewer.rig.annotations import VertexField
@@ -43,7 +44,7 @@ from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
 from viewer.rig.hierarchy import cycle_members
-from viewer.rig.mesh import Material, Mesh, vertex_normals
+from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
@@ -118,34 +119,17 @@ def _mesh(archive: Archive) -> Mesh:
     triangles = corners_of(archive, "triangles", listed, len(positions))
     positions = neutral_positions(positions, triangles)
     has_uvs, split = archive.has("uvs"), archive.has("uv_triangles")
-    materials = _materials(archive)
+    materials = read_materials(archive)
     return Mesh(
         positions=positions,
         normals=vertex_normals(positions, triangles),
         triangles=triangles,
         uvs=_finite(archive, "uvs", (None, 2)) if has_uvs else None,
         uv_triangles=_numbers(archive, "uv_triangles", (None, 3)) if split else None,
+        second_uvs=_finite(archive, "second_uvs", (None, 2)) if archive.has("second_uvs") else None,
         materials=materials,
         triangle_materials=_numbers(archive, "triangle_materials", (None,)) if materials else None,
     )
-
-
-def _materials(archive: Archive) -> tuple[Material, ...]:
-    if not archive.has("material_names"):
-        return ()
-    names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
-    if len(names) != len(textures):
-        raise archive.fault(
-            "F002.value", item="material_textures", expected=len(names), found=len(textures)
-        )
-    images = [
-        _numbers(archive, f"image_{index}", (None, None, 4))
-        if archive.has(f"image_{index}")
-        else None
-        for index in range(len(names))
-    ]
-    rows = zip(names, textures, images, strict=True)
-    return tuple(Material(name, texture or None, image) for name, texture, image in rows)
 
 
 def _skeleton(archive: Archive) -> Skeleton:
@@ -336,6 +320,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         "triangles": mesh.triangles,
         "uvs": mesh.uvs,
         "uv_triangles": mesh.uv_triangles,
+        "second_uvs": mesh.second_uvs,
         "joint_names": np.array(skeleton.names),
         "skin_starts": skin.starts,
         "skin_joints": skin.joints,
@@ -346,7 +331,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         arrays[key] = getattr(skeleton, key)
     if figure.correctives is not None:
         arrays["correctives"] = figure.correctives.values().astype(np.float32)
-    arrays |= _material_arrays(mesh) | _layout_arrays(figure.pose_layout)
+    arrays |= material_arrays(mesh) | _layout_arrays(figure.pose_layout)
     for index, hand in enumerate(figure.hands):
         arrays[f"hand_{index}_side"] = np.array(hand.side)
         for key in ("joints", "components", "mean"):
@@ -370,20 +355,6 @@ def _field_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         arrays[f"field_{index}_values"] = field.values
         if field.names:
             arrays[f"field_{index}_names"] = np.array(field.names)
-    return arrays
-
-
-def _material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    if not mesh.materials:
-        return {}
-    arrays: dict[str, NDArray[Any]] = {
-        "material_names": np.array([material.name for material in mesh.materials]),
-        "material_textures": np.array([material.texture or "" for material in mesh.materials]),
-        "triangle_materials": mesh.material_indices,
-    }
-    for index, material in enumerate(mesh.materials):
-        if material.image is not None:
-            arrays[f"image_{index}"] = material.image
     return arrays
 
 

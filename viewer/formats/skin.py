@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.errors import OutputError, UnsupportedFormatError, printable
+from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._neutral import neutral_positions
 from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
@@ -41,9 +41,11 @@ from viewer.formats._source import Source
 from viewer.formats._texture import load_image
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text
+from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh, vertex_normals
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin
 
 __all__ = ["read", "write"]

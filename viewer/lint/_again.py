@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import printable
 from viewer.lint._finding import Finding, LintOptions
 from viewer.lint._opening import Opened, Owners, open_files, with_files
 from viewer.lint._running import Progress, lint_scene
-from viewer.phrases import listed
+from viewer.phrases import listed, printable
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import CODES, Diagnostic
+from viewer.lint._counting import Counting
+from viewer.lint._track import Track
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import DEFAULT_RATE
@@ -18,10 +20,6 @@ from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
 from viewer.rig.units import METRES
-
-if TYPE_CHECKING:
-    from viewer.lint._counting import Counting
-    from viewer.lint._tracks import Track
 
 __all__ = ["MAX_TURN", "Finding", "LintOptions", "Subject"]
 

@@ -11,13 +11,14 @@ import numpy as np
 
 from viewer.diagnostics import SEVERITIES, Collector
 from viewer.diagnostics.merging import merged
-from viewer.errors import FormatError, ViewerError, printable
+from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding
 from viewer.lint._messages import CHECKED, of_diagnostic, of_error, of_refusal
 from viewer.lint._named import aimed_at
 from viewer.lint._running import Progress
 from viewer.loading import Contents, MotionSettings, begin, read_source
+from viewer.phrases import printable
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene

@@ -1,16 +1,16 @@
-"""Tracks: positions of an actor's joints in the scene in every frame of its clip."""
+"""Evaluation of an actor's clip frame by frame."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.lint._counting import Counting
 from viewer.lint._finding import Subject
 from viewer.lint._soles import soles_of
+from viewer.lint._track import Track
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box, box_size
@@ -19,62 +19,11 @@ from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.shape import rest_joints, shaped
 
-__all__ = ["Indices", "Track", "frame_numbers", "key_times", "track_of"]
-
-Indices = NDArray[np.int64]
+__all__ = ["frame_numbers", "key_times", "track_of"]
 
 _TOGETHER = 1000  # frames per batch, whose matrices are in memory together
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
 _ON_STEP = 1e-6  # of a step
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Track:
-    """A motion evaluated frame by frame.
-
-    Attributes
-    ----------
-    times : (F,)
-        Times on the scene's clock, in seconds.
-    numbers : (F,) int32
-        Number of each frame in the file; for keyed clips, the frame of the timeline. Several rows
-        may have the same frame.
-    present : (F,) bool
-        Rows where it is False are undefined: the actor is absent, or the file's data is invalid.
-    positions : (F, J, 3)
-        Joints in scene space.
-    rotations : (F, J, 4)
-        Local rotations: unit quaternions.
-    size : float
-        Of the skeleton at rest, in scene units.
-    scale : float
-        Scene units per figure unit.
-    feet : (N,) int32
-        The joint nearest to the ground of each foot; empty without two feet by name.
-    soles : (F, N)
-        Height of each foot's lowest point in the scene.
-    """
-
-    times: Floats
-    numbers: Ints
-    present: Bools
-    positions: Floats
-    rotations: Floats
-    size: float
-    scale: float
-    feet: Ints
-    soles: Floats
-
-    @property
-    def n_frames(self) -> int:
-        """Number of frames from the first to the last in which the actor is present."""
-        there = self.numbers[self.present]
-        return int(there[-1]) - int(there[0]) + 1 if len(there) else 0
-
-    def of_each(self, rows: Indices) -> Indices:
-        """Return rows, keeping only the first of each frame: (N,)."""
-        _, first = np.unique(self.numbers[rows], return_index=True)
-        return rows[np.sort(first)]
 
 
 def track_of(subject: Subject) -> Track | None:

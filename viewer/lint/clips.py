@@ -9,7 +9,8 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
-from viewer.lint._tracks import Indices, Track, frame_numbers, key_times, track_of
+from viewer.lint._track import Indices, Track
+from viewer.lint._tracks import frame_numbers, key_times, track_of
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip

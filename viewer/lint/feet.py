@@ -8,7 +8,8 @@ from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._ground import Ground, ground_of
 from viewer.lint._soles import extent
-from viewer.lint._tracks import Track, track_of
+from viewer.lint._track import Track
+from viewer.lint._tracks import track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import joint_labels

@@ -11,7 +11,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material
+from viewer.rig.material import Material, Texture
 
 __all__ = ["with_texture"]
 
@@ -30,7 +30,7 @@ def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
         raise RigError(Diagnostic("F004.picture", path, values=values))
     covered = replace(
         mesh,
-        materials=(Material(name=path.stem, texture=path.name, image=pixels),),
+        materials=(Material(path.stem, Texture(path.name, pixels)),),
         triangle_materials=np.zeros(mesh.n_triangles, dtype=np.int32),
     )
     return replace(figure, mesh=covered)

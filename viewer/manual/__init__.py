@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
+from viewer.phrases import printable
 from viewer.resources import resource
 
 __all__ = ["PAGES", "page_text"]

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import OutputError, printable
+from viewer.errors import OutputError
 from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
 from viewer.media.unfinished import note_unfinished
+from viewer.phrases import printable
 from viewer.streams import is_stdout, write_stdout
 
 __all__ = [

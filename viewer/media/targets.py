@@ -7,7 +7,8 @@ import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from viewer.errors import OutputError, printable
+from viewer.errors import OutputError
+from viewer.phrases import printable
 from viewer.streams import is_stdout, require_stdout
 
 __all__ = ["check_folder_target", "check_targets"]

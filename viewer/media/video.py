@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.errors import OutputError, ViewerError, printable
+from viewer.errors import OutputError, ViewerError
 from viewer.media.gif_palette import PaletteChooser, PaletteUser
 from viewer.media.saving import Replacement
 from viewer.media.video_file import VideoFile
 from viewer.media.video_kinds import MOST_GIF_RATE, VideoKind, video_kind
+from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:

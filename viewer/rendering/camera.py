@@ -37,12 +37,12 @@ VIEWS = {
     "top": (0.0, 90.0),
     "bottom": (0.0, -90.0),
 }
-"""Azimuth from the front, and inclination, in degrees; "left" looks at a left hand's side."""
+"""Azimuth from the front and inclination, degrees; "left" shows the figure's left side."""
 
 _USUAL_AZIMUTH = 35.0  # initial angle from the front
 
 _MARGIN = 1.08  # margin around a framed figure
-_SMALLEST = 1e-9  # distance of a camera that frames nothing
+_SMALLEST = 1e-9  # minimum distance; framing a single point gives less
 
 
 @dataclass(slots=True)
@@ -52,7 +52,7 @@ class Camera:
     Attributes
     ----------
     target : (3,)
-        The point that it orbits, scene space.
+        Point that the camera orbits, scene space.
     distance : float
         From eye to target, scene units.
     azimuth, inclination : float
@@ -65,10 +65,10 @@ class Camera:
     up : "y" or "z"
         The scene's up axis.
     fixed : CameraView or None
-        A calibrated camera to look through: it provides the matrices, and the other fields
-        describe the camera after this is reset to None.
+        A calibrated camera to look through. It provides the matrices; the other fields take
+        effect again when this is reset to None.
     front : float
-        Azimuth from which the front is seen; named views are relative to it.
+        Azimuth of the front view; named views are relative to it.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
@@ -116,7 +116,7 @@ class Camera:
         aspect : float
             Width / height.
         box : (2, 3)
-            What must lie between the near and the far plane, scene space.
+            Bounds that must lie between the near and the far plane, scene space.
 
         Returns
         -------
@@ -148,7 +148,8 @@ class Camera:
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:
     """Return the camera's right, up and backward axes in scene space, each (3,).
 
-    Up is the derivative of the backward axis by inclination, so it is also defined at the poles.
+    Up is the derivative of the backward axis with respect to inclination, so it is also defined
+    at the poles.
     """
     azimuth, inclination = math.radians(camera.azimuth), math.radians(camera.inclination)
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
@@ -201,10 +202,10 @@ def eye(camera: Camera) -> Floats:
 def camera_from_view(
     view: CameraView, size: tuple[int, int], up: Literal["y", "z"], box: Floats | None = None
 ) -> Camera:
-    """Return a camera that takes its view from a calibrated one.
+    """Return a camera that looks through a calibrated one.
 
-    With ``fixed`` reset to None it is an orbit camera at the same position with the same axis and
-    about the same field of view; it is upright, and the axis passes through the picture's centre.
+    With ``fixed`` reset to None it is an upright orbit camera at the same position, with the same
+    viewing direction and about the same field of view; its principal point is the picture's centre.
 
     Parameters
     ----------
@@ -224,7 +225,7 @@ def camera_from_view(
     """
     width, height = picture_size(view)
     aspect = size[0] / size[1]
-    seen = max(height, width / aspect)  # the picture's rows, and the margins above and below
+    seen = max(height, width / aspect)  # rows of the picture and the margins above and below
     backward = -view.rotation[2]
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
@@ -254,7 +255,7 @@ def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0)
     points : (N, 3)
         Points to frame, scene space.
     aspect : float
-    Width / height of the picture.
+        Width / height of the picture.
     free_height : float
         Fraction of the picture's height to use, about its centre; 0 to 1.
     """
@@ -294,6 +295,6 @@ def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
         Offset of the pointer from the picture's centre, right and up, in picture heights.
     """
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
-    factor = distance / camera.distance  # no movement at the ends of the range
+    factor = distance / camera.distance  # 1, hence no panning, at the ends of the range
     pan(camera, x * (1.0 - factor), y * (1.0 - factor))
     camera.distance = distance

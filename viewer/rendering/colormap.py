@@ -9,8 +9,8 @@ from viewer.rig.arrays import Bytes, Floats
 
 __all__ = ["colormap", "diverging_map", "oklab"]
 
-# Anchors in OKLab (Ottosson 2020): lightness rises evenly from violet over red to yellow, so
-# the map works in grey and for colour-blind people, like matplotlib's "inferno".
+# Anchors in OKLab (Ottosson 2020): lightness rises linearly from violet through red to yellow, so
+# the map works in greyscale and for colour-blind people, like matplotlib's "inferno".
 _ANCHORS = np.array(
     [
         [0.24, 0.020, -0.075],
@@ -20,8 +20,8 @@ _ANCHORS = np.array(
         [0.96, -0.020, 0.130],
     ]
 )
-# From blue over white to red: lightness falls evenly to both sides, and the two hues differ even
-# for red-green colour blindness.
+# From blue through white to red: lightness falls symmetrically towards both ends, and the two hues
+# differ even for red-green colour blindness.
 _DIVERGING = np.array(
     [
         [0.36, -0.020, -0.130],
@@ -67,7 +67,7 @@ def diverging_map(count: int = 256) -> Bytes:
 
 
 def _pixels(anchors: Floats, places: Floats, count: int) -> Bytes:
-    """Return ``count`` colours between anchors in OKLab."""
+    """Return ``count`` colours interpolated between anchors in OKLab."""
     wanted = np.linspace(0.0, 1.0, count)
     lab = np.stack([np.interp(wanted, places, column) for column in anchors.T], axis=1)
     pixels = np.full((count, 4), 255, dtype=np.uint8)

@@ -29,8 +29,8 @@ __all__ = [
 
 _MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # used for fitting
 _N_DIRECTIONS = 1000
-_BLOCK = 5_000  # points at a time: the table of products stays below 40 MB
-_N_VIEWS = 24  # of a rotating camera, 15 degrees apart in a full rotation
+_BLOCK = 5_000  # points at a time: the matrix of dot products stays below 40 MB
+_N_VIEWS = 24  # views of a rotating camera to fit, 15 degrees apart in a full rotation
 
 
 def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
@@ -56,7 +56,7 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     for index in _looked_at(recording):
         pose_scene(scene, recording, float(recording.times[index]))
         if not any(actor.is_drawn for actor in scene.actors) and len(recording.times) > 1:
-            continue  # everybody is absent
+            continue  # all actors are absent in this frame
         points = outermost(scene_points(scene, show))
         boxes.append(bounding_box(points))
         if follow is not None:
@@ -90,15 +90,15 @@ def frames_looked_at(n_frames: int, most: int) -> list[int]:
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
     """Return the extreme points along each of many directions.
 
-    Their bounding box is exact. A camera fitted to them misses well below 1 % of the size: 1000
-    directions are 7 degrees apart, and ``fit`` leaves a margin of 8 %.
+    Their bounding box is exact. A camera fitted to them cuts off well below 1 % of the size: 1000
+    directions are 7 degrees apart. The margin of ``fit`` is 8 %.
 
     Parameters
     ----------
     points : (N, 3)
         At least one.
     n_directions : int
-        100 are 20 degrees apart, with an error below 2 %.
+        Number of directions; 100 are 20 degrees apart, with an error below 2 %.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
     best = points[np.zeros(len(directions), dtype=np.int64)]
     for start in range(0, len(points), _BLOCK):
         block = points[start : start + _BLOCK]
-        # A direction per row: looking along rows takes half the time of looking down columns.
+        # One direction per row: argmax along rows takes half the time of argmax down columns.
         candidates = block[np.argmax(directions @ block.T, axis=1)]
         further = ((candidates - best) * directions).sum(axis=1) > 0.0
         best[further] = candidates[further]
@@ -119,7 +119,7 @@ def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
 
 
 def _directions(count: int) -> Floats:
-    """Spread directions evenly over the sphere: a spiral of golden angles, (N, 3)."""
+    """Return evenly distributed unit vectors, a golden-angle spiral on the sphere: (N, 3)."""
     index = np.arange(count) + 0.5
     height = 1.0 - 2.0 * index / count
     angle = index * math.pi * (3.0 - math.sqrt(5.0))
@@ -135,15 +135,15 @@ def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> N
     camera : Camera
         Changed in place: target and distance.
     points : (N, 3)
-        What to see, scene space.
+        Points to frame, scene space.
     aspect : float
         Width / height of the picture.
     turn : float
         Rotation about the target in degrees.
     """
     first, widest = camera.azimuth, 0.0
-    for share in np.linspace(0.0, 1.0, _N_VIEWS + 1) if turn else (0.0,):
-        camera.azimuth = first + turn * float(share)
+    for fraction in np.linspace(0.0, 1.0, _N_VIEWS + 1) if turn else (0.0,):
+        camera.azimuth = first + turn * float(fraction)
         fit(camera, points, aspect)
         widest = max(widest, camera.distance)
     camera.azimuth, camera.distance = first, widest
@@ -155,9 +155,9 @@ def find_follow(scene: Scene, name: str) -> Follow:
     Parameters
     ----------
     scene : Scene
-        In the pose at which the camera was aimed.
+        The scene in the pose for which the camera was framed.
     name : str
-        See ``follow_candidates``, of which the first is taken.
+        Name of an actor, joint or point, see ``follow_candidates``; the first match is used.
 
     Raises
     ------

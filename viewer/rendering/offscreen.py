@@ -23,18 +23,18 @@ _thread = threading.local()
 class Offscreen:
     """A headless context that draws any number of scenes.
 
-    The context is current only while it draws, so any thread may use it, one at a time; another
-    context that was current must be made current again (``with context:``).
+    The context is current only during drawing, so any thread may use it, one at a time. Another
+    context that was current before must be made current again (``with context:``).
 
     Parameters
     ----------
     device : int, optional
-        Index of the EGL device; without it each one is tried in turn.
+        Index of the EGL device; if omitted, each one is tried in turn.
 
     Raises
     ------
     RenderError
-        If there is no usable OpenGL, with the cause and the cure.
+        If there is no usable OpenGL, with the cause and a remedy.
     """
 
     def __init__(self, device: int | None = None) -> None:
@@ -54,7 +54,7 @@ class Offscreen:
         """Return a target of this size; reuse the last one if it matches."""
         target = self._target
         if target is None or (target.size, target.asked_samples) != (size, samples):
-            # The old one is still bound: moderngl rebinds it after creating another.
+            # moderngl rebinds the old target after creating the new one, so release it last.
             self._target = Target(self.context, size, samples)
             if target is not None:
                 target.release()
@@ -92,13 +92,13 @@ class Offscreen:
 
 
 class _OfThread:
-    """A thread's own Offscreen, freed when the thread ends."""
+    """Thread-local Offscreen, freed when the thread ends."""
 
     def __init__(self) -> None:
         self.offscreen = Offscreen()
 
     def __del__(self) -> None:
-        # At process exit everything is freed in an undefined order.
+        # At interpreter exit objects are freed in an undefined order.
         if hasattr(self, "offscreen") and not sys.is_finalizing():
             self.offscreen.release()
 
@@ -109,11 +109,11 @@ def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> C
     Parameters
     ----------
     scene : Scene
-        The scene to frame; gives the up axis.
+        The scene to frame; defines the up axis.
     size : (int, int)
         Width and height of the picture.
     show : str
-        Parts of the figures that are drawn, a key of ``SHOWN``.
+        Drawn parts of the figures, a key of ``SHOWN``.
     """
     camera = facing_camera(guess_front(scene), scene.up)
     fit(camera, scene_points(scene, show), size[0] / size[1])
@@ -128,7 +128,7 @@ def render(
 ) -> Bytes:
     """Draw a scene without a window.
 
-    The context is created on first use and cached, one per thread; ``Offscreen`` gives control.
+    The context is created on first use and cached, one per thread; use ``Offscreen`` to manage it.
     Afterwards no context is current in this thread.
 
     Parameters
@@ -138,7 +138,7 @@ def render(
     size : (int, int)
         Width and height in pixels.
     camera : Camera, optional
-        The point of view; frames the scene if omitted.
+        The camera; by default one that frames the scene.
     options : DisplayOptions, optional
         Display options.
 

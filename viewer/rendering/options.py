@@ -50,8 +50,8 @@ class Light:
     Attributes
     ----------
     azimuth, inclination : float
-        Direction that it comes from, in degrees: about the up axis and above the horizon;
-        relative to the camera if the lights follow it, else to the scene.
+        Direction that the light comes from, degrees about the up axis and above the horizon;
+        relative to the camera if the lights follow it, otherwise to the scene.
     color : (r, g, b)
         Linear, 0 to 1.
     strength : float
@@ -71,9 +71,9 @@ class Lights:
     Attributes
     ----------
     key, rim : Light
-        A warm one from the front, a cool one from behind the other side.
+        Warm light from the front; cool light from behind on the opposite side.
     ambient : float
-        Light from everywhere.
+        Strength of the ambient light.
     specular, shininess : float
         Strength and exponent of the Blinn-Phong highlight.
     follow_camera : bool
@@ -90,18 +90,18 @@ class Lights:
 
 @dataclass(slots=True)
 class DisplayOptions:
-    """All properties of a picture besides scene and camera.
+    """All properties of a picture except scene and camera.
 
     Attributes
     ----------
     show : str
-        A key of ``SHOWN``; a figure without a mesh shows its skeleton, one without a skeleton
-        its mesh.
+        A key of ``SHOWN``. A figure without a mesh always shows its skeleton, one without a
+        skeleton its mesh.
     shading : str
         A key of ``viewer.rendering.gpu.program.SHADING``.
     flat, wireframe, normals, texture, grid, cull : bool
-        One normal per triangle; edges on top; vertex normals as lines; the texture; the ground
-        grid; cull back faces.
+        Use one normal per triangle; draw edges; draw vertex normals as lines; use the texture;
+        draw the ground grid; cull back faces.
     background : str
         ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
     bones : str
@@ -109,41 +109,41 @@ class DisplayOptions:
         sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
         them, otherwise octahedra.
     skeleton_opacity : float or None
-        Of the skeleton when it is shown over the skin; None for ``OPACITIES`` by style.
+        Opacity of the skeleton over the skin; None for ``OPACITIES`` by style.
     samples : int
-        Multisampling; the driver's maximum if that is smaller.
+        Samples per pixel, limited by the driver's maximum.
     lights : Lights
         The two lights.
     skinning : Skinning
         Skinning method and options.
     scalar : str
-        Quantity of the shading ``"scalar"``: a key of ``viewer.rig.scalars.SCALARS``, followed by
-        a colon and a joint for quantities of one joint (``"weight:left_knee"``,
-        ``"weight:#4"``); without it the selected joint is used.
+        Quantity for the shading ``"scalar"``: a key of ``viewer.rig.scalars.SCALARS``. For a
+        quantity of one joint, a colon and the joint may follow (``"weight:left_knee"``,
+        ``"weight:#4"``); by default the selected joint is used.
     scalar_range : (float, float) or None
-        Range of the colour map, in the unit of the legend; None for the range of the values, or
-        of nearly all of them for quantities with a robust range.
+        Range of the colour map, in the unit of the legend; None for the range of the values, or a
+        range that excludes outliers for quantities with a robust range.
     isolines : bool or None
-        Lines at every tenth of the range; None for quantities that have them by default.
+        Draw lines at every tenth of the range; None for the quantity's default.
     legend : bool
-        Draw a legend of the colours into the picture.
+        Draw the legend of the colours into the picture.
     reduced : bool
         Draw the coarser mesh of figures that have one.
     keypoints : bool
         Draw the figure's keypoints as markers.
     hidden_parts : tuple of int
-        Hidden body parts.
+        Indices of hidden body parts.
     path_joints : tuple of (actor, joint)
         Joints whose motion paths are drawn.
     path_seconds : float
-        Extent of motion paths before and after the current time; 0 for the whole motion.
+        Seconds of motion paths before and after the current time; 0 for the whole motion.
     min_confidence : float
-        Captured keypoints with less confidence are hidden.
+        Captured keypoints below this confidence are hidden.
     xray : bool
         Show bones through the skin, which is translucent unless it shows a scalar quantity.
     joint_names, joint_axes : bool
-        Label the joints, where labels do not overlap; draw the axes of their spaces:
-        x red, y green, z blue.
+        Label the joints, omitting labels that would overlap; draw the axes of the joint spaces
+        (x red, y green, z blue).
     """
 
     show: str = "skin"

@@ -1,4 +1,4 @@
-"""Categorical colours of joints, body parts and counts."""
+"""Categorical colours for joints, body parts and counts."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
 NOTHING = (52, 54, 58)
 """Colour of missing weights or numbers, sRGB: a dark grey that no colour map contains."""
 
-# The first seven are Okabe and Ito's (2008); the others are those of a regular grid in sRGB that
-# lie farthest from all before them, in OKLab, for usual eyes and for eyes without long or middle
-# cones.
+# The first seven are from Okabe and Ito (2008). Each further one is the colour of a regular sRGB
+# grid that is farthest in OKLab from all previous ones, for normal vision, protanopia and
+# deuteranopia.
 _DISTINCT = np.array(
     [
         [86, 180, 233], [230, 159, 0], [0, 158, 115], [240, 228, 66],
@@ -25,10 +25,10 @@ _DISTINCT = np.array(
         [153, 255, 153], [153, 221, 255], [221, 170, 187], [119, 136, 204],
     ]
 )  # fmt: skip
-_ROUNDS = (1.0, 0.55, 0.3)  # brightness: three of each colour
-_RELUCTANCE = 0.04  # in OKLab: additional distance required of a darker colour
+_ROUNDS = (1.0, 0.55, 0.3)  # three brightness levels of each colour
+_RELUCTANCE = 0.04  # OKLab distance by which a darker colour must be better
 
-# What eyes without long or middle cones see of linear colours (Machado et al. 2009, severity 1).
+# Linear colours as seen with normal vision, protanopia and deuteranopia (Machado et al. 2009).
 _EYES = np.array(
     [
         np.eye(3),
@@ -44,19 +44,19 @@ _EYES = np.array(
         ],
     ]
 )
-_ENOUGH = 0.3  # in OKLab: larger distances do not improve the distinction
+_ENOUGH = 0.3  # OKLab distance beyond which colours are equally distinct
 
 
 def joint_palette(parents: Ints) -> Bytes:
-    """Return a colour for every joint: neighbours differ clearly, for colour-blind eyes too.
+    """Return a colour for every joint; neighbours differ clearly, even with colour blindness.
 
-    Neighbours of a joint are its parent, its parent's parent, its siblings and its parent's
-    siblings. Of the colours used least the one farthest from all neighbours is taken.
+    Neighbours of a joint are its parent, grandparent, siblings and its parent's siblings. Among the
+    least-used colours, the one farthest from all neighbours is chosen.
 
     Parameters
     ----------
     parents : (J,)
-        Smaller than the joint's own index; -1 for a root.
+        Index of each joint's parent, smaller than its own; -1 for a root.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def joint_palette(parents: Ints) -> Bytes:
     bright = decode_srgb(_DISTINCT / 255.0)
     linear = np.concatenate([brightness * bright for brightness in _ROUNDS])
     distances = _distances(linear)
-    # Bright colours come first where both would do.
+    # Prefer bright colours where both are distinct enough.
     reluctance = np.repeat(_RELUCTANCE * np.arange(len(_ROUNDS)), len(bright))
     chosen = np.zeros(len(parents), dtype=np.int32)
     uses = np.zeros(len(linear), dtype=np.int32)
@@ -83,21 +83,21 @@ def joint_palette(parents: Ints) -> Bytes:
 
 
 def part_palette(count: int) -> Bytes:
-    """Return the colours of body parts, as the shading of body parts has them: (count, 4)."""
+    """Return the colours that the body part shading uses: (count, 4)."""
     return _pixels(part_colors(count))
 
 
 def count_palette(most: int) -> Bytes:
-    """Return a colour for each of the counts 0 to ``most``: (most + 1, 4), dark grey for none."""
+    """Return a colour for each count from 0 to ``most``: (most + 1, 4), dark grey for 0."""
     pixels = np.full((most + 1, 4), 255, dtype=np.uint8)
     pixels[0, :3] = NOTHING
-    # Not from the map's end: almost black is for none.
+    # Skip the dark end of the map, which would look like the colour of 0.
     pixels[1:] = colormap(256)[np.linspace(56, 255, max(most, 1)).astype(int)][:most]
     return pixels
 
 
 def _neighbours(parents: Ints, joint: int, parent: int) -> Ints:
-    """Return the joints before one that must not look like it."""
+    """Return the earlier joints whose colours must differ from a joint's."""
     before = parents[:joint]
     near = before == parent
     if parent >= 0:
@@ -110,7 +110,7 @@ def _neighbours(parents: Ints, joint: int, parent: int) -> Ints:
 
 
 def _distances(linear: Floats) -> Floats:
-    """Return how far colours are apart for the eyes that see the least difference: (C, C)."""
+    """Return distances between colours for the type of vision that sees the least: (C, C)."""
     seen = oklab(np.clip(np.einsum("eab,cb->eca", _EYES, linear), 0.0, 1.0))
     return np.linalg.norm(seen[:, :, None] - seen[:, None], axis=-1).min(axis=0)
 

@@ -8,7 +8,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["part_colors"]
 
-# Okabe and Ito 2008, "Color Universal Design": told apart by the colour-blind as well. sRGB.
+# Okabe and Ito 2008, "Color Universal Design": distinguishable with colour blindness too. sRGB.
 _DISTINCT = np.array(
     [
         [153, 153, 153],
@@ -21,7 +21,7 @@ _DISTINCT = np.array(
         [204, 121, 167],
     ]
 )
-_DARKER = 0.55  # of the second round through the list
+_DARKER = 0.55  # factor on the brightness for each repetition of the list
 
 
 def part_colors(count: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Picking of actors, joints, triangles and keypoints at a pixel, by drawing their indices."""
+"""Picking of actors, joints, triangles and keypoints by drawing their indices."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Passes", "Pick", "PickPass"]
 
-_REACH = 3  # pixels around the one that is asked for
+_REACH = 3  # pixels around the requested one
 _SIDE = 2 * _REACH + 1
 _PREFERENCE = 2.5  # pixels by which a keypoint may be further away than a surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pick:
-    """What is seen at a pixel.
+    """The object at a pixel.
 
     Attributes
     ----------
     actor : int
         Index in the scene.
     joint : int
-        Whose box it is, -1 for something else.
+        Joint whose box was hit, otherwise -1.
     triangle : int
-        Index in the figure's mesh, or in its reduced mesh if that is drawn; -1 for something else.
+        Index in the figure's mesh, or in its reduced mesh if that is drawn; otherwise -1.
     keypoint : int
-        Captured point, or keypoint of the figure; the nearer one on a limb; -1 for something else.
+        Captured point or keypoint of the figure, on a limb the nearer one; otherwise -1.
     point : (3,)
-        Where the surface is, scene space.
+        Hit point on the surface, scene space.
     """
 
     actor: int
@@ -76,7 +76,7 @@ class Passes:
 
 
 _Found = Callable[[int, int, Floats], Pick]
-"""From instance, triangle as it is drawn, and point in scene space to what that is."""
+"""Function from instance, index of the drawn triangle and point in scene space to a Pick."""
 
 
 class PickPass:
@@ -87,7 +87,7 @@ class PickPass:
     context : moderngl.Context
         The context in use.
     passes : Passes
-        Gives programs, and what was uploaded and posed for drawing.
+        Programs and buffers shared with drawing.
     """
 
     def __init__(self, context: moderngl.Context, passes: Passes) -> None:
@@ -109,18 +109,18 @@ class PickPass:
         Parameters
         ----------
         scene : Scene
-            As it is drawn.
+            The scene as drawn.
         view : View
             The camera's matrices.
         options : DisplayOptions
-            What is shown.
+            Display options.
         size : (int, int)
             Width and height of the picture.
         pixel : (float, float)
             From the picture's left and upper edge.
         """
         if has_joint_marks(options):
-            # Their dots lie over everything else, and bones through the skin do.
+            # Dots, and bones in X-ray mode, are drawn over everything else.
             marked = joint_at(marks_of(scene.actors), view, size, pixel, options.xray)
             if marked is not None:
                 whose, joint, point = marked
@@ -140,14 +140,14 @@ class PickPass:
         return self._read(near)
 
     def _begin(self) -> None:
-        """Bind a few pixels of four whole numbers each, all 0."""
+        """Bind a small framebuffer with four integers per pixel, cleared to 0."""
         context = self.context
         if self._numbers is None:
             self._numbers = context.texture((_SIDE, _SIDE), 4, dtype="i4")
             self._depth = context.depth_renderbuffer((_SIDE, _SIDE))
             self._framebuffer = context.framebuffer([self._numbers], self._depth)
         self._numbers.write(np.zeros((_SIDE, _SIDE, 4), "i4"))
-        # Clearing colours is not defined for whole numbers.
+        # glClear is undefined for integer colour buffers.
         self._framebuffer.color_mask = False, False, False, False
         self._framebuffer.clear(depth=1.0)
         self._framebuffer.color_mask = True, True, True, True
@@ -157,7 +157,7 @@ class PickPass:
         context.depth_func = "<"
 
     def _number(self, program: moderngl.Program, found: _Found, is_small: bool = False) -> None:
-        """Give what is drawn next a number, and remember what it stands for."""
+        """Assign a number to the next draw call, and store how to resolve a hit."""
         self._found.append(found)
         self._is_small.append(is_small)
         set_uniforms(program, {"u_item": len(self._found)})
@@ -194,7 +194,7 @@ class PickPass:
         order = indices.order
 
         def found(instance: int, triangle: int, point: Floats) -> Pick:
-            # Some drivers count on from one instance to the next.
+            # Some drivers continue gl_PrimitiveID across instances.
             return Pick(numbers[instance], -1, int(order[triangle % len(order)]), -1, point)
 
         self._number(program, found)
@@ -203,7 +203,7 @@ class PickPass:
 
     def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self.passes.buffers.skeleton(actor)
-        # Over a skin it is drawn in front of it.
+        # A skeleton over a skin is drawn in front of it.
         view = in_front(view) if shows_mesh(actor.figure, options) else view
         program = joint_program(self.passes.programs, skeleton, options, "", "pick")
         self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
@@ -220,7 +220,7 @@ class PickPass:
         points = self.passes.buffers.points_of(actor)
         points.update(actor, actor.placement, view, options.min_confidence)
         elements, places, layout = points.elements, actor.points, actor.figure.points
-        assert places is not None and layout is not None  # it has points
+        assert places is not None and layout is not None  # guaranteed by has_points
         if not len(elements):
             return
         program = self.passes.programs.drawing("point", fragment="pick")
@@ -239,7 +239,7 @@ class PickPass:
         array.render(moderngl.TRIANGLES, instances=len(elements))
 
     def _read(self, view: View) -> Pick | None:
-        """Return what the hit nearest to the middle stands for; keypoints are easily missed."""
+        """Return the hit nearest to the centre; keypoints get a bonus because they are small."""
         rows = np.frombuffer(self._framebuffer.read(components=4, dtype="i4"), dtype=np.int32)
         numbers = rows.reshape(_SIDE, _SIDE, 4)
         row, column = np.nonzero(numbers[..., 0])
@@ -254,7 +254,7 @@ class PickPass:
         return self._found[item - 1](instance, triangle, _unproject(view, (x, y), depth))
 
     def release(self) -> None:
-        """Free the pixels."""
+        """Free the framebuffer."""
         if self._numbers is not None:
             for item in (self._framebuffer, self._depth, self._numbers):
                 item.release()
@@ -262,7 +262,7 @@ class PickPass:
 
 
 def _window(size: tuple[int, int], pixel: tuple[float, float]) -> Floats:
-    """Return what spreads a few pixels around one over the whole of clip space."""
+    """Return the matrix that maps a few pixels around one to all of clip space."""
     x, y = np.floor(pixel[0]) + 0.5, np.floor(pixel[1]) + 0.5
     scale = size[0] / _SIDE, size[1] / _SIDE
     matrix: NDArray[np.float64] = np.diag([*scale, 1.0, 1.0])
@@ -272,7 +272,7 @@ def _window(size: tuple[int, int], pixel: tuple[float, float]) -> Floats:
 
 
 def _unproject(view: View, pixel: tuple[int, int], depth: float) -> Floats:
-    """Return the point in scene space that is seen at a pixel, ``depth`` along the camera's z."""
+    """Return the point in scene space at a pixel, with ``depth`` along the camera's z axis."""
     x, y = (2.0 * (side + 0.5) / _SIDE - 1.0 for side in pixel)
     _, _, clip_z, clip_w = view.projection @ [0.0, 0.0, depth, 1.0]
     back = np.linalg.inv(view.projection @ view.matrix)

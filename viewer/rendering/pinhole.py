@@ -12,20 +12,20 @@ from viewer.rig.mesh import box_size
 __all__ = ["distortion_error", "picture_size", "pinhole_projection", "pinhole_view"]
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
-_UNBOUNDED = 1e9  # in place of an infinite distortion
-_THINNEST = 1e-6  # depth before and behind what is drawn, in distances
-_NEAREST = 5e-3  # near plane, of the distance to the middle of what is drawn
+_UNBOUNDED = 1e9  # replaces an infinite distortion
+_THINNEST = 1e-6  # minimum depth in front of and behind the scene, relative to its distance
+_NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's centre
 
 
 def picture_size(view: CameraView) -> tuple[float, float]:
-    """Return width and height of a camera's pictures in pixels.
+    """Return the width and height of a camera's pictures, pixels.
 
-    If the files do not say, the principal point counts as their middle.
+    If the size is not in the files, the principal point is taken as the centre.
 
     Raises
     ------
     RigError
-        If the size is unknown and the principal point is not right of and below the corner.
+        If the size is unknown and the principal point does not have positive coordinates.
     """
     if view.size is not None:
         return float(view.size[0]), float(view.size[1])
@@ -47,20 +47,20 @@ def pinhole_view(view: CameraView) -> Floats:
 
 
 def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
-    """Return the matrix from camera to clip space that puts points where the camera saw them.
+    """Return the matrix from camera to clip space that reproduces the camera's picture.
 
-    OpenCV counts pixels from the middle of the first one, OpenGL from its corner, so with K from
-    ``view`` and W its pictures' width, x in -1..1 is 2 (u + 1/2) / W - 1. A picture of another
-    shape shows the whole of the camera's picture in its middle, and more on two sides.
+    OpenCV's pixel coordinates start at the centre of the first pixel, OpenGL's at its corner. So
+    with u from K and the picture's width W, x in -1..1 is 2 (u + 1/2) / W - 1. A picture of another
+    aspect ratio shows all of the camera's picture in its centre, with margins on two sides.
 
     Parameters
     ----------
     view : CameraView
-        Distortion is left out, see ``distortion_error``.
+        The camera; its distortion is ignored, see ``distortion_error``.
     aspect : float
-        Width / height of what is drawn.
+        Width / height of the drawn picture.
     box : (2, 3)
-        What must lie between the near and the far plane, scene space.
+        Bounds that must lie between the near and the far plane, scene space.
 
     Returns
     -------
@@ -76,11 +76,11 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
     k = view.intrinsic / view.intrinsic[2, 2]
     distance = float(np.linalg.norm(view.rotation @ box.mean(axis=0) + view.translation))
     reach = box_size(box) or distance or 1.0
-    # Seen from very far away, both planes would be at the same distance.
+    # From very far away, rounding would put both planes at the same distance.
     before, behind = max(reach, _THINNEST * distance), max(20.0 * reach, _THINNEST * distance)
     near, far = max(distance - before, _NEAREST * (distance + reach)), distance + behind
     matrix = np.zeros((4, 4))
-    # Camera space is OpenCV's with y and z turned round: its z is -w.
+    # OpenGL's camera space is OpenCV's with y and z negated, so w is -z.
     matrix[0, :3] = 2.0 * k[0, 0] / width, -2.0 * k[0, 1] / width, _offset(k[0, 2], width)
     matrix[1, :3] = 0.0, 2.0 * k[1, 1] / height, -_offset(k[1, 2], height)
     matrix[2, 2:] = -(far + near) / (far - near), -2.0 * far * near / (far - near)
@@ -92,22 +92,22 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
 
 
 def _offset(principal: float, side: float) -> float:
-    """Return the negative of where the principal point is from the middle, in half pictures."""
+    """Return the offset from the principal point to the centre, in half picture sizes."""
     return 1.0 - 2.0 * (principal + 0.5) / side
 
 
 def distortion_error(view: CameraView) -> float:
-    """Return how far the lens moves the corner of the picture that it moves most, in pixels.
+    """Return the largest displacement of a picture corner by lens distortion, pixels.
 
-    That is what looking through the camera leaves out. OpenCV's model with r^2 = x^2 + y^2:
-    x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + 2 p1 x y
-    + p2 (r^2 + 2 x^2), and y' alike with p1 and p2 exchanged.
+    It is the error of looking through the camera without distortion. OpenCV's model is, with
+    r^2 = x^2 + y^2: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
+    + 2 p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged.
 
     Parameters
     ----------
     view : CameraView
-        Coefficients k1 k2 p1 p2 k3 k4 k5 k6, those missing at the end 0; the thin prism's, after
-        them, are not used.
+        Camera with coefficients k1 k2 p1 p2 k3 k4 k5 k6, of which trailing ones may be missing;
+        the thin prism coefficients after them are ignored.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def distortion_error(view: CameraView) -> float:
     corners = [[u, v, 1.0] for u in (0.0, width - 1.0) for v in (0.0, height - 1.0)]
     x, y, _ = np.linalg.solve(k, np.transpose(corners))
     r2 = x * x + y * y
-    # Where the divisor is 0, the model has no place for the corner.
+    # Where the divisor is 0, the model is undefined at the corner.
     with np.errstate(divide="ignore", invalid="ignore"):
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
     radial = np.where(np.isfinite(radial), radial, _UNBOUNDED)

@@ -1,4 +1,4 @@
-"""Projection of scene points into the picture, computed on the processor."""
+"""Projection of scene points into the picture, computed on the CPU."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["Projected", "picture_scale", "project", "project_segments", "unproject"]
 
-_USUAL_HEIGHT = 720.0  # pixels of a picture whose marks have their usual size
+_USUAL_HEIGHT = 720.0  # height of a picture in which marks have their standard size, pixels
 _SCALES = 0.8, 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Projected:
-    """Points in the picture.
+    """Projected points.
 
     Attributes
     ----------
     pixels : (N, 2)
-        From the picture's left and upper edge; any where the point is not seen.
+        From the picture's left and upper edge; arbitrary where the point is not visible.
     depths : (N,)
-        Growing away from the eye, -1 to 1.
+        Normalized depth, -1 at the near plane to 1 at the far plane.
     seen : (N,) bool
         Whether the point is in front of the eye and within the picture.
     """
@@ -35,7 +35,7 @@ class Projected:
 
 
 def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
-    """Return where points are seen: x = c_x / c_w with c = P V [p 1].
+    """Project points into the picture: x = c_x / c_w with c = P V [p 1].
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
 def project_segments(
     view: View, size: tuple[int, int], starts: Floats, ends: Floats
 ) -> tuple[Floats, Bools]:
-    """Return where segments are seen, cut off at the near plane: -c_w <= c_z.
+    """Project segments into the picture, clipped at the near plane: -c_w <= c_z.
 
     Parameters
     ----------
@@ -71,25 +71,25 @@ def project_segments(
     Returns
     -------
     pixels : (N, 2, 2)
-        Both ends, from the picture's left and upper edge; they may lie outside of it.
+        Both ends, from the picture's left and upper edge; they may lie outside the picture.
     seen : (N,) bool
-        Whether any of it is in front of the near plane.
+        Whether any part of the segment is beyond the near plane.
     """
     clips = np.stack([_clip(view, starts), _clip(view, ends)], axis=1)
     away = clips[..., 2] + clips[..., 3]
     seen: Bools = np.any(away > 0.0, axis=1)
     behind = away <= 0.0
     span = away - away[:, ::-1]
-    share = away / np.where(span == 0.0, 1.0, span)
-    # A little on this side of the plane, where w is not 0.
-    cut = clips + (share + 1e-6)[..., None] * (clips[:, ::-1] - clips)
-    clips = np.where(behind[..., None], cut, clips)
+    fraction = away / np.where(span == 0.0, 1.0, span)
+    # Slightly beyond the plane, where w is not 0.
+    clipped = clips + (fraction + 1e-6)[..., None] * (clips[:, ::-1] - clips)
+    clips = np.where(behind[..., None], clipped, clips)
     w = clips[..., 3]
     return _pixels(clips, np.where(w > 0.0, w, 1.0), size), seen
 
 
 def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats) -> Floats:
-    """Return what is seen at some pixels, as deep in the picture as some points are.
+    """Return the scene points at some pixels that have the depths of given points.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats)
 
 
 def picture_scale(size: tuple[int, int]) -> float:
-    """Return how much larger than usual marks are drawn in a picture, 1 at 720 pixels' height.
+    """Return the scale of marks in a picture, 1 at a height of 720 pixels.
 
     Parameters
     ----------

@@ -1,16 +1,16 @@
-"""Recording of frames: drawn, read back and passed to a sink while the next are drawn.
+"""Recording of frames: drawing, reading back and encoding run in parallel.
 
-Three things happen at the same time. The driver draws a frame; this thread poses the next one; and
-the sink's workers encode those before, for which this thread lets go of Python's lock while it
-waits for the driver. So recording takes about as long as drawing or encoding alone, whichever is
-slower, as far as they do not compete for the same processors (``tests/bench/bench_video.py``).
+While the driver draws a frame, this thread poses the next one and the sink's workers encode
+previous ones. This thread releases the global interpreter lock while it waits for the driver, so
+recording takes about as long as the slower of drawing and encoding, unless they compete for the
+same CPU cores (``tests/bench/bench_video.py``).
 
-The window and the command line use it alike::
+The window and the command line both use it::
 
     steps = record(Recording(scene, times, camera, size, options), renderer, sink)
-    for progress in steps:       # one step a frame; draw a progress bar, answer the mouse
+    for progress in steps:       # one step per frame: draw a progress bar, handle input
         if cancelled:
-            steps.close()        # stops the workers; nothing half-written stays
+            steps.close()        # stops the workers and removes partial output
 """
 
 from __future__ import annotations
@@ -40,49 +40,50 @@ from viewer.rig.scene import Scene, scene_box
 
 __all__ = ["Follow", "Progress", "Recording", "Sink", "copied", "pose_scene", "record"]
 
-_WAITING = 2  # frames that wait for a worker, beside those being encoded: memory stays bounded
-_PATIENCE = 0.05  # seconds between two steps while the sink finishes
+_WAITING = 2  # frames that may wait for a worker; bounds the memory
+_PATIENCE = 0.05  # seconds between steps while the sink finishes
 
 
 class Sink(Protocol):
-    """Where frames go; ``viewer.formats`` has sinks for pictures, contact sheets and videos.
+    """Receiver of frames; ``viewer.media`` has sinks for pictures, contact sheets and videos.
 
     Attributes
     ----------
     workers : int
-        How many threads may call ``write`` at the same time. 1 for whoever needs the frames in
-        order.
+        Number of threads that may call ``write`` at the same time; 1 for sinks that need the
+        frames in order.
     n_samples : int
-        How many frames, spread over the whole, ``look`` is to see before the first is written.
+        Number of frames, spread over the recording, to pass to ``look`` before the first
+        ``write``.
     """
 
     @property
     def workers(self) -> int:
-        """How many threads may call ``write``."""
+        """Number of threads that may call ``write`` at the same time."""
 
     @property
     def n_samples(self) -> int:
-        """How many frames ``look`` is to see."""
+        """Number of frames to pass to ``look``."""
 
     def look(self, pixels: Bytes) -> None:
-        """See a frame before any is written: to choose the colours of a GIF."""
+        """Inspect a sample frame before any is written, to choose the palette of a GIF."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Take one frame; called in a worker's thread.
+        """Write one frame; called in a worker thread.
 
         Parameters
         ----------
         frame : int
-            Counted from 0.
+            Index of the frame, from 0.
         pixels : (H, W, 4) uint8
-            sRGB and alpha, not multiplied, first row at the top; not to be changed.
+            sRGB and straight alpha, first row at the top; read-only.
         """
 
     def close(self) -> None:
-        """Put the result under its final name; called once, after the last frame."""
+        """Finish the output and move it to its final name; called once, after the last frame."""
 
     def abort(self) -> None:
-        """Remove what is not finished; nothing if ``close`` went through already."""
+        """Remove unfinished output; does nothing after a successful ``close``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,9 +95,9 @@ class Follow:
     actor : int
         Index in the scene.
     joint : int
-        Of its skeleton or points, -1 for the middle of all.
+        Index in its skeleton or points; -1 for their centre.
     origin : (3,)
-        Where that was when the camera was aimed, scene space.
+        Position of the joint when the camera was framed, scene space.
     """
 
     actor: int
@@ -111,30 +112,30 @@ class Recording:
     Attributes
     ----------
     scene : Scene
-        Its actors are copied: neither their poses nor their presence change.
+        The scene; its actors are copied and not modified.
     times : (F,)
-        Seconds of the scene's clock, a frame each.
+        Scene time of each frame, seconds.
     camera : Camera
-        The first frame's point of view.
+        Camera of the first frame.
     size : (int, int)
         Width and height in pixels.
     options : DisplayOptions
-        What is shown and how.
+        Display options.
     box : (2, 3) or None
-        What the grid lies under and the depth range covers; None for the scene as it is.
+        Bounds for the ground grid and the depth range; None for those of the current scene.
     moves : bool
-        Whether clips pose the actors; False keeps their poses, for a turntable of a still.
+        Whether clips pose the actors; False keeps their poses, for a turntable of a still pose.
     interpolate : bool
-        Interpolate over the gaps of captures.
+        Interpolate across gaps of captures.
     turn : float
-        Degrees by which the camera turns about its target from the first frame to the one that
-        would follow the last: 360 makes a seamless loop.
+        Rotation of the camera about its target, degrees, from the first frame to the one after
+        the last: 360 gives a seamless loop.
     follow : Follow or None
-        Whom the camera goes with.
+        Actor or joint that the camera follows.
     selected : (int, int)
-        An actor's index and its joint that is highlighted, as ``Renderer.draw`` takes them.
+        Index of an actor and of its highlighted joint, as in ``Renderer.draw``.
     annotations : callable or None
-        Gives what is drawn over a frame, from the posed scene and the picture's size.
+        Returns the annotations of a frame, given the posed scene and the picture's size.
     """
 
     scene: Scene
@@ -163,11 +164,11 @@ class Progress:
     Attributes
     ----------
     done : int
-        Frames that are drawn and handed to the sink.
+        Number of frames drawn and passed to the sink.
     total : int
-        All frames.
+        Number of all frames.
     seconds : float
-        Since the first step.
+        Time since the first step.
     """
 
     done: int
@@ -176,37 +177,37 @@ class Progress:
 
     @property
     def left(self) -> float:
-        """Seconds that the rest will take if it goes on like this; 0 before the first frame."""
+        """Estimated remaining time, seconds; 0 before the first frame."""
         return self.seconds * (self.total - self.done) / self.done if self.done else 0.0
 
 
 def copied(scene: Scene) -> Scene:
-    """Return a scene whose actors can be posed without changing this one's; figures are shared."""
+    """Return a scene with copied actors, so that posing them leaves the original unchanged."""
     return replace(scene, actors=[actor.copy() for actor in scene.actors])
 
 
 def pose_scene(scene: Scene, recording: Recording, seconds: float) -> None:
-    """Pose a copy of the recording's scene as it is at one time."""
+    """Pose a copy of the recording's scene at a time."""
     if recording.moves:
         scene.time = seconds
         pose_actors(scene.actors, seconds, recording.interpolate)
 
 
 def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Progress]:
-    """Draw all frames and hand them to a sink, one step a frame.
+    """Draw all frames and pass them to a sink, one step per frame.
 
-    The renderer's context must be current in every step, and when the generator is closed. What
-    else is drawn between the steps is free to bind other framebuffers. A generator that is closed,
-    or dropped, before its end aborts the sink.
+    The renderer's context must be current in every step and when the generator is closed. Other
+    framebuffers may be bound between steps. Closing or discarding the generator before its end
+    aborts the sink.
 
     Parameters
     ----------
     recording : Recording
-        What is drawn.
+        The recording.
     renderer : Renderer
-        Best one of its own: what it holds for other scenes is freed and uploaded again.
+        Preferably a renderer of its own: buffers of other scenes are freed and uploaded again.
     sink : Sink
-        Gets the frames; closed after the last one, aborted if anything goes wrong.
+        Receives the frames; closed after the last one, aborted on any error.
 
     Yields
     ------
@@ -263,7 +264,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
 
 
 class _Queue:
-    """Work for some threads, of which only a little may wait."""
+    """Bounded work queue of a thread pool."""
 
     def __init__(self, workers: int) -> None:
         self._pool = ThreadPoolExecutor(workers, "viewer-record")
@@ -274,7 +275,7 @@ class _Queue:
         return self._pool.submit(work)
 
     def add(self, work: Callable[[], None]) -> None:
-        """Begin some work; wait for the oldest if there is too much, and raise what it raised."""
+        """Submit work; if too much is queued, wait for the oldest and raise its exception."""
         self._waiting.append(self.begin(work))
         while len(self._waiting) > self._most:
             self._waiting.popleft().result()
@@ -288,7 +289,7 @@ class _Queue:
 
 
 class _Drawer:
-    """Draws frames of a recording; one is being drawn while the one before is handed on."""
+    """Draws the frames of a recording, each while the previous one is passed on."""
 
     def __init__(self, recording: Recording, renderer: Renderer) -> None:
         self._recording, self._renderer = recording, renderer
@@ -306,11 +307,11 @@ class _Drawer:
             raise
 
     def draw(self, frames: Sequence[int]) -> Generator[bytes]:
-        """Yield some frames' bytes as OpenGL has them, last row first."""
+        """Yield the bytes of frames in OpenGL's order, last row first."""
         cameras, times = _Cameras(self._recording), self._recording.times
         for step in range(len(frames) + 1 if frames else 0):
             if step < len(frames):
-                # The driver still draws the frame before.
+                # The driver is still drawing the previous frame.
                 pose_scene(self._scene, self._recording, float(times[frames[step]]))
             if step:
                 self._waiter.end()
@@ -329,29 +330,29 @@ class _Drawer:
         self._waiter.begin()
 
     def release(self) -> None:
-        """Free what was drawn into; the framebuffer of nobody is bound then."""
+        """Free target and buffer, and leave the default framebuffer bound."""
         self._release_target()
         self._buffer.release()
 
     def _release_target(self) -> None:
-        # One that is bound must not be freed: moderngl would bind it again.
+        # Unbind the target before freeing it, since moderngl would bind it again.
         self._renderer.context.detect_framebuffer(0).use()
         self._target.release()
 
 
 class _Cameras:
-    """The point of view of each frame, asked for in order."""
+    """Camera of each frame; frames must be requested in order."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._shift = np.zeros(3)  # of whoever is followed; kept while they are absent
+        self._shift = np.zeros(3)  # of the followed actor; unchanged while it is absent
 
     def at(self, frame: int, scene: Scene) -> Camera:
         recording = self._recording
         camera, follow = recording.camera.copy(), recording.follow
         if recording.turn:
-            turned = camera.azimuth + recording.turn * frame / recording.n_frames
-            camera.azimuth = (turned + 180.0) % 360.0 - 180.0
+            rotated = camera.azimuth + recording.turn * frame / recording.n_frames
+            camera.azimuth = (rotated + 180.0) % 360.0 - 180.0
         if follow is not None:
             place = followed_point(scene.actors[follow.actor], follow.joint)
             self._shift = self._shift if place is None else place - follow.origin

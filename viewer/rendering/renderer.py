@@ -1,4 +1,4 @@
-"""Draws a scene into the bound framebuffer; the same for a window and a picture file."""
+"""Renderer of a scene into a framebuffer, used for the window and for picture files."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ __all__ = ["Renderer"]
 
 
 class Renderer:
-    """Owner of everything that drawing needs: programs, passes and buffers.
+    """Owner of all programs, passes and buffers needed for drawing.
 
     Parameters
     ----------
@@ -62,16 +62,16 @@ class Renderer:
     scalars : ScalarQuantities
         Range and legend of the scalar quantity drawn last.
     buffers : ActorBuffers
-        What was uploaded for figures and actors.
+        Uploaded buffers of figures and actors.
     marks : Marks or None
-        What is marked, over everything but annotations and legends.
+        Marks, drawn over everything except annotations and legends.
     annotations : sequence of Annotation
-        What is explained, over everything but legends.
+        Annotations, drawn over everything except legends.
     ghost : Ghost or None
-        A surface that is shown over the scene without being part of it.
+        A surface drawn over the scene that is not part of it.
     names_left_out : (int, int)
-        How many joints of the last picture have no name for want of room beside them, and of
-        how many.
+        Number of joint names omitted from the last picture for lack of room, and number of
+        joints within it.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -95,12 +95,12 @@ class Renderer:
 
     @property
     def scalar_range(self) -> tuple[float, float]:
-        """Lowest and highest number of the scalar quantity drawn last, over all figures."""
+        """Lowest and highest value of the scalar quantity drawn last, over all figures."""
         return self.scalars.range
 
     @property
     def legend(self) -> Legend | None:
-        """Legend of the scalar quantity drawn last, None before there was one."""
+        """Legend of the scalar quantity drawn last; None before the first one."""
         return self.scalars.legend
 
     def draw(
@@ -117,19 +117,19 @@ class Renderer:
         Parameters
         ----------
         scene : Scene
-            Actors that are not visible, or absent at this time, are left out.
+            The scene; actors that are hidden, or absent at this time, are omitted.
         camera : Camera
-            The point of view.
+            The camera.
         options : DisplayOptions
-            What is shown and how.
+            Display options.
         target : Target
-            Drawn into, not yet resolved.
+            The target to draw into; not resolved afterwards.
         box : (2, 3)
-            What the grid lies under and the depth range covers, scene space: ``scene_box`` of
-            the pose in which the scene was opened.
+            Bounds for the ground grid and the depth range, scene space: ``scene_box`` of the pose
+            in which the scene was opened.
         selected : (int, int)
-            An actor's index and a joint of it that is drawn in a highlight colour, and that a
-            scalar quantity is about which is of no joint by itself; -1 for none.
+            Index of an actor and of its highlighted joint, which also is the joint of a scalar
+            quantity that needs one and does not name it; -1 for none.
         """
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
@@ -173,33 +173,33 @@ class Renderer:
         y: float,
         box: Floats,
     ) -> Pick | None:
-        """Return what is seen at a pixel, or within three pixels of it; None for nothing.
+        """Return the object at a pixel or within three pixels of it; None if there is none.
 
         Parameters
         ----------
         scene : Scene
-            As it is drawn.
+            The scene as drawn.
         camera : Camera
-            The point of view.
+            The camera.
         options : DisplayOptions
-            What is shown.
+            Display options.
         size : (int, int)
             Width and height of the picture, pixels.
         x, y : float
             Pixels from the picture's left and upper edge.
         box : (2, 3)
-            As ``draw`` takes it.
+            Bounds, as in ``draw``.
         """
         self.buffers.keep_only(scene.actors)
         return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
 
     def prepare(self, scene: Scene) -> None:
-        """Upload what a scene needs, so that a refusal comes before the old scene is given up.
+        """Upload a scene's buffers in advance, so that failure leaves the previous scene intact.
 
         Raises
         ------
         RenderError
-            If the driver has no room for it.
+            If there is not enough graphics memory.
         """
         prepare_meshes(self.buffers, scene.actors, DisplayOptions())
         for actor in scene.actors:
@@ -214,7 +214,7 @@ class Renderer:
         target: Target,
         selected: tuple[int, int],
     ) -> bool:
-        """Skin what changed, clear the picture, and draw background and surfaces if there are."""
+        """Skin changed meshes, clear the picture, and draw background and surfaces."""
         meshes = update_meshes(self.buffers, scene.actors, options)
         if options.shading == "scalar" and meshes.singles:
             index, joint = selected
@@ -265,7 +265,7 @@ class Renderer:
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self.buffers.keypoints_of(actor)
         markers.update(actor.require_pose(), options.skinning)
-        # The markers' place is part of their positions.
+        # Marker positions already include the placement of the pose.
         self.late.keypoint_pass.draw(markers, actor.placement, view, options)
 
     def _draw_marks(
@@ -276,7 +276,7 @@ class Renderer:
         size: tuple[int, int],
         selected: tuple[int, int],
     ) -> None:
-        """Draw what lies over everything but legends; all words last."""
+        """Draw joint marks, ghost, marks and annotations, then all labels."""
         self.names_left_out, drawn = (0, 0), []
         if has_joint_marks(options):
             from viewer.rendering.overlay.joint_annotation import joint_annotation
@@ -295,7 +295,7 @@ class Renderer:
             self.names_left_out = left_out[0] if drawn else (0, 0)
 
     def _marked(self) -> list[Annotation]:
-        """Return what is marked as an annotation."""
+        """Return the marks as annotations."""
         if self.marks is None:
             return []
         from viewer.rendering.overlay.marks import mark_annotation
@@ -312,14 +312,14 @@ class Renderer:
         at = Moment(scene.time or 0.0, options.path_seconds)
         for index, actor in enumerate(scene.actors):
             joints = tuple(joint for owner, joint in options.path_joints if owner == index)
-            # Paths outlast gaps: they show where somebody was and will be.
+            # Paths are drawn across gaps: they show past and future positions of absent actors.
             if joints and actor.visible and actor.clip is not None:
                 paths = self.buffers.motion_path(actor)
                 paths.update(actor, joints, options.min_confidence)
                 self.late.motion_path_pass.draw(paths, actor.placement, view, size, at)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
-        """Return an actor's posed buffer, made on first use; the figure's mesh must exist."""
+        """Return an actor's posed mesh, created on first use; its figure must have a mesh."""
         return self.buffers.posed_mesh(actor)
 
     def _note_samples(self, target: Target) -> None:

@@ -1,4 +1,4 @@
-"""Mapping from the numbers of a scalar quantity to colours."""
+"""Mapping from the values of a scalar quantity to colours."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name
 __all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typical_span"]
 
 TYPICAL = 0.99
-"""Fraction of the numbers other than 0 that a robust range contains at least."""
+"""Minimum fraction of the nonzero values that a robust range contains."""
 
 _NOTHING_LINEAR = tuple(float(channel) for channel in decode_srgb(np.array(NOTHING) / 255.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScalarLook:
-    """Parameters of the shader for a scalar quantity.
+    """Colours of a scalar quantity and parameters of its shader.
 
     Attributes
     ----------
     colors : (N, 4) uint8
-        sRGB: 256 from the lowest to the highest number shown, or one for each whole number.
+        sRGB: 256 from the lowest to the highest value shown, or one per integer.
     ends : (float, float)
-        What the first and the last colour stand for.
+        Values of the first and the last colour.
     is_whole : bool
-        Whether each colour stands for one whole number, from 0.
+        Whether each colour stands for one integer, from 0.
     dark_zero : bool
-        Whether 0 has a colour of its own, that of nothing.
+        Whether 0 has a colour of its own, ``NOTHING``.
     isolines : bool
-        Whether there are lines at every tenth of the range.
+        Whether lines are drawn at every tenth of the range.
     is_typical : bool
-        Whether the ends leave out what is rare: larger numbers may look like the ends.
+        Whether the range excludes outliers, which have the colours of its ends.
     """
 
     colors: Bytes
@@ -52,7 +52,7 @@ class ScalarLook:
 
     @property
     def uniforms(self) -> dict[str, object]:
-        """What ``shaders/shade/scalar.glsl`` asks for."""
+        """Uniforms of ``shaders/shade/scalar.glsl``."""
         return {
             "u_scalar_range": self.ends,
             "u_categories": self.is_whole,
@@ -63,23 +63,23 @@ class ScalarLook:
 
 
 def is_whole(name: str) -> bool:
-    """Return whether a view's numbers are counts or indices."""
+    """Return whether the values of a quantity are counts or indices."""
     return find_quantity(name).kind in ("discrete", "categorical")
 
 
 def typical_span(numbers: Floats) -> tuple[float, float]:
-    """Return between which numbers nearly all lie that are not 0.
+    """Return a range that contains nearly all nonzero values.
 
     Parameters
     ----------
     numbers : (V,)
-        Of a view.
+        Values of a scalar quantity.
 
     Returns
     -------
     (float, float)
-        Lowest and highest of the numbers whose amounts are not above that of the 99th of a
-        hundred; the lowest and highest of all if there are fewer than a hundred.
+        The range of the values, limited to the 99th percentile of their absolute values; with
+        fewer than a hundred nonzero values, the whole range.
     """
     amounts = np.abs(numbers[numbers != 0.0])
     if not len(amounts):
@@ -99,23 +99,23 @@ def shown_ends(
     Parameters
     ----------
     name : str
-        Of the view.
+        Name of the quantity.
     figure : Figure
-        Gives the unit of a range that was asked for.
+        Defines the unit of a requested range.
     ranges : sequence of (float, float)
-        Lowest and highest number of each figure, or those of its typical span.
+        Lowest and highest value of each figure, or its typical range.
     options : DisplayOptions
-        The range that was asked for, if there is one.
+        Display options with the requested range, if any.
 
     Returns
     -------
     (float, float)
-        In the view's own numbers.
+        In the unit of the values.
     """
-    asked = options.scalar_range
-    if asked is not None and not is_whole(name):
+    requested = options.scalar_range
+    if requested is not None and not is_whole(name):
         factor, _ = shown_unit(name, figure)
-        return asked[0] / factor, asked[1] / factor
+        return requested[0] / factor, requested[1] / factor
     lows, highs = zip(*ranges, strict=True)
     return find_quantity(name).shown(min(lows), max(highs))
 
@@ -123,30 +123,30 @@ def shown_ends(
 def look_of(
     name: str, figure: Figure, ends: tuple[float, float], options: DisplayOptions
 ) -> ScalarLook:
-    """Return how a view of a figure is coloured.
+    """Return the colours of a quantity on a figure.
 
     Parameters
     ----------
     name : str
-        Of the view.
+        Name of the quantity.
     figure : Figure
-        Gives the colours of its joints or parts.
+        Defines the colours of its joints or parts.
     ends : (float, float)
-        As ``shown_ends`` gives them.
+        Result of ``shown_ends``.
     options : DisplayOptions
-        Whether there are isolines.
+        Display options, for isolines and range.
     """
-    view = find_quantity(name)
-    if view.kind == "categorical":
+    quantity = find_quantity(name)
+    if quantity.kind == "categorical":
         return ScalarLook(_category_colors(name, figure), ends, is_whole=True)
-    if view.kind == "discrete":
+    if quantity.kind == "discrete":
         return ScalarLook(count_palette(max(round(ends[1]), 1)), ends, is_whole=True)
-    colors = diverging_map() if view.kind == "diverging" else colormap()
-    isolines = view.isolines if options.isolines is None else options.isolines
-    # No weight at all is another thing than a small one.
-    is_typical = view.robust and options.scalar_range is None
+    colors = diverging_map() if quantity.kind == "diverging" else colormap()
+    isolines = quantity.isolines if options.isolines is None else options.isolines
+    # No weight at all must be distinguishable from a small one.
+    is_typical = quantity.robust and options.scalar_range is None
     return ScalarLook(
-        colors, ends, dark_zero=view.takes_joint, isolines=isolines, is_typical=is_typical
+        colors, ends, dark_zero=quantity.takes_joint, isolines=isolines, is_typical=is_typical
     )
 
 

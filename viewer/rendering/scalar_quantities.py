@@ -1,4 +1,4 @@
-"""Scalar quantities of a scene: computed, coloured alike, and explained by one legend."""
+"""Scalar quantities of a scene, with colours and a legend common to all figures."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["ScalarQuantities", "name_for"]
 
 
 class ScalarQuantities:
-    """Keeps the numbers of all figures that are drawn up to date.
+    """Values, colours and legend of the displayed scalar quantity, kept up to date.
 
     Attributes
     ----------
     range : (float, float)
-        Lowest and highest number of the view drawn last, over all figures.
+        Lowest and highest value of the quantity drawn last, over all figures.
     ends : (float, float)
-        What the ends of its colours stand for.
+        Values at the ends of the colour range.
     legend : Legend or None
-        Of that view.
+        Legend of that quantity.
     """
 
     def __init__(self) -> None:
@@ -40,25 +40,25 @@ class ScalarQuantities:
         selected: tuple[Actor | None, int],
         figures: Sequence[Figure],
     ) -> None:
-        """Compute what changed; the same colour means the same number on all figures.
+        """Recompute changed values; equal colours mean equal values on all figures.
 
-        Figures that lack what the view shows get no colours: they are drawn as usual.
+        Figures without the quantity are drawn with the default shading.
 
         Parameters
         ----------
         meshes : sequence of (Actor, PosedMesh)
-            At least one.
+            Drawn actors with meshes, at least one.
         options : DisplayOptions
-            The view, its range and lines.
+            Name of the quantity, its range and isolines.
         selected : (Actor or None, int)
-            The actor and its joint that a view without a joint of its own is about; -1 for none.
+            Actor and joint used for a quantity that needs a joint and names none; -1 for none.
         figures : sequence of Figure
-            All of the scene, also those that are not drawn.
+            All figures of the scene, including those not drawn.
         """
         name = name_for(options.scalar, *selected)
         for actor, mesh in meshes:
             pose = None if options.show == "binding" else actor.pose
-            # The selected joint has an index, whatever it is called; elsewhere its name counts.
+            # On the selected actor the joint is given by index; on other actors by its name.
             is_selected = actor is selected[0] and name != options.scalar
             its_name = f"{options.scalar}:#{selected[1]}" if is_selected else name
             mesh.scalars.update(its_name, pose, options.skinning)
@@ -69,7 +69,7 @@ class ScalarQuantities:
             *((id(mesh), mesh.scalars.version) for _, mesh in meshes),
             *map(id, figures),
         )
-        # A new mesh may have the id and version of one that is gone.
+        # A new mesh may reuse the id and version of a deleted one.
         if key != self._key or not all(mesh.scalars.is_shown for _, mesh in meshes):
             self._show(name, meshes, options, figures)
             self._key = key
@@ -99,16 +99,16 @@ class ScalarQuantities:
 
 
 def name_for(name: str, actor: Actor | None, joint: int) -> str:
-    """Return the name of a view with the selected joint, if it is about one and has none.
+    """Return a quantity's name, with the selected joint appended if it needs one and has none.
 
     Parameters
     ----------
     name : str
-        Of the view.
+        Name of the quantity.
     actor : Actor or None
-        Whose joint is selected.
+        Actor with the selected joint.
     joint : int
-        Its index, -1 for none.
+        Index of the joint, -1 for none.
     """
     if actor is None or joint < 0 or ":" in name or not find_quantity(name).takes_joint:
         return name

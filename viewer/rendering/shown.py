@@ -1,4 +1,4 @@
-"""Drawn parts of a scene, and the posed meshes and instances that they need."""
+"""Selection of the drawn parts of a scene, and update of their meshes and instances."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Meshes:
-    """The meshes of a picture: those drawn one by one, and those drawn together."""
+    """The meshes of a picture: those drawn singly, and those drawn as instances."""
 
     singles: list[tuple[Actor, PosedMesh]] = field(default_factory=list)
     instanced: list[tuple[list[Actor], InstanceBuffers]] = field(default_factory=list)
@@ -47,21 +47,21 @@ class Meshes:
 def prepare_meshes(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
 ) -> Meshes:
-    """Upload what the meshes of some actors need; none is skinned yet.
+    """Upload the buffers of the actors' meshes, without skinning posed buffers.
 
     Parameters
     ----------
     buffers : ActorBuffers
-        Gets what is new.
+        Buffers of the scene; missing ones are added.
     actors : sequence of Actor
-        Those whose figure has no mesh are left out.
+        The actors; those whose figure has no mesh are ignored.
     options : DisplayOptions
-        What is shown.
+        Display options.
 
     Raises
     ------
     RenderError
-        If the driver has no room for it.
+        If there is not enough graphics memory.
     """
     meshes = Meshes()
     actors = [actor for actor in actors if shows_mesh(actor.figure, options)]
@@ -84,16 +84,16 @@ def prepare_meshes(
 def update_meshes(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
 ) -> Meshes:
-    """Skin what changed, before anything is drawn; some framebuffer must be bound.
+    """Skin changed meshes before drawing; a framebuffer must be bound.
 
     Parameters
     ----------
     buffers : ActorBuffers
-        Gets what is new.
+        Buffers of the scene; missing ones are added.
     actors : sequence of Actor
-        Of a scene.
+        Actors of a scene.
     options : DisplayOptions
-        What is shown.
+        Display options.
     """
     meshes = prepare_meshes(buffers, [actor for actor in actors if actor.is_drawn], options)
     for actor, mesh in meshes.singles:
@@ -105,16 +105,16 @@ def update_meshes(
 def update_skeletons(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions
 ) -> None:
-    """Send the joints' matrices of all drawn skeletons that moved, computed figure by figure.
+    """Upload the joint matrices of all drawn skeletons that moved, computed per figure.
 
     Parameters
     ----------
     buffers : ActorBuffers
-        Gets what is new.
+        Buffers of the scene; missing ones are added.
     actors : sequence of Actor
-        Of a scene.
+        Actors of a scene.
     options : DisplayOptions
-        What is shown.
+        Display options.
     """
     groups: dict[tuple[int, bytes], list[tuple[Actor, Pose]]] = {}
     for actor in actors:
@@ -129,8 +129,8 @@ def update_skeletons(
 
         poses = [pose for _, pose in group]
         skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
-        assert skeleton is not None  # it is shown
-        posed_worlds(skeleton, poses)  # together; each pose keeps its own
+        assert skeleton is not None  # guaranteed by shows_skeleton
+        posed_worlds(skeleton, poses)  # batched; each pose caches its result
         for actor, pose in group:
             buffers.skeleton(actor).update(pose, options)
 
@@ -141,21 +141,21 @@ def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
 
 
 def shows_skeleton(actor: Actor, options: DisplayOptions) -> bool:
-    """Return whether an actor's boxes are drawn."""
+    """Return whether an actor's joint boxes are drawn."""
     figure = actor.figure
     wanted = options.show in ("skeleton", "both") or figure.mesh is None
     return actor.is_drawn and figure.skeleton is not None and wanted
 
 
 def has_markers(actor: Actor, options: DisplayOptions) -> bool:
-    """Return whether the keypoints that an actor's figure itself has are marked."""
+    """Return whether the keypoints of an actor's figure are drawn."""
     if not options.keypoints or options.show == "binding" or actor.pose is None:
         return False
     return actor.is_drawn and actor.figure.keypoints is not None
 
 
 def has_joint_marks(options: DisplayOptions) -> bool:
-    """Return whether anything is drawn at joints beside their boxes."""
+    """Return whether joint marks are drawn in addition to boxes."""
     wanted = options.joint_names or options.joint_axes or options.xray
     return wanted and options.show != "binding"
 
@@ -166,7 +166,7 @@ def has_points(actor: Actor) -> bool:
 
 
 def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
-    """Return where an actor stands: its placement, then that of its pose."""
+    """Return the matrix from figure to scene space: actor placement times pose placement."""
     if actor.pose is None or options.show == "binding":
         return actor.placement
     return actor.placement @ placement_matrix(actor.pose)

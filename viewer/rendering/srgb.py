@@ -11,7 +11,7 @@ __all__ = ["decode_color", "decode_srgb", "encode_color", "encode_srgb"]
 
 
 def encode_srgb(linear: Floats) -> Floats:
-    """Return linear light as sRGB, 0 to 1, cut to what screens show."""
+    """Return linear light as sRGB, clipped to 0..1."""
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
@@ -22,7 +22,7 @@ def decode_srgb(colors: Floats) -> Floats:
 
 
 def encode_color(color: Color) -> Color:
-    """Return a scene's colour as screens and colour pickers show it.
+    """Return a linear colour of the scene as sRGB, as in colour pickers.
 
     >>> [round(part, 3) for part in encode_color((0.0, 0.001, 0.214))]
     [0.0, 0.013, 0.5]
@@ -32,6 +32,6 @@ def encode_color(color: Color) -> Color:
 
 
 def decode_color(color: Color) -> Color:
-    """Return the colour of a colour picker as scenes hold it."""
+    """Return an sRGB colour of a colour picker as a linear colour of the scene."""
     r, g, b = decode_srgb(np.array(color)).tolist()
     return r, g, b

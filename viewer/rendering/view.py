@@ -1,4 +1,4 @@
-"""Camera matrices shared by all passes, kept in float64 until the upload."""
+"""Camera matrices shared by all passes, in float64 until they are uploaded."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
 
 
 def in_front(view: View) -> View:
-    """Return the same view with all depths moved in front of what the other view draws."""
+    """Return a view whose depths are all in front of those of the given view."""
     squeeze = np.eye(4)
     squeeze[2] = 0.0, 0.0, 0.01, -0.98
     return View(view.matrix, squeeze @ view.projection, view.camera)
@@ -42,7 +42,7 @@ def in_front(view: View) -> View:
 def set_model(program: moderngl.Program, view: View, placement: Floats, center: Floats) -> None:
     """Set the matrices of a mesh whose positions are relative to ``center``.
 
-    The product is formed in float64: its large translations cancel before float32 sees them.
+    The product is formed in float64: large translations cancel before the conversion to float32.
     """
     model_view = view.matrix @ placement @ translation_matrix(center)
     values = {
@@ -55,7 +55,7 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 
 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
-    """Set the uniforms of ``shade/phong.glsl`` that the program kept."""
+    """Set the uniforms of ``shade/phong.glsl`` that the program uses."""
     pair = (lights.key, lights.rim)
     directions = [_direction(light, lights.follow_camera, view) for light in pair]
     colors = [[light.strength * channel for channel in light.color] for light in pair]
@@ -76,6 +76,6 @@ def _direction(light: Light, follows: bool, view: View) -> Floats:
         flat = math.cos(inclination)
         across, towards = flat * math.sin(azimuth), flat * math.cos(azimuth)
         return np.array([across, math.sin(inclination), towards])
-    # A camera that looked from there would have the light behind it.
-    seat = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
-    return view.matrix[:3, :3] @ camera_axes(seat)[2]
+    # The light comes from the position of a camera at these angles.
+    camera = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
+    return view.matrix[:3, :3] @ camera_axes(camera)[2]

@@ -100,7 +100,7 @@ class VertexField:
     Attributes
     ----------
     name : str
-        One word, for the command line.
+        Identifier without spaces, for the command line.
     title : str
         Label in menus and the legend.
     values : (V,)
@@ -129,7 +129,7 @@ class VertexField:
 
 
 def keypoint_positions(keypoints: Keypoints, vertices: Floats, joints: Floats) -> Floats:
-    """Return the positions of keypoints: sum_k b_k v_k of their corners, or that of their joint.
+    """Return the positions of keypoints: of their joints, or sum_k b_k v_k of triangle corners.
 
     Parameters
     ----------

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
+from viewer.phrases import printable
 
 __all__ = ["Bools", "Bytes", "Deferred", "Floats", "Ints", "frozen"]
 
@@ -74,7 +75,7 @@ def frozen(
     name : str
         Name of the array in error messages.
     values : array-like of ``shape``
-        Copied unless nothing can write to its memory any more.
+        Copied unless nothing can write to its memory.
     shape : tuple
         Required shape; ``None`` leaves an axis free.
     dtype : dtype
@@ -118,7 +119,7 @@ def _is_writeable_by_others(array: NDArray[Any]) -> bool:
 
 
 def _converted(name: str, values: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return values as an array of a type; integers must not lose a fraction."""
+    """Convert values to an array of a type; an integer type rejects fractions."""
     try:
         given = np.asarray(values)
         if given.dtype == dtype:

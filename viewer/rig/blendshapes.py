@@ -169,7 +169,7 @@ class Correctives:
 
 
 def active_rows(weights: Floats) -> list[slice]:
-    """Return the runs of joints, nine rows each, whose corrective weights are not all 0."""
+    """Return the row ranges of consecutive joints, nine rows each, whose weights are not all 0."""
     active = weights.reshape(-1, 9).any(axis=1)
     edges = np.flatnonzero(np.diff(active, prepend=False, append=False))
     return [slice(9 * int(a), 9 * int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -202,7 +202,7 @@ class JointRegressor:
     joints, vertices : (N,) int32
         Row and column of each entry of the sparse (J, V) matrix.
     weights : (N,)
-        Its value.
+        Value of each entry.
     """
 
     n_joints: int

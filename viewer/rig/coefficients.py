@@ -16,7 +16,7 @@ _MOST_SIGMA = 1e6  # standard deviations; larger coefficients are not plausible
 
 
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
-    """Return a diagnostic of coefficients that a figure does not have; none if they are all 0.
+    """Return a message about coefficients that a figure does not have; none if they are all 0.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def apply_coefficients(
     Returns
     -------
     list of Diagnostic
-        The ignored coefficients.
+        Messages about ignored coefficients.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def apply_coefficients(
     if values is None or len(values) == 0:
         return []
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
-    # Records keep every weight that is not a shape's, morphs included, as an expression.
+    # Records store all weights outside the shape group, morphs included, as expressions.
     rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
     values = np.asarray(values, dtype=np.float64).ravel()
     notes = unused_coefficients(group, values, len(rows), figure.name)

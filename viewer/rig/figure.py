@@ -36,7 +36,7 @@ class AttachedFigure(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Figure:
-    """A character as its files hold it.
+    """A character as read from its files.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Figure:
             )
 
     def _check_vertices(self) -> None:
-        """Check that all data about vertices fits the mesh."""
+        """Check that all per-vertex data fits the mesh."""
         count = 0 if self.mesh is None else self.mesh.n_vertices
         if self.symmetry is not None:
             symmetry = frozen("symmetry", self.symmetry, (count,), np.int32)

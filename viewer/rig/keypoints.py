@@ -48,7 +48,7 @@ def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None
     if figure.keypoints is None or figure.mesh is None:
         raise RigError(f"figure {figure.name} has no keypoints")
     part, keypoints = _parts.get(figure, None, lambda: _part(figure))
-    # The joints are those of the whole figure, shaped; the part has no regressor of its own.
+    # Joints are taken from the whole shaped figure, as the partial one has no joint regressor.
     whole = shaped(figure, pose.shape_weights)
     part = replace(part, skeleton=whole.skeleton, skin=_with_binds(part.skin, whole.skin))
     vertices = deform(part, pose, skinning or Skinning())[0]
@@ -62,7 +62,7 @@ def _with_binds(skin: Skin | None, whole: Skin | None) -> Skin | None:
 def _part(figure: Figure) -> tuple[Figure, Keypoints]:
     """Return a figure of the vertices that keypoints use, and the keypoints on that figure."""
     keypoints = figure.keypoints
-    assert keypoints is not None  # the caller looked
+    assert keypoints is not None  # checked by the caller
     vertices, index = np.unique(keypoints.vertices, return_inverse=True)
     part = some_vertices(figure, vertices.astype(np.int32))
     return part, replace(keypoints, vertices=index.reshape(-1, 3).astype(np.int32))

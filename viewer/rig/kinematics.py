@@ -18,9 +18,9 @@ __all__ = [
     "world_matrices",
 ]
 
-_RIGID = (
-    1e-5  # relative; treating the rest as rigid rotates normals by at most half as many radians
-)
+# Relative tolerance of A^T A = s^2 I. Treating a matrix within it as rigid rotates normals by at
+# most half as many radians.
+_RIGID = 1e-5
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:

@@ -42,7 +42,7 @@ class Memo(Generic[_Owner, _Value]):
         """
         known = self._values.setdefault(owner, {})
         if key in known:
-            with contextlib.suppress(KeyError):  # another thread may have evicted it
+            with contextlib.suppress(KeyError):  # already evicted by another thread
                 return known[key]
         value = make()
         with self._lock:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.errors import RigError
-from viewer.rig.arrays import Bools, Bytes, Floats, Ints, frozen
+from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.material import Material
 
 __all__ = [
-    "Material",
     "Mesh",
     "bounding_box",
     "box_size",
@@ -20,32 +20,7 @@ __all__ = [
     "volume",
 ]
 
-_ROW = 64  # points reduced side by side
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Material:
-    """The surface appearance of some triangles.
-
-    Attributes
-    ----------
-    name : str
-        As in the file; triangles refer to materials by index.
-    texture : str or None
-        File name of the picture, relative to the figure's folder.
-    image : (H, W, 4) uint8 or None
-        Pixels of the picture, sRGB with alpha, first row at v = 1; None if it could not be read.
-    """
-
-    name: str = ""
-    texture: str | None = None
-    image: Bytes | None = None
-
-    def __post_init__(self) -> None:
-        if self.image is not None:
-            object.__setattr__(
-                self, "image", frozen("image", self.image, (None, None, 4), np.uint8)
-            )
+_ROW = 64  # points per row of a reduction, see bounding_box
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +42,8 @@ class Mesh:
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
+    second_uvs : (U, 2) or None
+        Another texture coordinate for each row of ``uvs``, for textures that name this set.
     """
 
     positions: Floats
@@ -76,6 +53,7 @@ class Mesh:
     materials: tuple[Material, ...] = ()
     triangle_materials: Ints | None = None
     uv_triangles: Ints | None = None
+    second_uvs: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -87,6 +65,9 @@ class Mesh:
         if self.uvs is not None:
             rows = self.n_vertices if self.uv_triangles is None else None
             put("uvs", frozen("uvs", self.uvs, (rows, 2)))
+        if self.second_uvs is not None:
+            rows = 0 if self.uvs is None else len(self.uvs)
+            put("second_uvs", frozen("second_uvs", self.second_uvs, (rows, 2)))
         if self.uv_triangles is not None:
             shape = (self.n_triangles, 3)
             put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))
@@ -212,7 +193,7 @@ def volume(positions: Floats, triangles: Ints) -> float:
     >>> round(volume(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])), 12)
     0.166666666667
     """
-    # Tetrahedra start at the mean, so that a small hole changes the sum little.
+    # All tetrahedra share the mean as a corner, so that a small hole changes the sum only slightly.
     centered = positions - positions.mean(axis=0)
     a, b, c = (centered[triangles[:, corner]] for corner in range(3))
     return float(np.einsum("ta,ta->", a, np.cross(b, c)) / 6.0)

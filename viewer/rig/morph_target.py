@@ -17,7 +17,7 @@ from viewer.rig.skin import Skin
 __all__ = ["MORPH_GROUP", "MorphTarget", "on_one_joint", "with_morphs"]
 
 MORPH_GROUP = "morph"
-"""Group of blend shapes whose weight 1 is the target itself and 0 the unchanged mesh."""
+"""Group of blend shapes for which weight 0 gives the unchanged mesh and weight 1 the target."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +95,7 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
         names, groups = shapes.names + names, shapes.groups + groups
         known = np.stack([shapes.direction_values(), shapes.normal_values()])
         offsets = np.concatenate([known, offsets], axis=1)
-    # Read-only arrays are taken over without a copy.
+    # BlendShapes uses read-only arrays without copying them.
     offsets.flags.writeable = False
     return replace(figure, blend_shapes=BlendShapes(names, offsets[0], groups, offsets[1]))
 

@@ -12,7 +12,7 @@ __all__ = ["NumberKey"]
 class NumberKey:
     """A snapshot of the contents of some arrays.
 
-    Keys of equal contents are equal. ``is_of`` compares without copying.
+    Keys of equal contents are equal, and ``array`` returns the contents.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class NumberKey:
     >>> angles = np.zeros(3)
     >>> key = NumberKey(angles)
     >>> angles[1] = 0.5
-    >>> key.is_of(angles), key.is_of(np.zeros(3)), key == NumberKey(np.zeros(3))
+    >>> key.updated(angles) is key, key.updated(np.zeros(3)) is key, key == NumberKey(np.zeros(3))
     (False, True, True)
     """
 
@@ -31,16 +31,31 @@ class NumberKey:
     def __init__(self, *arrays: Floats) -> None:
         self._parts = tuple(map(bytearray, arrays))
 
-    def is_of(self, *arrays: Floats) -> bool:
-        """Return whether the arrays have the contents of the key, bit by bit."""
-        if len(arrays) != len(self._parts):
-            return False
-        for part, array in zip(self._parts, arrays, strict=True):
+    def updated(self, *arrays: Floats) -> NumberKey:
+        """Return the key of the arrays' present contents: this one if they are the same bit by bit.
+
+        Arrays are compared without copying, and only those that changed are copied.
+        """
+        old = self._parts
+        if len(arrays) != len(old):
+            return NumberKey(*arrays)
+        changed = False
+        parts = []
+        for part, array in zip(old, arrays, strict=True):
             packed = array if array.flags.c_contiguous else np.ascontiguousarray(array)
             # A bytearray compares with the array's memory directly, without a temporary array.
             if part != packed:
-                return False
-        return True
+                part, changed = bytearray(packed), True
+            parts.append(part)
+        if not changed:
+            return self
+        key = NumberKey()
+        key._parts = tuple(parts)
+        return key
+
+    def array(self, index: int) -> Floats:
+        """Return a copy of the contents of one of the arrays, flat: (N,)."""
+        return np.array(np.frombuffer(self._parts[index]))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, NumberKey):

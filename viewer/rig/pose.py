@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,13 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = [
     "Pose",
+    "PoseKey",
     "dof_rotations",
     "joint_rotations",
     "local_matrices",
     "placement_matrix",
     "pose_key",
+    "pose_of",
     "rest_pose",
 ]
 
@@ -64,21 +67,9 @@ class Pose:
 
         Poses with equal keys have the same joints and need no second skinning.
         """
-        key, arrays = self._key, self._arrays
-        if key is None or not key.is_of(*arrays):
-            key = self._key = NumberKey(*arrays)
-        return key
-
-    @property
-    def _arrays(self) -> tuple[Floats, ...]:
-        return self.dofs, self.translations, self.rotations, self.scales, self.shape_weights
-
-    def is_like(self, other: Pose) -> bool:
-        """Return whether another pose has the same values; only this one caches a key."""
-        places = (self.figure_scale, *self.figure_translation.tolist())
-        if places != (other.figure_scale, *other.figure_translation.tolist()):
-            return False
-        return self.skinning_key.is_of(*other._arrays)
+        arrays = self.dofs, self.translations, self.rotations, self.scales, self.shape_weights
+        self._key = NumberKey(*arrays) if self._key is None else self._key.updated(*arrays)
+        return self._key
 
     def copy(self) -> Pose:
         """Return a pose that shares no array with this one."""
@@ -93,9 +84,41 @@ class Pose:
         )
 
 
-def pose_key(pose: Pose) -> tuple[object, ...]:
-    """Return a key that identifies the pose, to decide when to redraw."""
-    return pose.skinning_key, pose.figure_scale, *pose.figure_translation.tolist()
+class PoseKey(NamedTuple):
+    """All values of a pose at one moment, to compare and to restore; see ``pose_of``.
+
+    Attributes
+    ----------
+    numbers : NumberKey
+        The pose's ``skinning_key``.
+    scale : float
+        Its ``figure_scale``.
+    translation : tuple of 3 floats
+        Its ``figure_translation``.
+    """
+
+    numbers: NumberKey
+    scale: float
+    translation: tuple[float, ...]
+
+
+def pose_key(pose: Pose) -> PoseKey:
+    """Return a key that identifies the pose. It copies no number unless one has changed."""
+    return PoseKey(pose.skinning_key, pose.figure_scale, tuple(pose.figure_translation.tolist()))
+
+
+def pose_of(key: PoseKey) -> Pose:
+    """Return a new pose with the values of a key."""
+    numbers = key.numbers
+    return Pose(
+        dofs=numbers.array(0),
+        translations=numbers.array(1).reshape(-1, 3),
+        rotations=numbers.array(2).reshape(-1, 4),
+        scales=numbers.array(3).reshape(-1, 3),
+        shape_weights=numbers.array(4),
+        figure_scale=key.scale,
+        figure_translation=np.array(key.translation),
+    )
 
 
 def placement_matrix(pose: Pose) -> Floats:

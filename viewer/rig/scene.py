@@ -41,8 +41,10 @@ if TYPE_CHECKING:
 Motion: TypeAlias = "Clip | SampledClip | PointClip"
 """The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
 
-_OUTLIER_FRACTION = 0.001  # the camera fits the box of the other 99.9 % of the points
-_OUTLIER_RATIO = 100.0  # ... if the whole box is this much larger
+# The camera frames the box of the other 99.9 % of the points ...
+_OUTLIER_FRACTION = 0.001
+# ... if the box of all points is this many times larger.
+_OUTLIER_RATIO = 100.0
 
 
 @dataclass(slots=True, eq=False)

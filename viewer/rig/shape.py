@@ -1,4 +1,4 @@
-"""Figures with a changed rest mesh, whose joints and inverse bind matrices follow."""
+"""Changes of a figure's rest mesh, which its joints and inverse bind matrices follow."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = [
     "with_rest_mesh",
 ]
 
-_shaped: Memo[Figure, Figure] = Memo(kept=32)  # distinct shapes in one scene
+_shaped: Memo[Figure, Figure] = Memo(kept=32)  # shapes in use at a time
 
 
 def shaped(figure: Figure, weights: Floats) -> Figure:
@@ -123,7 +123,7 @@ def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
     above = parents[has_parent]
     translations = joints.copy()
     offsets = joints[..., has_parent, :] - joints[..., above, :]
-    # Solved rather than transposed, as rest transforms may scale.
+    # Solved instead of multiplied by the transpose, as rest transforms may scale.
     translations[..., has_parent, :] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
     return translations
 

@@ -189,8 +189,8 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
 def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
     """Return each vertex's sum over joints of |weight|, after adding up entries of the same joint.
 
-    For the entries of one skin and the negated entries of another this is the L1 distance of
-    their rows, in whatever order or parts they list the weights.
+    For the entries of one skin and the negated entries of another this is the L1 distance of their
+    rows, regardless of the order of influences and of duplicate joints.
 
     Parameters
     ----------

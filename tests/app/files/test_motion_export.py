@@ -25,15 +25,10 @@ def moving(drive, rig):
     return hand
 
 
-def finish(hand):
-    while hand.state.job is not None:
-        hand.step(1)
-
-
 def test_every_suffix_offered_is_written(moving, tmp_path):
     for suffix in motion_suffixes():
         save_motion(moving.state, tmp_path / f"slide{suffix}")
-        finish(moving)
+        moving.finish_job()
         assert moving.state.error == "", suffix
         assert (tmp_path / f"slide{suffix}").stat().st_size > 0
     assert motion_suffixes()[0] == ".bvh"
@@ -43,7 +38,7 @@ def test_every_suffix_offered_is_written(moving, tmp_path):
 def test_only_the_range_that_is_played_is_written(moving, tmp_path):
     moving.state.clock.set_range(0.2, 0.5)
     save_motion(moving.state, tmp_path / "part.bvh")
-    finish(moving)
+    moving.finish_job()
     text = (tmp_path / "part.bvh").read_text()
     assert "Frames: 10\n" in text  # 6 to 15 of 30 a second
 
@@ -58,7 +53,7 @@ def test_menu_asks_where_and_says_what_was_written(moving, tmp_path):
     moving.key("escape")
     moving.state.messages.notes.clear()
     save_motion(moving.state, tmp_path / "slide.bvh")
-    finish(moving)
+    moving.finish_job()
     assert any("slide.bvh" in note.text for note in moving.state.messages.notes)
 
 
@@ -81,7 +76,7 @@ def test_folder_that_does_not_exist_is_one_message(moving, tmp_path):
 def test_keys_are_written_at_the_frame_rate_that_is_shown(moving, tmp_path):
     moving.state.clock.count_by(10.0)
     save_motion(moving.state, tmp_path / "slide.bvh")
-    finish(moving)
+    moving.finish_job()
     text = (tmp_path / "slide.bvh").read_text()
     assert "Frames: 11\n" in text and "Frame Time: 0.1" in text
 
@@ -107,7 +102,7 @@ def frames_of(path):
 def test_everybody_is_written_a_file_each_as_convert_names_them(crowd, tmp_path):
     save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
     assert crowd.state.job.title == "Writing walk-0.bvh and 2 more"
-    finish(crowd)
+    crowd.finish_job()
     assert crowd.state.error == ""
     assert sorted(path.name for path in tmp_path.glob("*.bvh")) == [
         "walk-0.bvh",
@@ -115,13 +110,13 @@ def test_everybody_is_written_a_file_each_as_convert_names_them(crowd, tmp_path)
         "walk-2.bvh",
     ]
     assert frames_of(tmp_path / "walk-0.bvh") == 21
-    assert crowd.says("captured points are not written: face4 0")
+    assert crowd.says("captured points are not exported: face4 0")
 
 
 def test_only_the_chosen_actor_is_written_if_asked_for(crowd, tmp_path):
     crowd.state.choose_actor(1)
     save_motion(crowd.state, tmp_path / "walk.bvh")
-    finish(crowd)
+    crowd.finish_job()
     assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk.bvh"]
 
 
@@ -131,20 +126,20 @@ def test_nobody_there_in_the_range_is_said(drive, rig, tmp_path):
     hand = drive(scene=scene, size=(1000, 700), samples=1)
     hand.state.clock.set_range(0.0, 1.0)
     save_motion(hand.state, tmp_path / "walk.bvh", everyone=True)
-    finish(hand)
+    hand.finish_job()
     assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk-0.bvh"]
     assert frames_of(tmp_path / "walk-0.bvh") == 11
-    assert hand.says("tiny 1: absent throughout the range, not written")
+    assert hand.says("tiny 1: absent throughout the range, not exported")
     hand.state.clock.set_range(5.0, 6.0)
     save_motion(hand.state, tmp_path / "none.bvh", everyone=True)
-    assert hand.state.error == ("everybody is absent in the playback range: nothing to write")
+    assert hand.state.error == ("all actors are absent in the playback range: nothing to export")
 
 
 def test_all_files_appear_or_none(crowd, tmp_path):
     (tmp_path / "walk-0.bvh").write_text("before")
     (tmp_path / "walk-2.bvh").mkdir()  # cannot be replaced by a file
     save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
-    finish(crowd)
+    crowd.finish_job()
     assert "walk-2.bvh" in crowd.state.error
     assert (tmp_path / "walk-0.bvh").read_text() == "before"
     assert not (tmp_path / "walk-1.bvh").exists()
@@ -188,7 +183,7 @@ def bodies(drive_body):
 
 def test_everybody_goes_into_one_easymocap_folder(bodies, tmp_path):
     save_motion(bodies.state, tmp_path / "out", everyone=True)
-    finish(bodies)
+    bodies.finish_job()
     assert bodies.state.error == ""
     frames = sorted((tmp_path / "out" / "smpl").glob("*.json"))
     found = [[record["id"] for record in json.loads(frame.read_text())] for frame in frames]
@@ -197,7 +192,7 @@ def test_everybody_goes_into_one_easymocap_folder(bodies, tmp_path):
 
 def test_amass_is_a_file_each(bodies, tmp_path):
     save_motion(bodies.state, tmp_path / "take.npz", everyone=True)
-    finish(bodies)
+    bodies.finish_job()
     assert bodies.state.error == ""
     with np.load(tmp_path / "take-7.npz") as arrays:
         assert arrays["poses"].shape[0] == 5
@@ -227,12 +222,12 @@ def test_dialog_exports_all_actors_unless_told_otherwise(crowd, tmp_path):
     _ask(crowd, tmp_path)
     assert crowd.state.of(Files).dialog.name == "tiny.bvh"
     crowd.click("Save###Save")
-    finish(crowd)
+    crowd.finish_job()
     assert len(list(tmp_path.glob("*.bvh"))) == 3
     _ask(crowd, tmp_path / ".")
     crowd.pick("Actors##exported", 1)
     crowd.click("Save###Save")
-    finish(crowd)
+    crowd.finish_job()
     assert (tmp_path / "tiny.bvh").exists()
 
 
@@ -262,5 +257,5 @@ def test_dialog_for_one_actor_does_not_ask_whose(moving, tmp_path):
     _ask(moving, tmp_path)
     assert "Actors##exported" not in moving.state.item_rects and "Format" in moving.state.item_rects
     moving.click("Save###Save")
-    finish(moving)
+    moving.finish_job()
     assert (tmp_path / "tiny.bvh").exists()

@@ -25,7 +25,7 @@ def at_frame(hand, frame, texts):
 def test_panel_says_what_the_points_are(points, texts):
     at_frame(points, 0, texts)
     assert "4 captured points (face4), not a skeleton: there are no joints to rotate." in texts
-    assert "4 are seen at this time." in texts
+    assert "4 detected at this time." in texts
     assert not any("open its .skel" in text for text in texts)
 
 
@@ -41,14 +41,14 @@ def test_panel_lists_names_and_how_sure_each_is_now(points, texts, monkeypatch):
     at_frame(points, 1, texts)
     assert [text for text in texts if text in NAMES] == list(NAMES)
     assert bars[-3:] == [(0.9, "0.9"), (0.05, "0.05"), (0.5, "0.5")]
-    assert texts.count("not seen") == 1
-    assert "3 are seen at this time, 1 of them below 0.1 and not drawn." in texts
+    assert texts.count("not detected") == 1
+    assert "3 detected at this time, 1 of them with confidence below 0.1 and not drawn." in texts
 
 
 def test_points_that_are_not_there_are_said_to_be_so(points, texts):
     points.state.clock.mode = "run on"
     at_frame(points, 9, texts)
-    assert "Absent at this time." in texts and texts.count("not seen") == 4
+    assert "Absent at this time." in texts and texts.count("not detected") == 4
 
 
 def test_filter_lists_points_by_name(points, texts):

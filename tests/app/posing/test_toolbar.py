@@ -92,18 +92,18 @@ def test_chain_goes_from_one_to_the_depth(arm):
 def test_reasons_of_what_is_greyed(arm):
     state = arm.state
     assert no_keys(state) == "there is no clip: create one with Edit > New clip"
-    assert no_chain(state) == "only the Move tool (D) has chains"
+    assert no_chain(state) == "chains apply only to the Move tool (D)"
     arm.key("d")
     assert no_chain(state) == "select a joint"
     state.selected_joint = 0
     assert no_chain(state) == "no joint above shoulder can rotate"
     state.selected_joint = 2
     assert no_chain(state) == ""
-    assert no_orientation(state) == "it is dragged in the image plane"
+    assert no_orientation(state) == "this joint is dragged in the image plane"
     arm.key("e")
     assert no_orientation(state) == ""
     state.selected_joint = 1
-    assert no_orientation(state) == "this joint turns about the axes of its DOFs only"
+    assert no_orientation(state) == "this joint rotates only about the axes of its DOFs"
     state.actor.visible = False
     assert no_tool(state) == "this actor is not shown"
 
@@ -152,7 +152,7 @@ def test_edit_pauses_the_clip_and_says_why(moved):
     places = around(center, 1.2 * RADIUS, 0.3, 1.1)
     drag_along(moved, places)
     assert not moved.state.clock.playing
-    assert moved.says("Paused: the clip overwrites this pose as time moves; key it (Key)")
+    assert moved.says("Paused: the clip overwrites this pose when the time changes; press Key")
     edited, stopped = moved.dofs(), moved.state.clock.time
     moved.step(3)
     assert_array_equal(moved.dofs(), edited)

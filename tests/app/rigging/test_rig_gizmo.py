@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app import rig_scene
-from app.rig_scene import TRUE, finish
+from app.rig_scene import TRUE
 from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 
 from viewer.app.core.view_frame import view_frame
 from viewer.app.rigging.placing import (
+    aligned_template,
     as_similarity,
     ghost_place,
-    laid_template,
     move_by_hand,
     posed_template,
     similarity_now,
@@ -93,7 +93,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
     assert_allclose(after.rotation, before.rotation, atol=1e-6)
     assert after.scale == pytest.approx(before.scale, rel=1e-6)
     assert hand.state.camera.azimuth == camera
-    finish(hand)  # once it was let go of its error is measured
+    hand.finish_job()  # once it was let go of its error is measured
     alignment = hand.state.of(Rigging).placing.alignment
     assert alignment.how == "given" and alignment.error > 0.01
 
@@ -117,7 +117,7 @@ def test_ring_turns_the_template_about_its_middle(hand):
 
 @pytest.mark.parametrize("kind", ["factors", "own_factors"])
 def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
-    laid = laid_template(hand.state)
+    laid = aligned_template(hand.state)
     stretch = np.array([1.3, 1.0, 1.0]) / 1.3 ** (1 / 3)
     straight = replace(similarity(hand), rotation=np.eye(3), **{kind: stretch})
     move_by_hand(hand.state, laid, straight)
@@ -131,10 +131,10 @@ def test_drag_is_one_step_of_undoing_with_its_error(hand):
     hand.click("rig tool move")
     before, steps = similarity(hand), hand.undo_steps
     pull_along_x(hand, 2.5)
-    finish(hand)
+    hand.finish_job()
     first, error = similarity(hand), hand.state.of(Rigging).placing.alignment.error
     pull_along_x(hand, -1.0)
-    finish(hand)
+    hand.finish_job()
     assert hand.undo_steps == steps + 2
     hand.key("z", "ctrl")
     hand.step(2)
@@ -156,10 +156,10 @@ def test_moved_template_keeps_its_fitted_pose_and_not_the_gap_it_left(hand):
     hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2  # the target's tip is bent more
     hand.step(2)
     hand.click("Align")
-    finish(hand)
+    hand.finish_job()
     pose, gap = hand.state.of(Rigging).placing.lines
     assert (pose.key, gap.key) == ("R003.pose", "R003.gap")
-    laid = laid_template(hand.state)
+    laid = aligned_template(hand.state)
     away = translation_matrix(np.array([2.5, 0.0, 0.0])) @ similarity_now(hand.state, laid).matrix
     move_by_hand(hand.state, laid, as_similarity(away))
     assert hand.state.of(Rigging).placing.lines == (pose,)
@@ -181,7 +181,7 @@ def test_drag_undone_while_its_error_is_measured_stays_undone(hand, monkeypatch)
     hand.key("z", "ctrl")
     hand.step(2)
     gate.set()
-    finish(hand)
+    hand.finish_job()
     assert hand.state.of(Rigging).placing is None
     hand.key("y", "ctrl")
     hand.step(2)
@@ -236,7 +236,7 @@ def test_numbers_place_the_template(hand):
     assert similarity(hand).shift[0] == pytest.approx(12.0)
     hand.enter_value("Scale factor", "-3")
     assert similarity(hand).scale == pytest.approx(30.0)
-    finish(hand)
+    hand.finish_job()
     assert hand.state.of(Rigging).placing.alignment is not None and hand.state.error == ""
     assert x1 > x0
 
@@ -248,7 +248,7 @@ def test_refining_finds_the_place_from_near_by(hand):
     move_by_hand(hand.state, template, as_similarity(near))
     hand.step(2)
     hand.click("Refine")
-    finish(hand)
+    hand.finish_job()
     assert_allclose(similarity(hand).matrix, TRUE, atol=1e-3)
     assert hand.state.of(Rigging).placing.alignment.how == "landmarks"
 
@@ -258,7 +258,7 @@ def test_run_keeps_what_was_placed_by_hand(hand):
     move_by_hand(hand.state, template, as_similarity(TRUE))
     hand.step(2)
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     rigged = hand.state.of(Rigging).results["robust"].rigged
     assert rigged.alignment.how == "given"
     assert_allclose(rigged.alignment.similarity.matrix, TRUE, atol=1e-9)
@@ -318,7 +318,7 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
     assert state.camera.azimuth == orbit and state.chosen_actor == 0
     hand.click("Refine by closest points")
     hand.click("Align by landmarks")
-    finish(hand)
+    hand.finish_job()
     assert state.error == "" and state.of(Rigging).placing.alignment.how == "landmarks"
     # A click hits a point to half a pixel, of some 15 to a unit of a mesh 60 units long.
     assert similarity(hand).scale == pytest.approx(30.0, rel=0.03)

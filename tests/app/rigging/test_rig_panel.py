@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app import rig_scene
-from app.rig_scene import TRUE, finish
+from app.rig_scene import TRUE
 from app.tiny import write_rig
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
@@ -70,7 +70,7 @@ def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
     hand.menu("menu Window", "Rig")
     texts.clear()
     hand.step(2)
-    assert "Every mesh in the scene has a rig: add one without, an .obj or .ply." in texts
+    assert "Every mesh in the scene has a rig: add a mesh without one, .obj or .ply." in texts
     for label in ("Align", "Run", "Compare methods", "rig tool move"):
         hand.click(label)
     assert hand.state.job is None and hand.state.of(Rigging).tool == "" and not hand.state.error
@@ -81,7 +81,7 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
     hand = rigging(placed=False)
     steps = hand.undo_steps
     hand.click("Align")
-    finish(hand)
+    hand.finish_job()
     assert_allclose(hand.state.of(Rigging).placing.similarity.matrix, TRUE, atol=1e-6)
     texts.clear()
     hand.step()
@@ -105,7 +105,7 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
 )
 def test_words_beside_the_error_say_what_was_done(rigging, texts, factors, own, words):
     hand = rigging()
-    finish(hand)  # the gap where it was laid is being measured
+    hand.finish_job()  # the gap where it was laid is being measured
     placing = placing_now(hand.state)
     where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
     found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")
@@ -120,7 +120,7 @@ def test_align_says_what_it_does(rigging, monkeypatch, fits):
     said, show = [], imgui.set_tooltip
     monkeypatch.setattr(imgui, "set_tooltip", lambda text: said.append(text) or show(text))
     hand = rigging()
-    finish(hand)
+    hand.finish_job()
     hand.state.of(Rigging).choices.fits = fits
     also = "; joints are rotated and limbs resized{} where that fits much better" if fits else ""
     for label, words in (
@@ -137,7 +137,7 @@ def test_template_posed_after_aligning_says_so(rigging, texts):
     hand.state.scene.actors[1].pose.dofs[8] = 0.0
     texts.clear()
     hand.step(2)
-    assert "the template has been posed since: align again" in texts
+    assert "the template was posed after the alignment: align it again" in texts
 
 
 def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
@@ -148,10 +148,10 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
     move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
     hand.step(2)
     hand.click("Show match")
-    finish(hand)
+    hand.finish_job()
     state = hand.state
     assert (state.options.shading, state.options.scalar) == ("scalar", "class:match")
-    assert state.of(Rigging).match_share == 1.0 and state.error == ""
+    assert state.of(Rigging).match_fraction == 1.0 and state.error == ""
     fields = {field.name: field for field in state.scene.actors[0].figure.fields}
     assert fields["match"].names == ("matched", "unmatched")
     assert fields["match"].values.tolist() == [0.0] * state.scene.actors[0].figure.mesh.n_vertices
@@ -175,8 +175,8 @@ def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
     hand.enter_value("Max. distance", "1")
     assert hand.state.of(Rigging).choices.max_distance == pytest.approx(0.01)
     hand.click("Show match")
-    finish(hand)
-    assert hand.state.of(Rigging).match_share < 0.35
+    hand.finish_job()
+    assert hand.state.of(Rigging).match_fraction < 0.35
 
 
 def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
@@ -194,9 +194,9 @@ def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
     moved[:3, :3] = rig_scene.ROTATION @ moved[:3, :3]
     again = as_similarity(moved, now)
     assert_allclose(again.matrix, moved, atol=1e-9 * np.abs(moved).max())
-    finish(hand)
+    hand.finish_job()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     placed = hand.state.of(Rigging).results["robust"].rigged.alignment.similarity
     assert_allclose(placed.own_factors, stretch, atol=1e-9)
 
@@ -208,7 +208,7 @@ def test_run_puts_the_rigged_mesh_in_the_targets_place_in_one_step(rigging):
     steps = hand.undo_steps
     hand.click("Run")
     assert hand.state.job is not None and hand.state.job.can_cancel
-    finish(hand)
+    hand.finish_job()
     assert hand.state.error == ""
     assert names(hand) == ["scan rigged", "arm", "scan"]
     assert visible(hand) == ["scan rigged", "arm"]
@@ -230,9 +230,9 @@ def test_report_says_how_the_alignment_was_found(rigging, texts):
     hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
     hand.step(2)
     hand.click("Align")
-    finish(hand)
+    hand.finish_job()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     rigged = hand.state.of(Rigging).results["robust"].rigged
     keys = ["R001.alignment", "R001.error", "R003.pose", "R003.gap", "R005.matched"]
     assert [line.key for line in rigged.lines[:5]] == keys
@@ -243,7 +243,7 @@ def test_report_says_how_the_alignment_was_found(rigging, texts):
 def test_stats_count_the_rigged_mesh(rigging, texts):
     hand = rigging()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     texts.clear()
     hand.step()
     assert "scan rigged, arm, scan" in texts and "4" in texts  # joints: two of each rig
@@ -254,7 +254,7 @@ def test_a_goes_between_the_mesh_and_its_rig_without_steps(rigging):
     hand.key("a")
     assert hand.says("A/B: nothing is rigged yet, see Window > Rig")
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     steps = hand.undo_steps
     for expected in ("scan", "scan rigged", "scan"):
         hand.key("a")
@@ -271,14 +271,14 @@ def test_second_run_replaces_the_first_result(rigging):
     hand = rigging()
     for _ in range(2):
         hand.click("Run")
-        finish(hand)
+        hand.finish_job()
     assert names(hand) == ["scan rigged", "arm", "scan"]
 
 
 def test_both_methods_are_compared(rigging, texts):
     hand = rigging()
     hand.click("Compare methods")
-    finish(hand)
+    hand.finish_job()
     assert names(hand) == ["scan rigged", "arm", "scan", "scan rigged (nearest)"]
     assert visible(hand) == ["scan rigged", "arm"]
     results = hand.state.of(Rigging).results
@@ -311,7 +311,7 @@ def names_of(expected):
 def test_confidence_maps_are_buttons(rigging):
     hand = rigging()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     for view in ("class:confidence", "field:distance", "class:guarded"):
         hand.click(f"color {view}")
         assert (hand.state.options.shading, hand.state.options.scalar) == ("scalar", view)
@@ -328,7 +328,7 @@ def test_result_moves_as_the_template_where_the_target_stands(rigging):
     template.pose.dofs[6:] = 0.2, -0.1, 0.7
     hand.step(2)
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.error == ""
     still = seen(hand, 0)
     hand.click("Move like the template")
@@ -350,7 +350,7 @@ def test_result_moves_as_the_template_where_the_target_stands(rigging):
 def test_template_without_motion_says_why_nothing_moves(rigging):
     hand = rigging()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     hand.click("Move like the template")
     assert hand.state.actor.clip is None
 
@@ -360,7 +360,7 @@ def test_cancelled_work_changes_nothing(rigging):
     before = names(hand)
     hand.click("Run")
     hand.key("escape")
-    finish(hand)
+    hand.finish_job()
     assert hand.says("Cancelled")
     hand.step(5)
     running = hand.state.of(Rigging).running
@@ -383,7 +383,7 @@ def test_new_scene_forgets_everything_but_the_choices(rigging, rig):
     hand = rigging()
     hand.pick("Method", 1)
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     assert names(hand)[0] == "scan rigged (nearest)"
     hand.open(*rig)
     assert hand.state.of(Rigging).results == {} and hand.state.of(Rigging).target is None
@@ -397,7 +397,7 @@ def test_missing_scipy_is_a_message(rigging, monkeypatch):
     monkeypatch.setattr("viewer.rig._scipy.import_module", missing)
     hand = rigging()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.error == "rigging needs scipy: pip install scipy"
     assert names(hand) == ["scan", "arm"]
 
@@ -428,7 +428,7 @@ def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
     hand.click("Refine alignment")
     hand.click("Fit pose and proportions")
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     settings = asked["settings"]
     assert hand.state.error == "stopped here" and asked["name"] == "scan rigged"
     assert (asked["alignment"].up, asked["alignment"].scale) == ("z", "none")
@@ -473,7 +473,7 @@ def test_work_says_in_words_what_it_does_and_its_share(rigging, texts, monkeypat
     hand.step(2)
     gate.set()
     assert "Fitting pose and proportions" in texts and said[-1] == "40 %"
-    finish(hand)
+    hand.finish_job()
 
 
 def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
@@ -482,7 +482,7 @@ def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
     actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is turned by half a radian more
     hand.step(2)
     hand.click("Align")
-    finish(hand)
+    hand.finish_job()
     state = hand.state
     assert state.of(Rigging).placing.fitted is not None
     texts.clear()
@@ -496,7 +496,7 @@ def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
     assert gaps[0] < 0.2 * gaps[1]
     assert actor.pose.dofs[8] == 0.2  # the actor stands as before
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     assert_allclose(seen(hand, 0), wanted, atol=1e-6)
     assert state.error == ""
 
@@ -511,7 +511,7 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
     hand.step()
     hand.click("file scan.obj")
     hand.click("Open###Open")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.actor.name == "scan" and hand.state.of(Rigging).target is hand.state.actor
     assert hand.state.paths[-1] == tmp_path / "scan.obj"
     assert hand.undo_steps == 1
@@ -519,7 +519,7 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
     hand.pick("Template", 2)
     assert hand.state.of(Rigging).template_key == "fox"
     hand.click("rig tool move")  # the template has to be there to be moved
-    finish(hand)
+    hand.finish_job()
     assert hand.state.of(Rigging).template.figure.name == "fox"
     hand.click("Pose it…")
     hand.step(2)
@@ -543,14 +543,14 @@ def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
     assert hand.state.of(Rigging).template_key == "body"  # there is no other
     save(rig_scene.bent()[0], tmp_path / "arm.npz")
     start_reading(hand.state, (tmp_path / "arm.npz",))
-    finish(hand)
+    hand.finish_job()
     template = hand.state.of(Rigging).template
     hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
-    finish(hand)
+    hand.finish_job()
     assert hand.state.of(Rigging).template is template
     assert placing_now(hand.state).fitted is not None
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.of(Rigging).template is template and placing_now(hand.state) is not None
     assert names(hand) == ["scan rigged", "scan"] and hand.state.error == ""
 
@@ -563,7 +563,7 @@ def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
     hand.step()
     hand.click("file tiny.skel")
     hand.click("Open###Open")
-    finish(hand)
+    hand.finish_job()
     wanted = "tiny.skel: expected a figure with mesh, skeleton and skin, found none"
     assert hand.state.error == wanted
     hand.key("escape")
@@ -572,7 +572,7 @@ def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
     hand.state.of(Files).dialog.chosen = {skel, skin}
     hand.step()
     hand.click("Open 2 files###Open")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.of(Rigging).template.figure.name == "tiny" and hand.state.error == ""
     assert hand.state.of(Rigging).template_key == "file"
 
@@ -582,7 +582,7 @@ def test_rigged_mesh_without_a_bare_one_is_refused(drive, tmp_path):
     body = viewer.load(*write_rig(tmp_path)).actors[0]
     save(body.figure, tmp_path / "whole.npz")
     start_adding(hand.state, tmp_path / "whole.npz")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.error == (
         f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found one with a rig"
     )
@@ -591,13 +591,13 @@ def test_rigged_mesh_without_a_bare_one_is_refused(drive, tmp_path):
 def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand = rigging()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     hand.click("Save rigged…")
     hand.state.of(Files).dialog.enter(tmp_path)
     hand.step()
     assert hand.state.of(Files).dialog.name == "scan_rigged.npz"
     hand.click("Save###Save")
-    finish(hand)
+    hand.finish_job()
     assert hand.says("Saved") and hand.state.error == ""
     again = viewer.load(tmp_path / "scan_rigged.npz").actors[0].figure
     assert again.is_attached and again.fields[0].name == "confidence"
@@ -606,7 +606,7 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand.state.of(Files).dialog.name = "arm2.skel"
     hand.step()
     hand.click("Save###Save")
-    finish(hand)
+    hand.finish_job()
     found = sorted(path.name for path in tmp_path.glob("arm2.*"))
     assert found == ["arm2.json", "arm2.obj", "arm2.skel", "arm2.skin"]
     hand.click("Save rigged…")
@@ -614,14 +614,14 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand.state.of(Files).dialog.name = "arm3.glb"
     hand.step()
     hand.click("Save###Save")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.error.startswith('a rigged mesh cannot be written as ".glb"; there are: ')
 
 
 def test_report_is_copied(rigging, texts):
     hand = rigging()
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     lines = [line.labelled for line in hand.state.of(Rigging).results["robust"].rigged.lines]
     hand.click("Copy report")
     assert imgui.get_clipboard_text() == "\n".join(lines)
@@ -641,5 +641,5 @@ def test_target_without_meeting_the_template_is_a_message(drive):
     )  # fmt: skip
     hand.menu("menu Window", "Rig")
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     assert hand.state.error != "" and names(hand) == ["point", "arm"]

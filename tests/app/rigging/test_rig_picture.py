@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from app import rig_scene
-from app.rig_scene import finish
 from app.test_panel_pictures import _compare, _shown
 
 from viewer.app.shown_panels import ShownPanels
@@ -16,14 +15,14 @@ SIZE = (1000, 1100)
 
 def _aligned(hand):
     hand.click("Align")
-    finish(hand)
+    hand.finish_job()
     hand.click("rig tool rotate")
     hand.move((5, 5))
 
 
 def _result(hand):
     hand.click("Run")
-    finish(hand)
+    hand.finish_job()
     hand.click("color class:confidence")
     hand.move((5, 5))
 

@@ -227,7 +227,7 @@ def test_drawing_needs_no_display(tmp_path):
             "there is no graphics device 9: EGL found 3 devices, counted from 0",
         ),
         ("eglInitialize failed (0x3001)", "EGL could not be initialised: its driver files"),
-        ("eglInitialize failed (0x3002)", "EGL was refused access to the graphics device"),
+        ("eglInitialize failed (0x3002)", "EGL was denied access to the graphics device"),
         ("eglCreateContext failed (0x3003)", "the driver is out of memory"),
         ("eglGetDisplay failed (0x3008)", "EGL does not accept this display"),
         ("eglCreateContext failed (0x3009)", "OpenGL 3.3 is needed and the driver"),

@@ -197,5 +197,5 @@ def test_number_of_influences_is_named(kept, title):
 def test_title_is_kept_while_the_figure_that_has_the_field_is_hidden():
     having = strip(fields=(VertexField("near", "How near", np.zeros(6)),))
     found = legend_of("field:near", [], Skinning(), [strip(), having])
-    assert (found.title, found.note) == ("How near", "not known of what is shown")
+    assert (found.title, found.note) == ("How near", "not available for the visible figures")
     assert legend_of("field:near", [], Skinning(), [strip()]).title == "Field"

@@ -69,7 +69,7 @@ def test_every_term_of_dual_quaternions():
     s, c = np.sin(half), np.cos(half)
     assert_allclose(dual.duals, [[0, 0, s, c, 1 * c - 1 * s, -1 * c - 1 * s, 0, 0],
                                  [0, 0, 0, 1, 0, 0, 0, 0]], atol=1e-15)  # fmt: skip
-    assert_allclose(dual.shares, [0.75, 0.25])
+    assert_allclose(dual.fractions, [0.75, 0.25])
     assert dual.signs.tolist() == [1, 1]
     blended = 0.75 * dual.duals[0] + 0.25 * dual.duals[1]
     assert_allclose(dual.blended, blended, atol=1e-15)

@@ -15,7 +15,7 @@ from viewer.app.core.widgets import (
     plain_zero,
     same_line_if_room,
 )
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
 from viewer.rig.scalars import length_unit

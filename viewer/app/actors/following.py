@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from viewer.app.core.state import AppState
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.follow import followed_point
 

@@ -1,1 +1,1 @@
-"""Core of the window: scene, selection, camera, time, history and messages. Knows no feature."""
+"""Core of the window: scene, camera, time, history and messages; independent of features."""

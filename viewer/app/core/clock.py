@@ -47,7 +47,7 @@ class PosedFor(NamedTuple):
 class Clock:
     """Advances the time of a scene, ``Scene.time``, and poses the actors for it.
 
-    It follows the wall clock: a slow machine drops frames but stays in time.
+    Playback follows the wall clock: a slow machine drops frames but stays in sync.
 
     Attributes
     ----------
@@ -64,18 +64,20 @@ class Clock:
     whole : (float, float)
         Time range of all clips, seconds.
     frame_rate : float
-        Frames per second for stepping and frame numbers: those of the chosen actor's capture, so
-        that each of its frames can be reached, otherwise of the longest one.
+        Frames per second for stepping and frame numbers: the rate of the chosen actor's capture,
+        so that each of its frames can be reached, or of the longest capture if it has none.
     origin : float
-        Seconds of that capture's first frame.
+        Time of that capture's first frame, seconds.
     first_frame : int
         Number of that frame in its file.
     keyed_rate : float
-        The same for scenes without sampled motion: keyed clips have no rate of their own.
+        Frames per second for scenes without sampled motion: keyed clips have no rate of their own.
     has_frames : bool
         Whether some motion is sampled: each frame is then shown for its whole duration.
     fill_gaps : bool
         Whether captures are interpolated in their gaps.
+    has_motion : bool
+        Whether any actor has a motion.
     posed_for : PosedFor or None
         Key of the current poses; time may have advanced since.
     n_posed : int
@@ -97,10 +99,10 @@ class Clock:
     fill_gaps: bool = False
     has_motion: bool = False
     _over: float = 0.0  # seconds since the last frame of the range began
-    _turned: bool = False  # in the backward half of ping-pong
+    _is_returning: bool = False  # in the backward half of ping-pong
     posed_for: PosedFor | None = None
     n_posed: int = 0
-    _grid: tuple[object, ...] = ()  # actor whose frames are counted
+    _grid: tuple[object, ...] = ()  # key of the capture that defines the frames
 
     @property
     def time(self) -> float:
@@ -112,7 +114,7 @@ class Clock:
         self.scene.time = time
 
     def show(self, scene: Scene) -> None:
-        """Attach a scene with the range of its clips; go to its start or keep its time."""
+        """Attach a scene: use the range of its clips, and go to its time, or else to the start."""
         self.scene, self.posed_for = scene, None
         self.playing, self.mode, self.speed = False, "loop", 1.0
         self.keyed_rate, self.has_frames = DEFAULT_RATE, False
@@ -129,7 +131,7 @@ class Clock:
         Parameters
         ----------
         chosen : Actor, optional
-            Actor whose capture gives the frames, if it has one.
+            Actor whose capture defines the frames, if it has one.
         """
         was_whole = (self.start, self.end) == self.whole
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
@@ -144,7 +146,7 @@ class Clock:
             self.set_range(self.start, self.end)
 
     def _count(self, actor: Actor | None) -> None:
-        """Count frames of an actor's capture; None for the rate of keyed clips."""
+        """Use the frames of an actor's capture; for None, frames at the rate of keyed clips."""
         clip = None if actor is None else actor.clip
         old_rate, old_origin, old_grid = self.frame_rate, self.origin, self._grid
         if actor is None or clip is None or isinstance(clip, Clip):
@@ -197,14 +199,14 @@ class Clock:
         return self.frame_time(min(max(round((time - self.origin) * self.frame_rate), low), high))
 
     def scrub(self, time: float, between: bool = False) -> None:
-        """Go to the frame nearest to a time, or to the exact time if asked to."""
+        """Go to the frame nearest to a time, or to the exact time if it may lie between frames."""
         self.seek(time if between else self.nearest_frame_time(time))
 
     def seek(self, time: float) -> None:
-        """Go to a time, clamped to the range unless the mode runs on."""
+        """Go to a time, clamped to the whole range unless the mode is "run on"."""
         is_free = self.mode == "run on"
         self.time = time if is_free else min(max(time, self.whole[0]), self.whole[1])
-        self._over, self._turned = 0.0, False
+        self._over, self._is_returning = 0.0, False
 
     def step(self, frames: int) -> None:
         """Stop and step by whole frames, snapping to a frame first."""
@@ -253,7 +255,7 @@ class Clock:
 
     def _run(self, step: float) -> None:
         """Move within the range; at its end wrap around or stop."""
-        # The last frame is shown for as long as every other one.
+        # The last frame is shown for as long as every other frame.
         hold = 1.0 / self.frame_rate if self.has_frames and self.end > self.start else 0.0
         period = self.end - self.start + hold
         if period <= 0.0:
@@ -270,14 +272,15 @@ class Clock:
         self._over = max(self.start + place - self.end, 0.0)
 
     def _bounce(self, step: float) -> None:
+        """Move back and forth within the range."""
         length = self.end - self.start
         if length <= 0.0:
             self.time = self.start
             return
         place = min(max(self.time - self.start, 0.0), length)
-        place = ((2.0 * length - place if self._turned else place) + step) % (2.0 * length)
-        self._turned = place > length
-        self.time = self.start + (2.0 * length - place if self._turned else place)
+        place = ((2.0 * length - place if self._is_returning else place) + step) % (2.0 * length)
+        self._is_returning = place > length
+        self.time = self.start + (2.0 * length - place if self._is_returning else place)
 
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
         """Pose all actors for the time shown if it or their clips changed; return whether they did.

@@ -12,19 +12,19 @@ from viewer.rig.scene import scene_points
 __all__ = ["fit_again", "fit_points", "fit_shown", "keep_fitting"]
 
 _GAP = 6.0  # points between the tools and the scene
-_LEAST = 0.6  # of the view's height, whatever the overlays cover
+_LEAST = 0.6  # smallest fraction of the view's height to fill, whatever the overlays cover
 _NARROWEST = 40.0  # points: a smaller view is unusable
 
 
 def keep_fitting(state: AppState, grows: bool) -> None:
-    """Continue to find the scene's extent, and fit the camera to it unless the user moved it.
+    """Extend the known extent of the scene, and fit the camera to it unless the user moved it.
 
     Called in each frame once the free part of the view is known.
 
     Parameters
     ----------
     state : AppState
-        With the camera.
+        Holds the camera and the scene.
     grows : bool
         Whether more of the motion is still being read.
     """
@@ -46,7 +46,7 @@ def fit_points(state: AppState, points: Floats) -> None:
     Parameters
     ----------
     state : AppState
-        Its camera stops being a calibrated one.
+        Holds the camera, which stops following a calibrated camera.
     points : (N, 3)
         Scene space.
     """

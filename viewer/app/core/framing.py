@@ -18,19 +18,19 @@ class Framing:
     Attributes
     ----------
     is_fitting : bool
-        Whether it is refitted when the view is resized or more of the motion is known.
-        Ends as soon as the camera is moved by anything else.
+        Whether the camera is refitted when the view is resized or more of the motion is known.
+        Cleared as soon as anything else moves the camera.
     extent : MotionExtent
-        Extent of the scene.
+        Extent of the scene over its motion.
     points : (N, 3) or None
-        Points that it is fitted to; None for the extent.
+        Points that the camera is fitted to; None for those of the extent.
     """
 
     is_fitting: bool = False
     extent: MotionExtent = field(default_factory=MotionExtent)
     points: Floats | None = None
     _placed: tuple[object, ...] | None = None  # key of the fitted camera
-    _fitted: tuple[object, ...] | None = None  # size of the view that it was fitted to
+    _fitted: tuple[object, ...] | None = None  # size of the view at the last fit
     _is_stale: bool = True  # more of the motion is known than at the last fit
 
     @property

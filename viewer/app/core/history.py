@@ -9,20 +9,20 @@ from typing import Protocol
 
 from viewer.app.core.snapshot import (
     Snapshot,
-    copied_poses,
     have_same_motion,
     is_current,
     is_same,
+    key_of,
     look_of,
     restore_display,
     restore_motion,
-    same_pose,
+    restored_pose,
 )
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.pose import Pose
+from viewer.rig.pose import PoseKey
 from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = ["History", "Undoable"]
@@ -34,10 +34,10 @@ PoseAt = Callable[[float], None]
 
 
 class Undoable(Protocol):
-    """State of a feature with one value that is undone with the scene."""
+    """State of a feature, with one value that undo restores together with the scene."""
 
     def kept(self) -> object | None:
-        """Return that value, which is replaced and never mutated; None if there is none."""
+        """Return the value, which is replaced and never mutated; None if there is none."""
 
     def restore(self, kept: object | None) -> None:
         """Restore a value."""
@@ -55,24 +55,24 @@ class _Step:
 class History:
     """Undo history that detects changes itself, so that no panel or key can forget to report one.
 
-    ``observe`` compares the state of each frame with that of the frame before. While a widget is
-    held an edit goes on: the whole drag becomes one step. Poses set by the scene's clock are
+    ``observe`` compares the state of each frame with that of the previous frame. An edit lasts as
+    long as a widget is held, so a whole drag becomes one step. Poses set by the scene's clock are
     not edits: see ``follow``.
 
-    Undo and redo of an edit of actors, poses or clips go to the time of the edit. There the clock
-    poses all actors by their restored clips, but a pose that was edited by hand comes back as it
-    was. Undo of an edit of the display alone leaves time and poses.
+    Undo and redo of an edit of actors, poses or clips go to the time of the edit. The clock then
+    poses all actors by their restored clips, and poses edited by hand are restored on top of that.
+    Undo of an edit of the display alone changes neither time nor poses.
 
     Attributes
     ----------
     feature : Undoable or None
-        State with a value that is undone with the scene.
+        State of the feature whose value is undone with the scene.
     """
 
     feature: Undoable | None = None
     _seen: Snapshot | None = None  # state of the last frame
     _before: Snapshot | None = None  # state before an edit in progress
-    _clocked: dict[Actor, tuple[Motion, float, Pose | None]] = field(default_factory=dict)
+    _clocked: dict[Actor, tuple[Motion, float, PoseKey | None]] = field(default_factory=dict)
     _undo: list[_Step] = field(default_factory=list)
     _redo: list[_Step] = field(default_factory=list)
 
@@ -95,7 +95,7 @@ class History:
         if busy or self._before is None:
             return False
         before, self._before = self._before, None
-        if is_same(before, self._seen):  # dragged there and back: no change
+        if is_same(before, self._seen):  # dragged back to the initial value
             return False
         self._undo.append(_Step(before, self._seen))
         del self._undo[:-_MOST]
@@ -103,7 +103,7 @@ class History:
         return True
 
     def accept(self, scene: Scene, options: DisplayOptions) -> None:
-        """Adopt a change of the display without a step of its own."""
+        """Adopt a change of the display without recording a step."""
         if self._seen is not None:
             self._seen = self._take(scene, options)
 
@@ -123,7 +123,7 @@ class History:
         if self._seen is None:
             return
         actors = self._seen.actors  # other actors may have been added since
-        poses = copied_poses(actors)
+        poses = tuple(map(key_of, actors))
         self._seen = replace(self._seen, poses=poses, by_hand=(False,) * len(poses), time=time)
         self._clocked = {
             actor: (actor.clip, actor.offset, pose)
@@ -225,8 +225,9 @@ class History:
         rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
         for actor, pose, is_own in rows:
             if is_own and pose is not None:
-                actor.pose = pose.copy()
-        self._seen = replace(restored, poses=copied_poses(restored.actors), time=time)
+                actor.pose = restored_pose(pose)
+        poses = tuple(map(key_of, restored.actors))
+        self._seen = replace(restored, poses=poses, time=time)
 
     def _replace(self, change: Callable[[Snapshot], Snapshot]) -> None:
         """Replace every stored state."""
@@ -238,21 +239,22 @@ class History:
 
     def _take(self, scene: Scene, options: DisplayOptions) -> Snapshot:
         actors = tuple(scene.actors)
-        poses, by_hand = copied_poses(actors), tuple(map(self._is_by_hand, actors))
+        poses = tuple(map(key_of, actors))
+        by_hand = tuple(map(self._is_by_hand, actors, poses))
         looks, shown = tuple(map(look_of, actors)), copy.deepcopy(options)
         # An edit belongs to the time of the poses: the clock may have advanced already.
         time = (scene.time or 0.0) if self._seen is None else self._seen.time
         return Snapshot(actors, poses, by_hand, looks, shown, time, self._kept())
 
-    def _is_by_hand(self, actor: Actor) -> bool:
-        """Return whether an actor's pose differs from that which the clock set by its clip.
+    def _is_by_hand(self, actor: Actor, now: PoseKey | None) -> bool:
+        """Return whether an actor's pose differs from the one that the clock set from its clip.
 
-        A new clip poses the actor in the same frame, whatever its pose was.
+        A new clip overrides the pose in the same frame.
         """
         clip, offset, pose = self._clocked.get(actor, (None, 0.0, None))
         if clip is None or clip is not actor.clip or offset != actor.offset:
             return False
-        return not same_pose(pose, actor.pose)
+        return pose != now
 
     def _kept(self) -> object | None:
         return None if self.feature is None else self.feature.kept()
@@ -264,7 +266,7 @@ class History:
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
-    """Return the extended version of an earlier step's clip, of which more has been read."""
+    """Return an earlier step's clip, extended by the frames that were read since."""
     if isinstance(old, SampledClip) and isinstance(new, SampledClip):
         return with_rate(new, old.timing.frame_rate)
     if isinstance(old, PointClip) and isinstance(new, PointClip):

@@ -11,7 +11,7 @@ from viewer.errors import ViewerError
 __all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
 
 Report = Callable[[int, int, str], None]
-"""Called with the steps done, the number of steps and the next one; raises to cancel."""
+"""Called with the steps done, the number of steps and the next step's name; raises to cancel."""
 
 
 class Job(Protocol):
@@ -26,7 +26,7 @@ class Job(Protocol):
     lines : list of str
         Messages at the end.
     can_cancel : bool
-        Whether it can be ended early.
+        Whether it can be cancelled.
     """
 
     title: str
@@ -46,7 +46,7 @@ class Job(Protocol):
         """Do the next step if the job runs between frames."""
 
     def cancel(self) -> None:
-        """Cancel it; no partial file stays."""
+        """Cancel the job; no partial file remains."""
 
 
 class ThreadJob:
@@ -68,7 +68,7 @@ class ThreadJob:
         self.title, self.error, self.can_cancel = title, "", False
         self.lines: list[str] = []
         self._act, self._wake = act, wake
-        self._thread = threading.Thread(target=self._run)  # not a daemon: files get finished
+        self._thread = threading.Thread(target=self._run)  # not a daemon: no partial files
         self._thread.start()
 
     def _run(self) -> None:
@@ -94,7 +94,7 @@ class ThreadJob:
         """Do nothing: the thread does the work."""
 
     def cancel(self) -> None:
-        """Do nothing: one file is finished sooner than removed."""
+        """Do nothing: a single file is written too quickly to be worth cancelling."""
 
     def wait(self) -> None:
         """Wait until it has ended."""
@@ -154,7 +154,7 @@ class CountedJob:
         """Do nothing: the thread does the work."""
 
     def cancel(self) -> None:
-        """Let it end before its next step; its result is discarded."""
+        """End the job before its next step, and discard its result."""
         self._is_cancelled = True
 
     def wait(self) -> None:
@@ -202,6 +202,6 @@ class FrameJob:
             self.error, self._is_done = str(problem), True
 
     def cancel(self) -> None:
-        """Cancel it; the generator removes partial output."""
+        """Cancel the job; the generator removes partial output."""
         self._steps.close()
         self._is_done = True

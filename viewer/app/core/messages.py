@@ -9,24 +9,24 @@ from dataclasses import dataclass, field
 __all__ = ["KINDS", "Message", "MessageLog", "Messages", "Note", "message_line"]
 
 KINDS = ("note", "status", "error")
-"""Kinds: unsolicited notes, status after a key or button, and errors."""
+"""Kinds of messages: unsolicited notes, status after a key or button, and errors."""
 
 _MOST = 1000  # number of messages kept
-_NOTE_SECONDS = 4.0  # for which a short message is shown
+_NOTE_SECONDS = 4.0  # how long a short message is shown
 
 
 @dataclass(slots=True)
 class Message:
-    """A text that was shown once or more.
+    """A message that was shown once or several times.
 
     Attributes
     ----------
     text : str
-        As it was shown.
+        Text as shown.
     kind : str
         One of ``KINDS``.
     count : int
-        How often it was shown.
+        Number of times it was shown.
     """
 
     text: str
@@ -98,7 +98,7 @@ class Messages:
     log: MessageLog = field(default_factory=MessageLog)
     is_open: bool = False
     lists_status: bool = False
-    _logged_error: str = ""  # the one already in the log, while it is shown
+    _logged_error: str = ""  # displayed error that is already in the log
 
     def show(self, text: str, is_status: bool = False) -> None:
         """Show a message for some seconds, and add it to the log.

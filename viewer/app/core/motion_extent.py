@@ -20,19 +20,19 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = ["MotionExtent"]
 
-_POINTS_A_TIME = 30_000  # frames posed per frame of the interface
-_MOST_POINTS = 2_000_000  # frames posed in all
+_POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
+_MOST_POINTS = 2_000_000  # vertices posed in all
 _MOST_FRAMES = 32
-_MOST_PRODUCTS = 100_000_000  # of points and directions, for very many points
+_MOST_PRODUCTS = 100_000_000  # dot products of points and directions: bounds the time
 _N_DIRECTIONS = (100, 1000)
 
 
 @dataclass(slots=True)
 class MotionExtent:
-    """Outermost points of a scene in some frames of its motion; of a static scene as it was opened.
+    """Outermost points of a scene in sampled frames of its motion, or in its initial pose.
 
-    A capture is sampled while it is being read: frames are taken at a step that doubles
-    whenever there are too many. In the end they are the frames that a recording is fitted to.
+    A capture is sampled while it is being read: the step between sampled frames doubles whenever
+    there are too many. Once reading is complete, they are the frames that a recording is fitted to.
 
     Attributes
     ----------
@@ -59,28 +59,28 @@ class MotionExtent:
 
     @property
     def points(self) -> Floats:
-        """Points found: (N, 3), scene space; the origin if everybody was absent."""
+        """Points found: (N, 3), scene space; the origin if all actors were absent."""
         clouds = [cloud for cloud in {**self._kept, **self._clouds}.values() if len(cloud)]
         return np.concatenate(clouds) if clouds else np.zeros((1, 3))
 
     @property
     def box(self) -> Floats:
-        """Bounding box of all of them: (2, 3)."""
+        """Bounding box of the points: (2, 3)."""
         return bounding_box(self.points)
 
     def look(self, scene: Scene, clock: Clock, show: str, grows: bool) -> bool:
-        """Sample some more frames; return whether there was one.
+        """Sample a few more frames; return whether there were any left.
 
         Parameters
         ----------
         scene : Scene
-            As it is shown; left unchanged.
+            Scene that is shown; it is not modified.
         clock : Clock
-            Gives the frames.
+            Source of the times of frames.
         show : str
             Visible parts of the figures, a key of ``SHOWN``.
         grows : bool
-            Whether more of the motion is still to come.
+            Whether more of the motion is still being read.
         """
         shapes = tuple(map(_own_shape, scene.actors))
         motions = tuple(map(_own_motion, scene.actors))
@@ -88,7 +88,7 @@ class MotionExtent:
         if not grows and not self._grew:  # growing motions are not edits
             is_edited |= motions[: len(self._motions)] != self._motions
         if is_edited or (self._grew and not grows):
-            # Frames are sampled again after an edit, or when another capture has caught up.
+            # Frames are sampled again after an edit, and once reading is complete.
             self._kept, self._clouds = {**self._kept, **self._clouds}, {}
         self.was_edited |= is_edited
         self._shapes, self._motions, self._grew = shapes, motions, grows
@@ -102,14 +102,14 @@ class MotionExtent:
         return bool(left)
 
     def _keep_poses(self, scene: Scene) -> None:
-        """Remember the initial pose of each actor: edits do not move the ground."""
+        """Remember each actor's initial pose, so that editing a pose does not move the ground."""
         for actor in scene.actors:
             known = self._opened.get(id(actor))
             if actor.pose is not None and (known is None or known[1] is not actor.figure):
                 self._opened[id(actor)] = actor, actor.figure, actor.pose.copy()
 
     def _left(self, scene: Scene, clock: Clock, grows: bool) -> list[float]:
-        """Return the times to sample next, and drop those that no longer count."""
+        """Return the times to sample next, and drop samples that are no longer needed."""
         first, last = clock.frame_range if clock.has_motion else (0, 0)
         last = max(first, last)  # a motion may lie entirely between two frames
         if grows:
@@ -121,14 +121,14 @@ class MotionExtent:
             for known in (self._clouds, self._kept):
                 for time in known.keys() - wanted:
                     del known[time]
-        # The lowest frame comes first: the ground must not lag behind a shape's slider.
+        # The frame that was lowest comes first: the ground must not lag behind a shape's slider.
         up = "xyz".index(scene.up)
         lowest = {time: cloud[:, up].min() for time, cloud in self._kept.items() if len(cloud)}
         left = wanted - self._clouds.keys()
         return sorted(left, key=lambda time: (lowest.get(time, np.inf), time))
 
     def _cloud(self, scene: Scene, clock: Clock, time: float, show: str) -> Floats:
-        """Return the outermost points at one time; none if everybody is absent."""
+        """Return the outermost points at one time; none if all actors are absent."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
             if actor.pose is not None:
@@ -141,13 +141,13 @@ class MotionExtent:
                 return np.zeros((0, 3))
         points = scene_points(seen, show)
         if not clock.has_motion:
-            return points  # one frame: keeping all points is faster than choosing
+            return points  # one frame: keeping all points is faster than reducing them
         low, high = _N_DIRECTIONS
         return outermost(points, min(max(_MOST_PRODUCTS // len(points), low), high))
 
 
 def _growing(first: int, last: int) -> list[int]:
-    """Return at most 33 frames of a growing motion, so that frames sampled earlier still count.
+    """Return at most 33 frames of a growing motion, such that earlier samples can be reused.
 
     >>> _growing(0, 3), _growing(0, 70)[:4]
     ([0, 1, 2, 3], [0, 4, 8, 12])
@@ -159,7 +159,7 @@ def _growing(first: int, last: int) -> list[int]:
 
 
 def _own_shape(actor: Actor) -> bytes:
-    """Return a key that identifies the shape, which no motion changes."""
+    """Return a key that identifies an actor's shape; empty if its motion sets the shape."""
     is_driven = isinstance(actor.clip, SampledClip) and actor.clip.shape_weights is not None
     return b"" if actor.pose is None or is_driven else actor.pose.shape_weights.tobytes()
 

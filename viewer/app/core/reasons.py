@@ -46,7 +46,7 @@ def no_panel(state: AppState, needs: str) -> str:
 
 def no_pose(state: AppState) -> str:
     """Return why the chosen actor cannot be posed."""
-    return "" if state.actor.pose is not None else f"{_what(state)} has no joints to pose"
+    return "" if state.actor.pose is not None else f"{_subject(state)} has no joints to pose"
 
 
 def no_new_clip(state: AppState) -> str:
@@ -59,7 +59,7 @@ def nothing_to_export(state: AppState) -> str:
     if any(isinstance(actor.clip, Clip | SampledClip) for actor in state.scene.actors):
         return ""
     if state.clock.has_motion:
-        return "only captured points move, no joints"
+        return "only captured points move; there are no joints to export"
     return no_motion(state)
 
 
@@ -79,7 +79,7 @@ def no_redo(state: AppState) -> str:
 
 
 def no_mesh(state: AppState) -> str:
-    """Return why settings of surfaces have no effect."""
+    """Return why settings of the surface have no effect."""
     has_one = any(actor.figure.mesh is not None for actor in state.scene.actors)
     return "" if has_one else "there is no mesh"
 
@@ -93,7 +93,7 @@ def no_skeleton(state: AppState) -> str:
 def no_skin(state: AppState) -> str:
     """Return why there is no binding space to show."""
     has_one = any(actor.figure.is_attached for actor in state.scene.actors)
-    return "" if has_one else "there is no skin that follows a skeleton"
+    return "" if has_one else "there is no skin attached to a skeleton"
 
 
 def no_texture(state: AppState) -> str:
@@ -106,5 +106,5 @@ def no_texture(state: AppState) -> str:
     return "" if has_one else "no figure in the scene has a texture: drop a picture on the window"
 
 
-def _what(state: AppState) -> str:
+def _subject(state: AppState) -> str:
     return "a set of captured points" if state.actor.figure.points is not None else "this figure"

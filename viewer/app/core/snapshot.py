@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
-from viewer.rig.pose import Pose
+from viewer.rig.pose import Pose, PoseKey, pose_key, pose_of
 from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = [
     "Look",
     "Snapshot",
-    "copied_poses",
     "have_same_motion",
     "is_current",
     "is_same",
+    "key_of",
     "look_of",
     "restore_display",
     "restore_motion",
-    "same_pose",
+    "restored_pose",
 ]
 
 
@@ -45,7 +44,7 @@ class Snapshot:
     ----------
     actors : tuple of Actor
         Actors of the scene.
-    poses : tuple of Pose or None
+    poses : tuple of PoseKey or None
         One per actor.
     by_hand : tuple of bool
         Whether an actor's pose differs from that of its clip at ``time``.
@@ -54,13 +53,13 @@ class Snapshot:
     options : DisplayOptions
         Display settings of the scene.
     time : float
-        Seconds of the scene's clock.
+        Time of the scene's clock, seconds.
     kept : object or None
         A feature's value that is undone with the scene; compared by identity.
     """
 
     actors: tuple[Actor, ...]
-    poses: tuple[Pose | None, ...]
+    poses: tuple[PoseKey | None, ...]
     by_hand: tuple[bool, ...]
     looks: tuple[Look, ...]
     options: DisplayOptions
@@ -68,9 +67,14 @@ class Snapshot:
     kept: object | None = None
 
 
-def copied_poses(actors: Sequence[Actor]) -> tuple[Pose | None, ...]:
-    """Return copies of the actors' poses."""
-    return tuple(actor.pose.copy() if actor.pose else None for actor in actors)
+def key_of(actor: Actor) -> PoseKey | None:
+    """Return the values of an actor's pose; None if it has none."""
+    return None if actor.pose is None else pose_key(actor.pose)
+
+
+def restored_pose(key: PoseKey | None) -> Pose | None:
+    """Return a new pose with the values of a key."""
+    return None if key is None else pose_of(key)
 
 
 def look_of(actor: Actor) -> Look:
@@ -79,25 +83,29 @@ def look_of(actor: Actor) -> Look:
     return Look(actor.clip, actor.offset, actor.visible, actor.color, placement)
 
 
-def same_pose(old: Pose | None, new: Pose | None) -> bool:
-    """Return whether two poses have the same numbers."""
-    if old is None or new is None:
-        return old is new
-    return new.is_like(old)
+def _looks(actor: Actor, look: Look) -> bool:
+    """Return whether ``look_of`` would return the same, without making one in each frame."""
+    # Clips are compared by identity: they are replaced and never mutated.
+    return (
+        actor.clip is look.clip
+        and actor.visible == look.visible
+        and actor.offset == look.offset
+        and actor.color == look.color
+        and actor.placement.tobytes() == look.placement
+    )
 
 
 def is_current(snapshot: Snapshot, scene: Scene, options: DisplayOptions) -> bool:
-    """Return whether the scene and its display are unchanged, ignoring the template."""
+    """Return whether the scene and its display are unchanged, ignoring the feature's value."""
     if snapshot.options != options:
         return False
     if [*map(id, snapshot.actors)] != [*map(id, scene.actors)]:
         return False
-    # Clips are compared by identity: they are replaced and never mutated.
-    pairs = zip(scene.actors, snapshot.looks, strict=True)
-    if any(look_of(actor) != look for actor, look in pairs):
+    if not all(map(_looks, scene.actors, snapshot.looks)):
         return False
-    poses = zip(snapshot.poses, (actor.pose for actor in scene.actors), strict=True)
-    return all(same_pose(old, new) for old, new in poses)
+    return all(
+        key == key_of(actor) for key, actor in zip(snapshot.poses, scene.actors, strict=True)
+    )
 
 
 def is_same(one: Snapshot, other: Snapshot) -> bool:
@@ -114,14 +122,14 @@ def have_same_motion(one: Snapshot, other: Snapshot) -> bool:
     looks = zip(one.looks, other.looks, strict=True)
     if any((a.clip, a.offset) != (b.clip, b.offset) for a, b in looks):
         return False
-    return all(same_pose(a, b) for a, b in zip(one.poses, other.poses, strict=True))
+    return one.poses == other.poses
 
 
 def restore_motion(snapshot: Snapshot, scene: Scene) -> None:
     """Restore the actors of a scene with their poses and clips."""
     scene.actors[:] = snapshot.actors
     for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
-        actor.pose = pose.copy() if pose else None
+        actor.pose = restored_pose(pose)
         actor.clip, actor.offset = look.clip, look.offset
 
 

@@ -1,4 +1,4 @@
-"""State shared by all features of the window: the open scene and what the core keeps about it."""
+"""State shared by all features of the window: scene, camera, clock, history and messages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = ["AppState"]
 
-_FARTHEST = 1e4  # in sizes of the scene
+_FARTHEST = 1e4  # largest distance of the camera, in sizes of the scene
 
 Part = TypeVar("Part")
 
@@ -41,8 +41,8 @@ class AppState:
     scene, camera, options : Scene, Camera, DisplayOptions
         The scene, its point of view and its display settings.
     box : (2, 3)
-        Bounding box of the scene in its current shape, as opened or over its whole motion: the grid
-        lies at its bottom.
+        Bounding box of the scene in its current shape, in its initial pose or over its whole
+        motion. The grid lies at its bottom.
     paths : tuple of Path
         The files of the scene; empty for the bundled figure.
     opened_at : float
@@ -52,17 +52,17 @@ class AppState:
     chosen_actor : int
         Index of the actor that panels act on.
     n_choices : int
-        Number of choices of an actor: state kept for an earlier choice is invalid.
+        Number of times that an actor was chosen: features compare it to detect outdated state.
     selected_joint : int
-        Of the chosen actor; -1 for none.
+        Selected joint of the chosen actor; -1 for none.
     in_degrees : bool
-        Whether rotations are shown in degrees or radians.
+        Whether rotations are shown in degrees instead of radians.
     panels_visible : bool
         Whether panels and menus are drawn.
     view_rect : (x, y, width, height)
         The part of the window that panels leave free, in window coordinates.
     item_rects : dict
-        Last rectangle of each labelled widget: (x0, y0, x1, y1). Tests use it to aim.
+        Last rectangle of each labelled widget: (x0, y0, x1, y1). Tests click there.
     wants : set of str
         Requests to the window, served after the frame: "screenshot", "quit", "open dialog".
     error : str
@@ -78,7 +78,7 @@ class AppState:
     clock : Clock
         Advances the scene's time, and poses the actors for it.
     job : Job or None
-        Job that runs beside the frame loop.
+        Job that runs in the background or between frames.
     """
 
     scene: Scene
@@ -146,7 +146,7 @@ class AppState:
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """All figures that were read for the scene, which no result replaces."""
+        """Files that were read for the scene, which no output may overwrite."""
         return (*self.paths, *self.scene.files)
 
     def show_scene(self, scene: Scene, paths: Sequence[Path]) -> None:
@@ -183,7 +183,7 @@ class AppState:
         self.camera.front = ahead
 
     def limit_camera(self) -> None:
-        """Keep the camera close enough to the scene for float32."""
+        """Keep the camera close enough to the scene for the precision of float32."""
         size = box_size(self.box) or 1.0
         camera, center = self.camera, self.box.mean(axis=0)
         camera.distance = min(max(camera.distance, 1e-5 * size), _FARTHEST * size)
@@ -193,7 +193,7 @@ class AppState:
             camera.target = center + away * (_FARTHEST * size / length)
 
     def say(self, *messages: str | Diagnostic) -> None:
-        """Show messages that time out; longer ones stay longer."""
+        """Show messages that time out, longer ones later."""
         for message in messages:
             self.messages.show(str(message))
 

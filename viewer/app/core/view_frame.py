@@ -15,7 +15,7 @@ __all__ = ["ViewFrame", "view_frame"]
 Place = tuple[float, float]
 """A point of the window, window coordinates."""
 
-_NEAREST = 1e-9  # smallest w in clip space: nearer points are beside or behind the eye
+_NEAREST = 1e-9  # smallest w in clip space: points with a smaller one are beside or behind the eye
 
 
 @dataclass(frozen=True, slots=True, eq=False)

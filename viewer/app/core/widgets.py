@@ -57,14 +57,14 @@ def explain(text: str, why: str = "") -> None:
     Parameters
     ----------
     text : str
-        Its effect; may be empty.
+        Effect of the widget; may be empty.
     why : str
-        Why it is disabled; empty if it is enabled.
+        Reason why it is disabled; empty if it is enabled.
     """
     flags = imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled
-    words = "\n".join(filter(None, (text, why)))
-    if words and imgui.is_item_hovered(flags):
-        imgui.set_tooltip(words)
+    tooltip = "\n".join(filter(None, (text, why)))
+    if tooltip and imgui.is_item_hovered(flags):
+        imgui.set_tooltip(tooltip)
 
 
 def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
@@ -73,11 +73,11 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
     Parameters
     ----------
     name : str
-        Of the window.
+        Name of the overlay's window.
     x, y : float
-        Its position, in window coordinates.
+        Position, in window coordinates.
     pivot : (float, float)
-        Its corner at that position: (0, 0) for the upper left, (1, 1) for the lower right.
+        Corner placed at that position: (0, 0) for the upper left, (1, 1) for the lower right.
     """
     imgui.set_next_window_pos((x, y), imgui.Cond_.always, pivot)
     imgui.set_next_window_bg_alpha(0.86)
@@ -89,7 +89,7 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 
 
 def overlay_rect(state: AppState, name: str) -> Rect:
-    """Return the rectangle of the current window, recorded under its name as for widgets."""
+    """Return the rectangle of the current window, and record it under its name."""
     place, size = imgui.get_window_pos(), imgui.get_window_size()
     rect = (place.x, place.y, place.x + size.x, place.y + size.y)
     state.item_rects[name] = rect
@@ -105,7 +105,7 @@ def slider(
     unit: str = "%.2f",
     flags: int = 0,
 ) -> float:
-    """Draw a slider and return its value, which keeps every digit unless it was moved."""
+    """Draw a slider and return its value, which keeps its full precision unless it was moved."""
     shown = plain_zero(value, unit)
     changed, moved = imgui.slider_float(label, shown, low, high, unit, flags)
     note_item(state, label)
@@ -150,7 +150,7 @@ def menu_item(
 
 
 def same_line_if_room(text: str) -> None:
-    """Put the next check box or button with this text beside the last widget if it fits."""
+    """Place the next check box or button with this text beside the last widget if it fits."""
     style = imgui.get_style()
     width = imgui.calc_text_size(text).x + imgui.get_frame_height() + style.item_inner_spacing.x
     end = imgui.get_item_rect_max().x + style.item_spacing.x + width

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.errors import printable
 from viewer.formats import FORMATS
+from viewer.phrases import printable
 
 __all__ = ["PICTURES", "FileDialog", "folder_of"]
 
@@ -24,13 +24,13 @@ class FileDialog:
         Initial folder.
     done : callable
         Called with the state and the choice: files, one folder, or one file to write.
-        Opens them if omitted.
+        If omitted, the chosen files are opened.
     purpose : str
         ``"open"``, ``"folder"`` or ``"save"``.
     title : str
         Title of the dialog.
     suffixes : tuple of str
-        Suffixes of the listed files; if empty, of all that can be opened.
+        Suffixes of the listed files; if empty, those of all formats that can be opened.
     name : str
         Suggested name of the file to write; its suffix is added to names without one.
     more : callable, optional
@@ -63,7 +63,7 @@ class FileDialog:
         self.enter(folder)
 
     def enter(self, folder: Path) -> None:
-        """Open a folder; if it cannot be read, the dialog stays where it was."""
+        """Open a folder; if it cannot be read, the dialog stays in the current one."""
         try:
             found = sorted(
                 folder.iterdir(), key=lambda path: (not path.is_dir(), path.name.lower())
@@ -75,7 +75,7 @@ class FileDialog:
         self.chosen.clear()
 
     def typed(self, text: str) -> Path | None:
-        """Return the file that a text names, or open the folder that it names."""
+        """Return the file at a typed path, or open the folder at that path."""
         try:
             path = Path(text).expanduser()
             if path.is_file():
@@ -107,7 +107,7 @@ class FileDialog:
 def opened_suffixes() -> set[str]:
     """Return the suffixes of files that can be opened, including textures."""
     suffixes = {suffix for kind in FORMATS.values() for suffix in kind.suffixes}
-    # Most .txt files are not poses; the check box lists them too.
+    # Most .txt files are not poses; the check box "All files" lists them.
     return suffixes - {".txt"} | set(PICTURES)
 
 
@@ -115,5 +115,5 @@ def folder_of(paths: Sequence[Path]) -> Path:
     """Return a dialog's initial folder: that of the first file, the current one, or home."""
     try:
         return paths[0].resolve().parent if paths else Path.cwd()
-    except (OSError, RuntimeError):  # the current folder is gone
+    except (OSError, RuntimeError):  # the current folder no longer exists
         return Path.home()

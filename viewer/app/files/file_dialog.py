@@ -1,6 +1,6 @@
-"""File dialog drawn in the window: the same on every system, and testable.
+"""File dialog drawn in the window, which makes it the same on every system and testable.
 
-It opens files, chooses a folder, or asks where to save; the caller decides what follows.
+It asks for files to open, for a folder, or for a file to save; the caller handles the choice.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.state import Files
-from viewer.errors import printable
 from viewer.formats import FORMATS
+from viewer.phrases import printable
 
 __all__ = ["draw_file_dialog"]
 
@@ -115,6 +115,7 @@ def _confirmation(dialog: FileDialog) -> tuple[int, str]:
 
 
 def _confirmed(dialog: FileDialog) -> list[Path]:
+    """Return the choice for the purpose of the dialog."""
     if dialog.purpose == "folder":
         return [dialog.folder]
     if dialog.purpose == "save":
@@ -124,6 +125,7 @@ def _confirmed(dialog: FileDialog) -> list[Path]:
 
 
 def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
+    """Draw the list of files; return a file that was double-clicked."""
     result: list[Path] = []
     if imgui.begin_child("files", (0.0, -_foot_height(dialog)), imgui.ChildFlags_.borders):
         for number, path in enumerate(dialog.listed()):
@@ -164,7 +166,7 @@ def _foot_height(dialog: FileDialog) -> float:
 
 
 def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
-    """Return whether a folder can itself be opened as a file; a double click lists it."""
+    """Return whether a folder can itself be opened like a file; a double click enters it."""
     if dialog.purpose != "open" or imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
         return False
     names = {name for kind in FORMATS.values() for name in kind.files}

@@ -1,4 +1,4 @@
-"""Loading of files beside the frame loop: the window responds, and loading can be cancelled."""
+"""Loading of files in a thread: the window stays responsive, and loading can be cancelled."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Loader:
     settings : MotionSettings, optional
         Settings for reading motions.
     opened : sequence of Path
-        Files of the current scene, whose figures get the motions.
+        Files of the current scene, to whose figures the motions are applied.
 
     Attributes
     ----------
@@ -91,13 +91,13 @@ class Loader:
             self.scene, self.builders = begin(contents, self._settings)
 
     def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
-        """Apply motions to the open figures; motions that fit none are shown alone."""
+        """Apply motions to the open figures; motions that fit none are shown on their own."""
         from viewer.loading.driving import is_body
 
         opened = read_files(self._opened, settings=self._settings)
         figures = opened.figures
         if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
-            figures = []  # people are drawn with the bundled body, and replace the scene
+            figures = []  # the people are drawn with the bundled body and replace the scene
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         joined = replace(contents, figures=figures, morphs=[*opened.morphs, *contents.morphs])
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
@@ -115,7 +115,7 @@ class Loader:
 
     @property
     def seconds(self) -> float:
-        """Seconds since it began."""
+        """Seconds since loading began."""
         return time.monotonic() - self._started
 
     def wait(self) -> None:

@@ -1,4 +1,4 @@
-"""Dialog to export motions: which ones, in which format, and where."""
+"""Dialog to export motions: choice of actors, format and file."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from viewer.app.files.motion_export import (
     save_motion,
 )
 from viewer.app.files.state import Files
-from viewer.errors import printable
 from viewer.export import EXPORTERS
 from viewer.formats import file_stem
+from viewer.phrases import printable
 
 __all__ = ["ask_for_motion"]
 
 
 @dataclass(slots=True)
-class _Wish:
-    """Choice between all actors' motions and the chosen one's."""
+class _Selection:
+    """Selection of all actors' motions, or only of the chosen actor's."""
 
     everyone: bool
 
@@ -35,24 +35,24 @@ class _Wish:
 def ask_for_motion(state: AppState) -> None:
     """Open the dialog; all actors are preselected if there are several."""
     moving = moving_actors(state)
-    wish = _Wish(len(moving) > 1 or state.actor not in moving)
-    first = moving[0] if wish.everyone else state.actor
+    selection = _Selection(len(moving) > 1 or state.actor not in moving)
+    first = moving[0] if selection.everyone else state.actor
     # The number of each person is appended to the name if there are several files.
     stem = file_stem(first.title if len(moving) > 1 else first.name)
     suffixes = motion_suffixes()
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
-        lambda state, paths: save_motion(state, paths[0], wish.everyone),
+        lambda state, paths: save_motion(state, paths[0], selection.everyone),
         "save",
         "Export motion",
         suffixes,
         f"{stem}{suffixes[0]}",
-        more=lambda state, dialog: _draw_more(state, dialog, wish),
-        written=lambda path: motion_files(state, path, wish.everyone),
+        more=lambda state, dialog: _draw_more(state, dialog, selection),
+        written=lambda path: motion_files(state, path, selection.everyone),
     )
 
 
-def _draw_more(state: AppState, dialog: FileDialog, wish: _Wish) -> None:
+def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> None:
     """Draw the choice of actors and format."""
     moving = moving_actors(state)
     imgui.set_next_item_width(16.0 * imgui.get_font_size())
@@ -60,8 +60,9 @@ def _draw_more(state: AppState, dialog: FileDialog, wish: _Wish) -> None:
         whose = {"all": f"all {len(moving)} actors"}
         if state.actor in moving:
             whose["one"] = f"only {printable(state.actor.name, 60)}"
-        wish.everyone = (
-            choice(state, "Actors##exported", "all" if wish.everyone else "one", whose) == "all"
+        selection.everyone = (
+            choice(state, "Actors##exported", "all" if selection.everyone else "one", whose)
+            == "all"
         )
         explain("" if dialog.suffix == "" else "one file per actor, named by its number")
         imgui.same_line()

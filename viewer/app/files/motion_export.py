@@ -1,4 +1,4 @@
-"""Export of whole motions for other programs, of one actor or all."""
+"""Export of the motions of one actor or all actors for other programs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
     MotionOptions,
@@ -18,18 +18,19 @@ from viewer.export import (
 )
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
+from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 
-_MANY = (".obj",)  # one file per frame: left to the command line
+_MANY = (".obj",)  # one file per frame: exported by the command line only
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = ["FOLDER", "motion_files", "motion_suffixes", "moving_actors", "save_motion"]
 
 FOLDER = "/"
-"""Stands for a folder where suffixes are listed: it holds all people of a capture."""
+"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
 
 
 def moving_actors(state: AppState) -> list[Actor]:
@@ -38,7 +39,7 @@ def moving_actors(state: AppState) -> list[Actor]:
 
 
 def motion_suffixes() -> tuple[str, ...]:
-    """Return the suffixes of files that hold one actor's motion, the default first."""
+    """Return the suffixes of files that contain one actor's motion, the default first."""
     kinds = [kind for kind in EXPORTERS.values() if kind.writes_motion]
     found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
     others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
@@ -51,7 +52,7 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     Parameters
     ----------
     state : AppState
-        Holds the actors.
+        Holds the scene and the chosen actor.
     path : Path
         A file, or a folder: a name without suffix.
     everyone : bool
@@ -60,7 +61,8 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     Returns
     -------
     list of Path
-        One per actor; a ``.gltf`` has a ``.bin`` beside it. For a folder, the one with frames.
+        One file per actor, and a ``.bin`` beside each ``.gltf``; for a folder, its folder of
+        frames.
     """
     if not path.suffix:
         return [path / _FRAMES]
@@ -82,12 +84,12 @@ class _Part:
 
 
 def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
-    """Write motions within the playback range, beside the frame loop.
+    """Write motions within the playback range, in the background.
 
     Parameters
     ----------
     state : AppState
-        Gets messages about what was written and what the format cannot hold.
+        Holds the actors; receives the job, or an error.
     path : Path
         Its suffix selects the format; without one it is an EasyMocap folder. Either all files
         are written or none.
@@ -99,7 +101,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         parts, lines = _parts(state, path, everyone)
         key = suited_exporter(path, parts[0].actor.figure)
         files = motion_files(state, path, everyone)
-        # The dialog has asked whether to replace existing files.
+        # The dialog has already asked whether to replace existing files.
         if path.suffix:
             check_targets(files, state.inputs, force=True)
         else:
@@ -122,25 +124,25 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
 
 
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[str]]:
-    """Return the parts to write, and messages about actors that are left out."""
+    """Return the parts to write, and messages about omitted actors."""
     actors = moving_actors(state) if everyone else [state.actor]
     paths = motion_paths(path, actors) if path.suffix else [path] * len(actors)
     parts, lines = [], []
     for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
-            lines.append(f"{printable(actor.name)}: absent throughout the range, not written")
+            lines.append(f"{printable(actor.name)}: absent throughout the range, not exported")
             continue
-        # Edits in the window meanwhile must not change what is written.
-        taken = actor.copy()
+        # Edits made during the export must not change what is written.
+        copied = actor.copy()
         rate = state.clock.frame_rate if isinstance(actor.clip, Clip) else None
-        parts.append(_Part(taken, file, frames, rate, number))
+        parts.append(_Part(copied, file, frames, rate, number))
     if not parts:
-        raise RigError("everybody is absent in the playback range: nothing to write")
+        raise RigError("all actors are absent in the playback range: nothing to export")
     points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
     if everyone and points:
         names = ", ".join(printable(actor.name, 60) for actor in points)
-        lines.append(f"captured points are not written: {names}")
+        lines.append(f"captured points are not exported: {names}")
     return parts, lines
 
 

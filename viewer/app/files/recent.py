@@ -44,9 +44,9 @@ def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
     Parameters
     ----------
     recent : list
-        Changed in place.
+        Groups of files, changed in place.
     paths : sequence of Path
-        Opened together.
+        Files that were opened together.
     """
     if not paths:
         return ""

@@ -1,4 +1,4 @@
-"""State of opening and choosing files, with the recent ones."""
+"""State of opening files: dialog, loader, stream, and recent files."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["Files"]
 
 @dataclass(slots=True)
 class Files:
-    """State of opening and choosing files.
+    """State of opening files.
 
     Attributes
     ----------
     dialog : FileDialog or None
-        The dialog that is open.
+        File dialog that is open.
     wants_open : list of Path
         Files to open after the frame.
     loader : Loader or None
-        Files that are being opened.
+        Loader of files that are being opened.
     stream : Stream or None
-        Captures that are still being read.
+        Reader of captures that are not yet complete.
     recent : list of tuple of str
         Groups of files that were opened together, latest first.
     models : dict

@@ -1,4 +1,4 @@
-"""Reading of captures beside the frame loop while their first frames are shown."""
+"""Reading of captures in the background while their first frames are shown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["Stream"]
 
-_WAITING = 4  # parts in the queue: bounds the memory
+_WAITING = 4  # most parts in the queue: bounds the memory
 
 
 class Stream:
@@ -59,7 +59,7 @@ class Stream:
         self._wake()
 
     def _hand_over(self, builder: Builder, part: CapturePart) -> bool:
-        """Wait for space in the queue; return False if reading was cancelled."""
+        """Put a part into the queue once it has room; return False if reading was cancelled."""
         while not self._stop.is_set():
             try:
                 self._parts.put((builder, part), timeout=0.1)
@@ -75,7 +75,7 @@ class Stream:
         Returns
         -------
         new : list of Actor
-            People who appeared.
+            Actors of people who appeared.
         notes : list of Diagnostic
             Messages about the parts.
         grew : bool
@@ -96,7 +96,7 @@ class Stream:
                 return new, notes, grew
             known = builder.actors
             more, said = builder.add(part)
-            # The user may have changed the rate since the first of them appeared.
+            # The user may have changed the frame rate since the first person appeared.
             _keep_rate(known[:1], more)
             new += more
             notes += said
@@ -114,13 +114,13 @@ class Stream:
         return read, sum(builder.capture.n_frames for builder in self.builders)
 
     def cancel(self) -> None:
-        """Stop reading; frames in the scene stay."""
+        """Stop reading; frames already in the scene remain."""
         self._stop.set()
         for builder in self.builders:
             builder.is_cut = True
 
     def wait(self) -> None:
-        """Wait for the thread, whose parts must be taken meanwhile. For tests."""
+        """Wait until the thread has ended or the queue is full. For tests."""
         while self._thread.is_alive():
             self._thread.join(0.01)
             if self._parts.full():
@@ -128,7 +128,7 @@ class Stream:
 
 
 def _keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
-    """Give new people the frame rate of those in the scene."""
+    """Set the frame rate of new people to that of the people in the scene."""
     for first in known:
         for actor in new:
             if isinstance(actor.clip, SampledClip | PointClip):

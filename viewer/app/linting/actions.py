@@ -14,7 +14,6 @@ from viewer.app.core.state import AppState
 from viewer.app.linting.state import Checked, Linting, Running
 from viewer.app.shown_panels import set_open
 from viewer.app.view.picks import take_pick
-from viewer.errors import counted, printable
 from viewer.lint import (
     Finding,
     LintOptions,
@@ -25,6 +24,7 @@ from viewer.lint import (
     worst_first,
 )
 from viewer.loading import bundled_files
+from viewer.phrases import counted, printable
 from viewer.rendering.picking import Pick
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene

@@ -24,9 +24,9 @@ from viewer.app.linting.actions import (
     take_findings,
 )
 from viewer.app.linting.state import Checked, Linting
-from viewer.errors import printable
 from viewer.lint import SEVERITIES, Finding, LintOptions
 from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
+from viewer.phrases import printable
 from viewer.rig.mesh import box_size
 
 __all__ = ["draw"]

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from viewer.app.core.clock import Clock
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.srgb import encode_color
 from viewer.rig.motion.clip import Clip
 from viewer.rig.scene import Actor, Motion

@@ -1,1 +1,1 @@
-"""Posing by hand: joints, shapes, hands, and the tools in the view."""
+"""Interactive posing: panels for joints, shapes and hands, and the tools in the view."""

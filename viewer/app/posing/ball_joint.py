@@ -1,4 +1,4 @@
-"""Ball joints in the Joints panel as rotation vectors and as the file's own numbers."""
+"""Ball joints in the Joints panel: rotation vectors, and the numbers stored in files."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def draw_vector_component(
     if imgui.is_item_hovered():
         imgui.set_tooltip(
             f"{label}: component of the rotation vector\n"
-            "Ctrl+click types a value, double-click sets it to 0"
+            "Ctrl+click to type a value, double-click to set it to 0"
         )
         is_reset = imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
     if is_reset or (changed and math.isfinite(moved) and abs(moved) < 1e6):
@@ -65,7 +65,7 @@ def draw_vector_component(
 
 
 def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Floats:
-    """Return a joint's rotation vector: the edited one while it matches the rotation."""
+    """Return a joint's rotation vector: the edited one as long as it matches the rotation."""
     posing = state.of(Posing)
     assert figure.skeleton is not None  # checked by the caller
     rotation = joint_rotations(figure.skeleton, pose)[joint]
@@ -78,7 +78,7 @@ def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Fl
 
 
 def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) -> None:
-    """Draw the three numbers that the model's own files store for a joint."""
+    """Draw the three numbers that files of the body model store for a joint."""
     layout, skeleton = figure.pose_layout, figure.skeleton
     if layout is None or skeleton is None:
         return

@@ -1,4 +1,4 @@
-"""Pausing of a clip that drives the actor while its pose is edited."""
+"""Pausing of the clip that drives an actor, when its pose is edited."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def pause_for_edit(state: AppState) -> None:
     Parameters
     ----------
     state : AppState
-        Whose chosen actor is about to be posed; nothing happens if no clip drives it.
+        Holds the chosen actor, which is about to be posed. Nothing happens if no clip drives it.
     """
     clip, clock = state.actor.clip, state.clock
     if clip is None:
         return
     stopped = "Paused: the" if clock.playing else "The"
     clock.playing = False
-    kept = "key it (Key) to keep it" if isinstance(clip, Clip) else "it lasts until time moves"
-    state.say_status(f"{stopped} clip overwrites this pose as time moves; {kept}")
+    kept = "press Key to keep it" if isinstance(clip, Clip) else "sampled motions cannot be keyed"
+    state.say_status(f"{stopped} clip overwrites this pose when the time changes; {kept}")

@@ -1,4 +1,4 @@
-"""Rows of the Joints panel for the placement of the whole figure."""
+"""Rows of the Joints panel for translation and scale of the whole figure."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
     )
     note_item(state, f"figure.{name}")
     if imgui.is_item_hovered():
-        imgui.set_tooltip(f"figure.{name}\nCtrl+click types a value, double-click resets")
+        imgui.set_tooltip(f"figure.{name}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             return rest
     return moved if changed and math.isfinite(moved) and abs(moved) < 1e9 else value

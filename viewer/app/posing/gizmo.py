@@ -1,4 +1,4 @@
-"""Handles in the view: picking, dragging and releasing them.
+"""Picking, dragging and releasing of handles in the view.
 
 ImGuizmo rotates matrices about three orthogonal axes; joints here have one, two or three DOFs
 about axes that may be oblique, with limits, so rings and arrows are our own.
@@ -41,12 +41,12 @@ __all__ = [
 DOT_REACH = 9.0
 """Radius around a joint in which a click selects it, window coordinates."""
 
-_STILL = 2.0  # window coordinates that the pointer may move in a click
+_STILL = 2.0  # window coordinates by which the pointer may move in a click
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
 
 def use_handles(state: AppState) -> bool:
-    """Begin, continue or end a drag; return whether the mouse belongs to a handle."""
+    """Begin, continue or end a drag; return whether a handle uses the mouse."""
     posing = state.of(Posing)
     io = imgui.get_io()
     place = (io.mouse_pos.x, io.mouse_pos.y)
@@ -54,7 +54,7 @@ def use_handles(state: AppState) -> bool:
         return _go_on(state, posing.drag, place)
     if not posing.is_on or io.want_capture_mouse or no_tool(state):
         return False
-    if io.key_shift or io.key_alt:  # these pan, and ask for vertices
+    if io.key_shift or io.key_alt:  # Shift pans, Alt picks vertices
         return False
     if not imgui.is_mouse_clicked(_LEFT):
         return False
@@ -66,10 +66,10 @@ def use_handles(state: AppState) -> bool:
 
 
 def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
-    """Pose by the pointer; releasing the button ends the drag, the other button cancels it."""
+    """Pose by the pointer; releasing the left button ends the drag, the right button cancels it."""
     posing = state.of(Posing)
     if state.actor is not drag.actor or drag.actor.pose is not drag.outcome.pose:
-        drag.is_over = True  # undone, reset or closed meanwhile: keep that
+        drag.is_over = True  # the pose was undone, reset or closed during the drag
     if imgui.is_mouse_clicked(_RIGHT):
         cancel_drag(state)
     if drag.is_over:
@@ -87,7 +87,7 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
     if not imgui.is_mouse_down(_LEFT):
         posing.drag = None
         if not drag.has_moved:
-            choose_joint(state)  # its dot lies under a ring or an arrow
+            choose_joint(state)  # a joint's dot may lie under a ring or an arrow
     return True
 
 
@@ -102,7 +102,7 @@ def _pose(state: AppState) -> Pose:
 
 
 def _grabbed(state: AppState, place: Place) -> Handle | None:
-    """Return the handle under the pointer; with the Move tool any joint is one."""
+    """Return the handle under the pointer; with the Move tool every joint is a handle."""
     handle = handle_at(state, view_frame(state), place)
     if handle is not None or state.of(Posing).tool != "move":
         return handle
@@ -120,11 +120,11 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     Parameters
     ----------
     state : AppState
-        With tool, actor and joint.
+        Holds the tool, the actor and the selected joint.
     frame : ViewFrame
-        How the scene is seen.
+        Projection of the scene.
     place : (float, float)
-        The pointer.
+        Position of the pointer, window coordinates.
     """
     posing = state.of(Posing)
     posed, pose = selected(state), state.actor.pose
@@ -146,7 +146,7 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
 
 
 def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
-    """Return the handle of the joint itself: its chain follows, or it is translated."""
+    """Return the handle at the joint, which moves it with its chain or translates it."""
     pose, skeleton = _pose(state), posed.skeleton
     length = len(used_chain(skeleton, posed.joint, state.of(Posing).chain_length))
     if length:

@@ -1,6 +1,6 @@
 """Drawing of the handles: joints, chain, limit arcs, rings, arrows, and their labels.
 
-Drawn behind the panels like the picture of the scene, so it must come after that.
+Like the picture of the scene they are drawn behind the panels, so they must be drawn after it.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ _HOT = (1.0, 0.92, 0.55)
 _LIMIT = (1.0, 0.70, 0.10)
 _CHAIN = (0.45, 0.90, 0.95)
 _BEHIND = 0.28  # opacity of the far side of a ring
-_MOST_DOTS = 300  # most joints that get a dot each
-_ARC_SHARE = 0.62  # of the rings' radius
+_MOST_DOTS = 300  # no dots are drawn for more joints
+_ARC_RADIUS = 0.62  # relative to the radius of the rings
 _GAP = 10.0  # window coordinates between a ring and its text
 
 
@@ -55,14 +55,14 @@ class _Pen:
         self.frame, self.list = frame, imgui.get_background_draw_list()
 
     def line(self, points: Floats, color: Color, thickness: float) -> None:
-        """Draw a line through (N, 3) points; none if one of them is behind the eye."""
+        """Draw a line through (N, 3) points, unless one of them is behind the eye."""
         seen = self.frame.project(points)
         if np.isfinite(seen).all():
             ink = imgui.get_color_u32(color)
             self.list.add_polyline([(x, y) for x, y in seen.tolist()], ink, thickness, 0)
 
     def fan(self, center: Floats, points: Floats, color: Color) -> None:
-        """Fill the area between a point and a line."""
+        """Fill the area between a point and a polyline."""
         seen, middle = self.frame.project(points), self.frame.place(center)
         if middle is None or not np.isfinite(seen).all():
             return
@@ -128,7 +128,7 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
     is_free = _drag(state) is None and not io.want_capture_mouse
     under = joint_at(state, (io.mouse_pos.x, io.mouse_pos.y)) if is_free else -1
     skeleton = state.actor.figure.skeleton
-    # A click selects it even under a handle, which only a drag moves.
+    # A click selects a joint even under a handle, which is used by dragging only.
     if under >= 0 and skeleton is not None:
         x, y = places[under].tolist()
         pen.list.add_circle((x, y), 7.0, imgui.get_color_u32((*_HOT, 1.0)), 0, 2.0)
@@ -141,8 +141,8 @@ def _draw_arcs(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
     unit = pen.frame.unit_length(posed.center)
     found = limit_arcs(posed, state.actor.pose)
     for rank, arc in enumerate(found):
-        # Each a little smaller than the one before: axes may coincide.
-        _draw_arc(pen, posed.center, arc, (_ARC_SHARE - 0.07 * rank) * RADIUS * unit)
+        # Each arc is a little smaller than the previous one, because axes may coincide.
+        _draw_arc(pen, posed.center, arc, (_ARC_RADIUS - 0.07 * rank) * RADIUS * unit)
 
 
 def _draw_arc(pen: _Pen, center: Floats, arc: LimitArc, radius: float) -> None:
@@ -159,7 +159,7 @@ def _draw_arc(pen: _Pen, center: Floats, arc: LimitArc, radius: float) -> None:
 
 
 def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
-    """Draw the rings of the joint; during a drag only its ring and the angle."""
+    """Draw the rings of the joint; during a drag only the grabbed ring and the angle."""
     drag, pose = _drag(state), state.actor.pose
     if drag is not None and isinstance(drag.handle, TurnHandle):
         _draw_turn(pen, posed, drag.handle, drag.outcome.angle or 0.0)
@@ -186,7 +186,7 @@ def _draw_ring(pen: _Pen, center: Floats, ring: Ring, is_hot: bool) -> None:
 
 
 def _runs(flags: np.ndarray) -> list[list[int]]:
-    """Split indices where a flag changes; neighbouring parts share an index, so that lines meet."""
+    """Split indices where a flag changes; adjacent runs share an index, so that lines meet."""
     edges = [0, *(np.flatnonzero(np.diff(flags)) + 1).tolist(), len(flags)]
     pairs = pairwise(edges)
     return [list(range(first, min(last + 1, len(flags)))) for first, last in pairs]
@@ -208,7 +208,7 @@ def _draw_turn(pen: _Pen, posed: PosedJoint, handle: TurnHandle, angle: float) -
 
 
 def _draw_chain(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
-    """Draw the joints between the selected one and the highest that may rotate."""
+    """Draw the chain from the selected joint up to the last joint that may rotate."""
     skeleton, drag = posed.skeleton, _drag(state)
     chain = used_chain(skeleton, posed.joint, state.of(Posing).chain_length).tolist()
     if not chain:
@@ -262,7 +262,7 @@ def _draw_arrow(pen: _Pen, center: Floats, arrow: Arrow, is_hot: bool) -> None:
 
 
 def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
-    """Write the result of the drag, and the limits that restrict it."""
+    """Draw the text with the result of the drag, and the limits that restrict it."""
     center, drag = pen.frame.place(posed.center), _drag(state)
     if center is None or drag is None or not drag.outcome.text:
         return
@@ -277,7 +277,7 @@ def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
 def _text_box(
     state: AppState, pen: _Pen, corner: tuple[float, float], lines: Sequence[tuple[str, Color]]
 ) -> None:
-    """Write lines on a dark background, within the view."""
+    """Draw lines of text on a dark background, within the view."""
     x, y, width, height = state.view_rect
     sizes = [imgui.calc_text_size(text) for text, _ in lines]
     wide, high = max(size.x for size in sizes), sum(size.y for size in sizes)

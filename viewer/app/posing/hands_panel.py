@@ -1,4 +1,4 @@
-"""Hands panel: a slider per principal component of hand poses, flat and mean hands."""
+"""Hands panel: sliders of the principal components of hand poses, and flat and mean hands."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.posing.pose_vector import set_joint_rotations
 
 __all__ = ["draw"]
 
-_REACH = 3.0  # range of a slider; more can be typed
+_REACH = 3.0  # range of a slider; larger values can be typed
 _CLAMP = imgui.SliderFlags_.always_clamp
 _coefficients: Memo[Hand, Floats] = Memo()
 
@@ -51,7 +51,7 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
     imgui.separator_text(side.capitalize())
     for name, flat in (("flat", True), ("mean", False)):
         if button(state, f"{name.capitalize()}###{side} {name}"):
-            _turn(figure, pose, hand, hand_vectors(hand, np.zeros(0), flat))
+            _rotate(figure, pose, hand, hand_vectors(hand, np.zeros(0), flat))
         note_item(state, f"{side} {name}")
         if flat:
             same_line_if_room("Mean")
@@ -64,9 +64,9 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
         )
         note_item(state, f"{side} component {index}")
         if changed and math.isfinite(value) and abs(value) < 1e3:
-            # The other components, and the residual that none represents, stay unchanged.
+            # The other components, and the residual outside their span, stay unchanged.
             step = (value - values[index]) * hand.components[index].reshape(-1, 3)
-            _turn(figure, pose, hand, vectors + step)
+            _rotate(figure, pose, hand, vectors + step)
     imgui.pop_item_width()
 
 
@@ -84,6 +84,6 @@ def _values(hand: Hand, vectors: Floats) -> Floats:
     )
 
 
-def _turn(figure: Figure, pose: Pose, hand: Hand, vectors: Floats) -> None:
+def _rotate(figure: Figure, pose: Pose, hand: Hand, vectors: Floats) -> None:
     assert figure.skeleton is not None
     set_joint_rotations(figure.skeleton, pose, hand.joints, rotation_vector_to_matrix(vectors))

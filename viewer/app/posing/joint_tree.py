@@ -20,7 +20,7 @@ class JointTree:
     Attributes
     ----------
     filter : str
-        Text that the names of listed joints or captured points contain.
+        Text that the names of listed joints or captured points must contain.
     opened : set of int
         Joints whose DOFs and children are listed.
     scrolls_to : int
@@ -60,7 +60,7 @@ def select_joint(state: AppState, joint: int) -> None:
     Parameters
     ----------
     state : AppState
-        Gets the joint; a filter that hides it is cleared.
+        Receives the selection; a filter that hides the joint is cleared.
     joint : int
         Index, 0 or more.
     """

@@ -1,4 +1,4 @@
-"""Joints panel: the joint tree with a filter, sliders of DOFs, and actions on the whole pose."""
+"""Joints panel: the joint tree with a filter, DOF sliders, and actions on the whole pose."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from viewer.app.posing.figure_place import draw_figure_place
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose, reset_pose
 from viewer.app.posing.state import Posing
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
@@ -38,7 +38,7 @@ __all__ = ["draw", "rows"]
 Rows: TypeAlias = tuple[tuple[int, int, int], ...]
 
 OWN_NUMBERS = -2
-"""Stands for a DOF in the row with the numbers of the model's own files."""
+"""Value in place of a DOF for the row with the numbers stored in files of the body model."""
 
 _FIRST_ROTATION = 3
 _INDENT = 9.0  # points per level
@@ -59,7 +59,8 @@ def draw(state: AppState) -> None:
         return
     if actor.figure.skeleton is None or actor.pose is None:
         imgui.text_wrapped(
-            "This figure has no skeleton: open its .skel with it, or give it one: Window > Rig."
+            "This figure has no skeleton: open it together with its .skel, or create one with "
+            "Window > Rig."
         )
         return
     _draw_head(state)
@@ -72,7 +73,7 @@ def draw(state: AppState) -> None:
     shown = rows(skeleton, frozenset(joint_tree(state).opened), joint_tree(state).filter, has_own)
     labels = _labels(skeleton)
     if not shown:
-        imgui.text_disabled("no joint has this in its name")
+        imgui.text_disabled("no joint name contains this text")
     clipper = imgui.ListClipper()
     clipper.begin(len(shown))
     _include_wanted(state, clipper, shown)
@@ -294,21 +295,21 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
 
 
 def _reach(state: AppState) -> float:
-    """Return the range of a slider of the root's translation: the size of the scene."""
+    """Return the range of sliders without limits for translations: the size of the scene."""
     return box_size(state.box) or 1.0
 
 
 def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
-    """Return the text about limits in a slider's tooltip, in the displayed unit."""
+    """Return the limits of a DOF for a slider's tooltip, in the displayed unit."""
     texts = [_value_text(limit, kind, in_degrees) for limit in (low, high)]
     if low == high:
         return f"locked at {texts[0]}"
     if not math.isfinite(low) and not math.isfinite(high):
-        return "unlimited; Ctrl+click types any value\ndouble-click resets"
+        return "unlimited; Ctrl+click to type any value\ndouble-click to reset"
     span = f"{texts[0]} to {texts[1]}"
     if not math.isfinite(low) or not math.isfinite(high):
         span = f"at most {texts[1]}" if math.isfinite(high) else f"at least {texts[0]}"
-    return f"{span}\nCtrl+click types a value, double-click resets"
+    return f"{span}\nCtrl+click to type a value, double-click to reset"
 
 
 def _value_text(value: float, kind: int, in_degrees: bool) -> str:

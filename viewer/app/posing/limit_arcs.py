@@ -24,7 +24,7 @@ __all__ = ["LimitArc", "arc_points", "limit_arcs"]
 _ALONG = 0.35  # sine of the angle between bone and axis below which the bone shows no rotation
 _STEP = math.radians(4.0)
 _WHOLE = 2.0 * math.pi
-_ROUNDING = 1e-6  # radians from a limit within which a value is at it
+_ROUNDING = 1e-6  # tolerance within which a value is at a limit, radians
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +60,9 @@ def limit_arcs(joint: PosedJoint, pose: Pose) -> list[LimitArc]:
     Parameters
     ----------
     joint : PosedJoint
-        In the scene.
+        The joint in the scene.
     pose : Pose
-        Of its actor.
+        Pose of its actor.
     """
     skeleton, found = joint.skeleton, []
     axes = rotation_axes(skeleton, pose, joint.joint)
@@ -85,7 +85,7 @@ def _present(joint: PosedJoint, axis: Floats, kind: int) -> Floats:
     own = joint.axes("local")
     across = _without(_bone(joint), axis)
     if np.linalg.norm(across) < _ALONG:
-        # Of the joint's other two axes the more perpendicular one, so that it never vanishes.
+        # Use the more perpendicular of the joint's other two axes, whose projection cannot vanish.
         others = [_without(own[:, (kind + k) % 3], axis) for k in (1, 2)]
         across = max(others, key=lambda vector: float(np.linalg.norm(vector)))
     return unit(across)

@@ -1,8 +1,8 @@
 """Move tool: a joint dragged in the image plane, and arrows that translate the root.
 
-A joint below others follows the pointer by inverse kinematics, solved from the pose in which the
-drag began: the result depends on the pointer's place, not on its path. A root, and a
-joint with translations of its own, is translated.
+A joint with parents follows the pointer by inverse kinematics, solved from the pose at the start
+of the drag: the result depends on the pointer's position, not on its path. Roots, and joints with
+translation DOFs, are translated.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ __all__ = [
 ]
 
 LENGTH = 72.0
-"""Of the arrows, window coordinates."""
+"""Length of the arrows, window coordinates."""
 
 _REACH = 7.0  # window coordinates around an arrow within which it is grabbed
-_SHORTEST = 12.0  # window coordinates: a shorter projection points at the eye
-_BARE = 14.0  # window coordinates at an arrow's base that belong to the handle in the middle
-_ROUNDS = 40  # iterations of the solver: bounds the time of a frame
-_MET = 1e-3  # of the chain's reach: smallest distance that is shown
+_SHORTEST = 12.0  # window coordinates: a shorter arrow points almost at the eye
+_BARE = 14.0  # window coordinates at an arrow's base that belong to the handle at the joint
+_ITERATIONS = 40  # of the solver: bounds the time of a frame
+_MET = 1e-3  # smallest remaining distance that is shown, relative to the figure's size
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +61,7 @@ class Arrow:
 
 
 def longest_chain(skeleton: Skeleton, joint: int) -> int:
-    """Return how many joints above one can rotate."""
+    """Return the number of joints above a joint that can rotate."""
     return len(chain_above(skeleton, joint, skeleton.n_joints)) if joint >= 0 else 0
 
 
@@ -71,12 +71,12 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     Parameters
     ----------
     skeleton : Skeleton
-        Gives the hierarchy.
+        Skeleton with the hierarchy.
     joint : int
-        The dragged one.
+        Index of the dragged joint.
     asked : int
-        Largest number; 0 for two without a root, which would rotate the whole figure, unless
-        nothing else can rotate.
+        Maximum number. With 0 it is two, and a root, which would rotate the whole figure, is
+        included only if nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)
     if not asked and len(chain) > 1:
@@ -85,13 +85,13 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
 
 
 def translation_dofs(skeleton: Skeleton, joint: int) -> Ints:
-    """Return the rows of a joint's free translations: (N,) int32."""
+    """Return the rows of a joint's unlocked translation DOFs: (N,) int32."""
     own = (skeleton.dof_joints == joint) & (skeleton.dof_kinds < 3) & ~skeleton.locked
     return np.flatnonzero(own).astype(np.int32)
 
 
 def shifts(skeleton: Skeleton, joint: int) -> bool:
-    """Return whether a joint has arrows: it is a root, or has translations of its own."""
+    """Return whether a joint has arrows: it is a root, or has translation DOFs."""
     return bool(skeleton.parents[joint] < 0) or len(translation_dofs(skeleton, joint)) > 0
 
 
@@ -101,9 +101,10 @@ def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
     Parameters
     ----------
     joint : PosedJoint
-        In the scene.
+        The joint in the scene.
     orientation : str
-        A key of ``ORIENTATIONS``; a joint with fewer than three translations has their own axes.
+        A key of ``ORIENTATIONS``. A joint with one or two translation DOFs has arrows along their
+        axes instead.
     """
     if not shifts(joint.skeleton, joint.joint):
         return []
@@ -122,13 +123,13 @@ def grab_arrow(found: list[Arrow], center: Floats, frame: ViewFrame, place: Plac
     Parameters
     ----------
     found : list of Arrow
-        To choose from.
+        Arrows to choose from.
     center : (3,)
-        Where the joint is, scene space.
+        Position of the joint, scene space.
     frame : ViewFrame
-        How the scene is seen.
+        Projection of the scene.
     place : (float, float)
-        The pointer.
+        Position of the pointer, window coordinates.
     """
     best, nearest = None, _REACH
     length = LENGTH * frame.unit_length(center)
@@ -147,18 +148,18 @@ def grab_arrow(found: list[Arrow], center: Floats, frame: ViewFrame, place: Plac
 
 
 class ReachHandle:
-    """Handle of a dragged joint, and of the chain above it that follows.
+    """Handle of a joint that is dragged by inverse kinematics.
 
     Parameters
     ----------
     posed : PosedJoint
-        When the drag began.
+        The joint at the start of the drag.
     start : Pose
-        The pose then.
+        Pose at the start of the drag.
     place : (float, float)
-        The pointer then.
+        Position of the pointer at the start of the drag.
     length : int
-        How many joints above may rotate.
+        Number of joints above it that may rotate.
     """
 
     def __init__(self, posed: PosedJoint, start: Pose, place: Place, length: int) -> None:
@@ -166,12 +167,12 @@ class ReachHandle:
         self.joint = posed.joint
 
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
-        """Return the pose that brings the joint to the pointer, at the depth it had."""
+        """Return the pose that moves the joint to the pointer, at its initial depth."""
         target = _dragged(self.posed.center, self.place, frame, place)
         skeleton = self.posed.skeleton
         inside = np.linalg.solve(self.posed.placement, np.append(target, 1.0))[:3]
         try:
-            found = reach(skeleton, self.start, self.joint, inside, self.length, _ROUNDS)
+            found = reach(skeleton, self.start, self.joint, inside, self.length, _ITERATIONS)
         except RigError as problem:
             return Outcome(self.start.copy(), str(problem))
         pose = self.start.copy()
@@ -186,18 +187,18 @@ class ReachHandle:
 
 
 class ShiftHandle:
-    """Handle of a root, or of a joint with translations of its own.
+    """Handle of a root, or of a joint with translation DOFs.
 
     Parameters
     ----------
     posed : PosedJoint
-        When the drag began.
+        The joint at the start of the drag.
     start : Pose
-        The pose then.
+        Pose at the start of the drag.
     place : (float, float)
-        The pointer then.
+        Position of the pointer at the start of the drag.
     arrow : Arrow or None
-        Along which it moves; None for the image plane.
+        Arrow along which the joint moves; None to move it in the image plane.
     """
 
     def __init__(
@@ -216,14 +217,14 @@ class ShiftHandle:
         return self._shift_dofs(rows, way) if len(rows) else self._shift_figure(way)
 
     def _along(self, frame: ViewFrame, place: Place) -> float:
-        """Return the movement of the line of sight along the arrow since the start of the drag."""
+        """Return the pointer's movement along the arrow since the start of the drag."""
         assert self.arrow is not None  # checked by the caller
         center, axis = self.posed.center, self.arrow.axis
         first = _nearest_to(center, axis, *frame.ray(self.place))
         return _nearest_to(center, axis, *frame.ray(place)) - first
 
     def _shift_dofs(self, rows: Ints, way: Floats) -> Outcome:
-        """Change the translations that the joint has."""
+        """Change the translation DOFs of the joint."""
         skeleton, pose = self.posed.skeleton, self.start.copy()
         columns = self.posed.parent_linear[:, skeleton.dof_kinds[rows]]
         steps = np.linalg.lstsq(columns, way, rcond=None)[0]
@@ -237,7 +238,7 @@ class ShiftHandle:
     def _shift_figure(self, way: Floats) -> Outcome:
         """Move the whole figure: its translation applies before its placement in the scene."""
         pose = self.start.copy()
-        # The placement of the actor is the joint's placement without the figure's own part.
+        # Without the figure's own scale, this is the placement of the actor.
         linear = self.posed.placement[:3, :3] / self.start.figure_scale
         pose.figure_translation = pose.figure_translation + np.linalg.solve(linear, way)
         return Outcome(pose, _shift_text("figure", way))

@@ -34,7 +34,7 @@ __all__ = [
     "save_pose",
 ]
 
-_RANDOM = 10  # number of leading coefficients, of largest variance, that a random body varies
+_RANDOM = 10  # number of leading coefficients, of largest variance, in a random shape
 
 
 def _record(state: AppState) -> PoseRecord | None:
@@ -76,8 +76,8 @@ def paste_pose(state: AppState) -> None:
     text = imgui.get_clipboard_text() or ""
     try:
         # Numbers may be separated by commas, as in a program's list.
-        words = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
-        source = Source("clipboard", words.encode("utf-8", "replace"))
+        cleaned = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
+        source = Source("clipboard", cleaned.encode("utf-8", "replace"))
         if not text.strip():
             raise source.fault("F002.pose-clipboard")
         record = pose.read(source)
@@ -112,7 +112,7 @@ def save_export(state: AppState, path: Path) -> None:
 
 
 def mirror(state: AppState) -> None:
-    """Exchange left and right of the chosen actor's pose."""
+    """Swap left and right in the chosen actor's pose."""
     actor = state.actor
     if actor.pose is None:
         return
@@ -125,7 +125,7 @@ def mirror(state: AppState) -> None:
 
 
 def reset_pose(state: AppState) -> None:
-    """Set every DOF of every actor back to the file's pose; shapes stay."""
+    """Reset every DOF of every actor to the rest pose of its file, but not the shapes."""
     for actor in state.scene.actors:
         if actor.figure.skeleton is not None and actor.pose is not None:
             weights = actor.pose.shape_weights
@@ -135,7 +135,7 @@ def reset_pose(state: AppState) -> None:
 
 
 def random_shape(state: AppState) -> None:
-    """Draw the first shape coefficients from a normal distribution; expressions stay."""
+    """Draw the first shape coefficients from a normal distribution, but not the expressions."""
     posing = state.of(Posing)
     actor = state.actor
     shapes = actor.figure.blend_shapes

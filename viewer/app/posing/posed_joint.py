@@ -25,9 +25,9 @@ class PosedJoint:
     Attributes
     ----------
     skeleton : Skeleton
-        Of the actor's figure in its present shape.
+        Skeleton of the actor's figure in its current shape.
     joint : int
-        Which one.
+        Index of the joint.
     placement : (4, 4)
         Figure space to scene, including the figure's own translation and scale.
     world : (J, 4, 4)
@@ -63,7 +63,7 @@ class PosedJoint:
         Parameters
         ----------
         axis : (3,)
-            Of a rotation, in the parent's frame.
+            Rotation axis in the parent's frame.
 
         Returns
         -------
@@ -107,11 +107,11 @@ def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoin
     Parameters
     ----------
     actor : Actor
-        Placed and posed.
+        Actor, placed and posed.
     joint : int
-        -1 for none.
+        Index of the joint; -1 for none.
     pose : Pose, optional
-        In place of the actor's own.
+        Pose to use in place of the actor's.
     """
     pose = actor.pose if pose is None else pose
     if pose is None or joint < 0:

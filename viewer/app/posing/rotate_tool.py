@@ -36,12 +36,12 @@ __all__ = [
 ]
 
 RADIUS = 78.0
-"""Of the rings, window coordinates."""
+"""Radius of the rings, window coordinates."""
 
 SNAP = math.radians(15.0)
 _VIEW_RADIUS = 1.2  # radius of the ring about the line of sight, relative to the others
 _REACH = 7.0  # window coordinates around a ring within which it is grabbed
-_FLAT = 0.25  # cosine between axis and line of sight below which a ring is dragged along its edge
+_FLAT = 0.25  # cosine between axis and line of sight below which a ring counts as seen edge-on
 _STEPS = 72
 
 
@@ -56,9 +56,9 @@ class Ring:
     color : int
         0, 1, 2 for x, y, z; 3 for the line of sight.
     size : float
-        Its radius in window coordinates.
+        Radius, window coordinates.
     dof : int
-        The DOF that it rotates, -1 for the whole joint.
+        DOF that it changes, -1 for the whole joint.
     """
 
     axis: Floats
@@ -73,13 +73,13 @@ def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> 
     Parameters
     ----------
     joint : PosedJoint
-        In the scene.
+        The joint in the scene.
     pose : Pose
-        Of its actor.
+        Pose of its actor.
     orientation : str
         A key of ``ORIENTATIONS``.
     frame : ViewFrame
-        How the scene is seen.
+        Projection of the scene.
     """
     skeleton = joint.skeleton
     if rotates_freely(skeleton, joint.joint):
@@ -110,7 +110,7 @@ def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = N
     radius : float
         Scene units.
     start : (3,), optional
-        The direction of the first point, perpendicular to the axis.
+        Direction of the first point, perpendicular to the axis.
     """
     first = _across(axis) if start is None else start
     second = np.cross(axis, first)
@@ -119,7 +119,7 @@ def circle(center: Floats, axis: Floats, radius: float, start: Floats | None = N
 
 
 def _across(axis: Floats) -> Floats:
-    """Return some unit vector perpendicular to an axis."""
+    """Return a unit vector perpendicular to an axis."""
     least = np.eye(3)[int(np.argmin(np.abs(axis)))]
     return unit(np.cross(axis, least))
 
@@ -129,18 +129,18 @@ def grab_ring(
 ) -> tuple[Ring, Floats] | None:
     """Return the ring under the pointer and the direction to its grabbed point.
 
-    Of several the nearest is chosen; the half of a ring behind the joint counts as farther.
+    The nearest of several rings is chosen; the half of a ring behind the joint counts as farther.
 
     Parameters
     ----------
     found : list of Ring
-        To choose from.
+        Rings to choose from.
     center : (3,)
-        Where the joint is, scene space.
+        Position of the joint, scene space.
     frame : ViewFrame
-        How the scene is seen.
+        Projection of the scene.
     place : (float, float)
-        The pointer.
+        Position of the pointer, window coordinates.
     """
     best, nearest = None, _REACH
     length = frame.unit_length(center)
@@ -150,24 +150,24 @@ def grab_ring(
         seen = frame.project(points)
         if length == 0.0 or not np.isfinite(seen).all():
             continue
-        distances, shares = _distances(seen, np.array(place))
+        distances, fractions = _distances(seen, np.array(place))
         directions = unit(points - center)
         if ring.color < 3:
             distances = distances + 0.5 * _REACH * (directions[:-1] @ eye < -1e-6)
         nearer = int(distances.argmin())
         if distances[nearer] < nearest:
             nearest = float(distances[nearer])
-            along = directions[nearer] * (1 - shares[nearer])
-            best = ring, unit(along + directions[nearer + 1] * shares[nearer])
+            along = directions[nearer] * (1 - fractions[nearer])
+            best = ring, unit(along + directions[nearer + 1] * fractions[nearer])
     return best
 
 
 def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Return a place's distances from the segments of a line, and the parameters: (N,) both."""
+    """Return a point's distances from the segments of a line, and the parameters: (N,) both."""
     starts, steps = line[:-1], np.diff(line, axis=0)
     lengths = np.maximum(np.einsum("na,na->n", steps, steps), 1e-12)
-    shares = np.clip(np.einsum("na,na->n", place - starts, steps) / lengths, 0.0, 1.0)
-    return np.linalg.norm(starts + shares[:, None] * steps - place, axis=1), shares
+    fractions = np.clip(np.einsum("na,na->n", place - starts, steps) / lengths, 0.0, 1.0)
+    return np.linalg.norm(starts + fractions[:, None] * steps - place, axis=1), fractions
 
 
 class TurnHandle:
@@ -176,17 +176,17 @@ class TurnHandle:
     Parameters
     ----------
     posed : PosedJoint
-        When the drag began.
+        The joint at the start of the drag.
     start : Pose
-        The pose then.
+        Pose at the start of the drag.
     ring : Ring
-        The ring.
+        The ring that is dragged.
     held : (3,)
-        From the joint to the grabbed point: a unit vector, scene space.
+        Direction from the joint to the grabbed point: a unit vector, scene space.
     place : (float, float)
-        The pointer then.
+        Position of the pointer at the start of the drag.
     in_degrees : bool
-        Unit of angles in text.
+        Whether text gives angles in degrees instead of radians.
     """
 
     def __init__(
@@ -205,10 +205,10 @@ class TurnHandle:
         self._first: float | None = None
 
     def follow(self, frame: ViewFrame, place: Place, snaps: bool) -> Outcome:
-        """Return the pose with the joint rotated by the pointer's angle around it."""
+        """Return the pose with the joint rotated by the angle of the pointer around it."""
         angle = self._turned(frame, place)
         if angle is not None:
-            # Several revolutions: of the equivalent angles, the nearest to the last one.
+            # Several revolutions are possible: take the equivalent angle nearest to the last one.
             self._angle = angle - 2 * math.pi * round((angle - self._angle) / (2 * math.pi))
         turn = SNAP * round(self._angle / SNAP) if snaps else self._angle
         if self.ring.dof >= 0:
@@ -245,14 +245,14 @@ class TurnHandle:
             return None
         away = origin + direction * float(axis @ (self.center - origin)) / along - self.center
         if not np.isfinite(frame.project(self.center + away)).all():
-            return None  # the plane is intersected behind the eye
+            return None  # the line of sight meets the plane behind the eye
         return math.atan2(float(axis @ np.cross(self.held, away)), float(self.held @ away))
 
     def _along_edge(self, frame: ViewFrame, place: Place) -> float:
-        """Return the angle of a ring seen edge-on: like a wheel rolled by the pointer."""
+        """Return the angle of a ring seen edge-on, which the pointer rolls like a wheel."""
         eye = toward_eye(frame, self.center)
         radius = self.ring.size * frame.unit_length(self.center)
-        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # its front moved by 1 mrad
+        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # movement of its front by 1 mrad
         ends = frame.project(np.stack([self.center, self.center + rim]))
         way = (ends[1] - ends[0]) * 1e3
         length = float(way @ way)
@@ -273,7 +273,7 @@ class TurnHandle:
         return Outcome(pose, f"{self._text(done, '+')}   {now}", limited, angle=done)
 
     def _whole(self, turn: float) -> Outcome:
-        """Rotate the joint about the ring's axis; at a limit, as near to that as possible."""
+        """Rotate the joint about the ring's axis, as closely as its limits permit."""
         skeleton, joint = self.posed.skeleton, self.joint
         axis = self.posed.parent_axis(self.ring.axis)
         now = joint_rotations(skeleton, self.start)[joint]

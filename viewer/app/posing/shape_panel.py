@@ -1,4 +1,4 @@
-"""Shape panel: a slider per coefficient of shape, expression or morph, and body measures."""
+"""Shape panel: sliders of shape coefficients, expressions and morphs, and body measures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
 from viewer.app.posing.pose_actions import random_shape, reset_shape
 from viewer.app.posing.state import Posing
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.memo import Memo
@@ -19,7 +19,7 @@ from viewer.rig.shape import shaped
 
 __all__ = ["draw"]
 
-_REACH = 5.0  # range of a slider in standard deviations; more can be typed
+_REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
 _WIDEST = 20.0  # width of a slider, in font sizes
 _HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
@@ -29,7 +29,7 @@ def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     figure, pose = state.actor.figure, state.actor.pose
     if figure.blend_shapes is None or pose is None:
-        imgui.text_wrapped("This figure has one fixed shape.")
+        imgui.text_wrapped("This figure has no blend shapes.")
         return
     _draw_measures(figure, pose)
     varies = "shape" in figure.blend_shapes.groups
@@ -64,7 +64,7 @@ def _draw_seed(state: AppState) -> None:
 
 
 def _width_beside(label: str, most: float) -> float:
-    """Return a widget's width that leaves room for its label, if there is room for both."""
+    """Return a width for a widget that leaves room for its label, if there is room for both."""
     room = imgui.get_content_region_avail().x
     taken = imgui.calc_text_size(label).x + imgui.get_style().item_inner_spacing.x
     return min(max(room - taken, 0.35 * room), most * imgui.get_font_size())
@@ -127,8 +127,8 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, is_morph: b
     if not is_morph:
         _draw_marks()
     if imgui.is_item_hovered():
-        unit = "1 reaches the target" if is_morph else "standard deviations"
-        imgui.set_tooltip(f"{shown}: {unit}\nCtrl+click types a value, double-click resets")
+        unit = "at 1 the full morph" if is_morph else "standard deviations"
+        imgui.set_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             pose.shape_weights[index] = 0.0
 
@@ -140,8 +140,8 @@ def _draw_marks() -> None:
     grab = imgui.get_style().grab_min_size * 0.5
     draw_list = imgui.get_window_draw_list()
     for sigma in range(-int(_REACH), int(_REACH) + 1):
-        share = 0.5 + sigma / (2.0 * _REACH)
-        x = low.x + grab + share * (width - 2.0 * grab)
+        fraction = 0.5 + sigma / (2.0 * _REACH)
+        x = low.x + grab + fraction * (width - 2.0 * grab)
         height = 7.0 if sigma == 0 else 4.0
         color = imgui.get_color_u32((1.0, 1.0, 1.0, 0.8 if sigma == 0 else 0.5))
         draw_list.add_line((x, high.y - height), (x, high.y - 1.0), color)

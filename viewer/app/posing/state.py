@@ -18,7 +18,7 @@ TOOLS = {
     "move": (
         "Move",
         "D",
-        "drag a joint: the joints above it follow (IK); the root moves the figure",
+        "drag a joint, and the joints above it follow (IK); drag the root to move the figure",
     ),
 }
 """Tools: label of the button, key, tooltip."""
@@ -28,7 +28,7 @@ ORIENTATIONS = {
     "parent": "Parent axes",
     "world": "World axes",
 }
-"""Orientations of rings and arrows, for joints free to rotate or move along all three axes."""
+"""Orientations of rings and arrows, for joints free to rotate about or move along all axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,15 +38,15 @@ class Outcome:
     Attributes
     ----------
     pose : Pose
-        Within the limits.
+        Pose within the joint limits.
     text : str
-        Text about the change, shown beside the handle.
+        Description of the change, shown beside the handle.
     limited : tuple of int
-        DOFs at a limit that restrict the drag.
+        DOFs whose limits restrict the drag.
     target : (3,) or None
-        Pointer in scene space, if the joint could not reach it.
+        Position of the pointer in scene space, if the joint could not reach it.
     angle : float or None
-        Rotation by a ring, radians.
+        Angle of rotation by a ring, radians.
     """
 
     pose: Pose
@@ -57,21 +57,21 @@ class Outcome:
 
 
 class Handle(Protocol):
-    """Something in the view that changes a pose while it is dragged."""
+    """Interface of a handle in the view, which changes a pose while it is dragged."""
 
     joint: int
     start: Pose
     place: tuple[float, float]
 
     def follow(self, frame: ViewFrame, place: tuple[float, float], snaps: bool) -> Outcome:
-        """Return the pose for a pointer.
+        """Return the result for a position of the pointer.
 
         Parameters
         ----------
         frame : ViewFrame
-            How the scene is seen.
+            Projection of the scene.
         place : (float, float)
-            The pointer, window coordinates.
+            Position of the pointer, window coordinates.
         snaps : bool
             Whether angles snap to whole steps.
         """
@@ -85,17 +85,18 @@ class Drag:
     Attributes
     ----------
     actor : Actor
-        Whose pose changes.
+        Actor whose pose changes.
     handle : Handle
         The handle that is held.
     outcome : Outcome
-        The last result.
+        Latest result.
     asked : tuple
-        Pointer and keys of the last result, so that nothing is solved twice.
+        Key of the pointer's position, the modifier and the camera for that result, which is
+        computed again only if the key changes.
     has_moved : bool
         Whether the pointer has moved: a click on a handle changes nothing.
     is_over : bool
-        Whether it was cancelled and only awaits the release of the button.
+        Whether it was cancelled and only waits for the release of the button.
     """
 
     actor: Actor
@@ -108,12 +109,14 @@ class Drag:
 
 @dataclass(slots=True)
 class HeldVector:
-    """A joint's rotation vector as edited: beyond pi its rotation has a shorter one.
+    """A joint's rotation vector as edited, which may be longer than pi.
+
+    Beyond pi a shorter vector gives the same rotation, so the rotation does not determine it.
 
     Attributes
     ----------
     joint : int
-        Joint of the actor that was chosen then.
+        Joint of the actor that was chosen.
     vector : (3,)
         The vector as edited.
     rotation : (3, 3)
@@ -139,7 +142,8 @@ class Posing:
     orientation : str
         A key of ``ORIENTATIONS``.
     chain_length : int
-        How many joints above a dragged one may rotate; 0 until chosen: two, without the root.
+        Number of joints above a dragged joint that may rotate; 0 for the default, two without the
+        root.
     drag : Drag or None
         The handle that is held.
     as_vectors : bool
@@ -149,7 +153,7 @@ class Posing:
     shape_seed : int
         Seed of the last random shape.
     n_hand_components : int
-        How many principal components of the hands have sliders.
+        Number of principal components of the hands that have sliders.
     """
 
     tool: str = "select"

@@ -1,4 +1,4 @@
-"""Actions of the posing tools' buttons and keys, and reasons why they are disabled."""
+"""Actions of the posing tools' buttons and keys, and the reasons why they are disabled."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 
 def choose_tool(state: AppState, tool: str) -> None:
-    """Choose a tool, a key of ``TOOLS``, and show what it needs."""
+    """Choose a tool, a key of ``TOOLS``, and show its hint, or why it is disabled."""
     why = no_tool(state)
     if tool != "select" and why:
         state.say_status(f"{TOOLS[tool][0]}: {why}")
@@ -68,7 +68,7 @@ def key_pose_now(state: AppState) -> None:
 
 
 def selected(state: AppState) -> PosedJoint | None:
-    """Return the selected joint in the scene, None if there is none to pose."""
+    """Return the selected joint in the scene, None if there is none that can be posed."""
     actor = state.actor
     if not actor.is_drawn or state.options.show == "binding":
         return None
@@ -78,7 +78,7 @@ def selected(state: AppState) -> PosedJoint | None:
 def no_tool(state: AppState) -> str:
     """Return why nothing can be posed in the view."""
     if state.options.show == "binding" and state.actor.figure.is_attached:
-        return "the skin is shown in its binding space: K shows the pose"
+        return "the skin is shown in its binding space: press K to show the pose"
     if not state.actor.is_drawn:
         return "this actor is not shown"
     return no_pose(state)
@@ -90,12 +90,12 @@ def no_orientation(state: AppState) -> str:
     if skeleton is None or joint < 0:
         return ""
     if state.of(Posing).tool != "rotate":
-        return "" if shifts(skeleton, joint) else "it is dragged in the image plane"
+        return "" if shifts(skeleton, joint) else "this joint is dragged in the image plane"
     if rotates_freely(skeleton, joint):
         return ""
     if not len(rotation_dofs(skeleton, joint, free=True)):
         return f"{joint_label(skeleton, joint)} cannot rotate"
-    return "this joint turns about the axes of its DOFs only"
+    return "this joint rotates only about the axes of its DOFs"
 
 
 def chain_limit(state: AppState) -> int:
@@ -105,7 +105,7 @@ def chain_limit(state: AppState) -> int:
 
 
 def chain_length(state: AppState) -> int:
-    """Return how many joints would follow a drag of the selected one; at least 1."""
+    """Return the number of joints that would follow a drag of the selected joint; at least 1."""
     posing = state.of(Posing)
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:
@@ -116,7 +116,7 @@ def chain_length(state: AppState) -> int:
 def no_chain(state: AppState) -> str:
     """Return why the length of the chain cannot be chosen."""
     if state.of(Posing).tool != "move":
-        return "only the Move tool (D) has chains"
+        return "chains apply only to the Move tool (D)"
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:
         return "select a joint"
@@ -131,5 +131,5 @@ def no_keys(state: AppState) -> str:
     if clip is None:
         return no_pose(state) or "there is no clip: create one with Edit > New clip"
     if not isinstance(clip, Clip):
-        return "this motion has sampled frames, no keys"
+        return "this motion is sampled and has no keys"
     return ""

@@ -24,7 +24,7 @@ __all__ = ["draw_toolbar"]
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
-_WIDTH = 14.5  # of the rows, in font sizes: buttons stay in place as rows come and go
+_WIDTH = 14.5  # of each row, in font sizes: buttons must not move when rows appear
 _ACCENT = (0.62, 0.36, 0.12, 1.0)
 
 
@@ -34,9 +34,9 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
     Parameters
     ----------
     state : AppState
-        What they act on.
+        State that the tools act on.
     legend : Rect or None
-        Rectangle of the legend: the tools go below it if there is no room beside it.
+        Rectangle of the legend: the tools are placed below it if there is no room beside it.
     """
     x, y, width, height = state.view_rect
     if not state.panels_visible or width < _NARROWEST or height < _LOWEST:
@@ -64,7 +64,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
 
 def _draw_tools(state: AppState) -> None:
     """Draw a button per tool; the chosen one is highlighted."""
-    width = _share(len(TOOLS))
+    width = _item_width(len(TOOLS))
     for number, (tool, (name, key, text)) in enumerate(TOOLS.items()):
         why = no_tool(state) if tool != "select" else ""
         if number:
@@ -79,8 +79,8 @@ def _draw_tools(state: AppState) -> None:
             choose_tool(state, tool)
 
 
-def _share(count: int) -> float:
-    """Return the width of one of several widgets in a row: all rows are equally wide."""
+def _item_width(count: int) -> float:
+    """Return the width of each of several widgets in a row: all rows are equally wide."""
     spacing = imgui.get_style().item_spacing.x
     return (_WIDTH * imgui.get_font_size() - spacing * (count - 1)) / count
 
@@ -98,24 +98,24 @@ def _draw_settings(state: AppState) -> None:
     posing, has_chain = state.of(Posing), state.of(Posing).tool == "move"
     why = no_orientation(state)
     with disabled(why):
-        imgui.set_next_item_width(_share(2 if has_chain else 1))
+        imgui.set_next_item_width(_item_width(2 if has_chain else 1))
         posing.orientation = choice(state, "##axes", posing.orientation, ORIENTATIONS)
-        explain("axes that the rings and arrows follow (X)", why)
+        explain("orientation of the rings and arrows (X)", why)
     if has_chain:
         imgui.same_line()
         _draw_chain(state)
 
 
 def _draw_chain(state: AppState) -> None:
-    """Draw how many joints follow the one that is dragged."""
+    """Draw the slider of the number of joints that follow a dragged joint."""
     why, longest = no_chain(state), max(chain_limit(state), 1)
     with disabled(why):
-        imgui.set_next_item_width(_share(2))
+        imgui.set_next_item_width(_item_width(2))
         changed, length = imgui.slider_int(
             "##chain", chain_length(state), 1, longest, "chain %d", imgui.SliderFlags_.always_clamp
         )
         note_item(state, "Chain")
-        explain("how many joints above the dragged one may rotate", why)
+        explain("number of joints above the dragged joint that may rotate", why)
     if changed:
         state.of(Posing).chain_length = min(max(length, 1), longest)
 
@@ -132,5 +132,5 @@ def _draw_actions(state: AppState) -> None:
     for number, (name, action, text, reason) in enumerate(rows):
         if number:
             imgui.same_line()
-        if _button(state, name, _share(len(rows)), text, reason):
+        if _button(state, name, _item_width(len(rows)), text, reason):
             action(state)

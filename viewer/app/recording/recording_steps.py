@@ -16,9 +16,10 @@ from viewer.app.actors.following import Following
 from viewer.app.core.state import AppState
 from viewer.app.recording.recorded_marks import RecordedMarks
 from viewer.app.recording.state import RecordSettings
-from viewer.errors import OutputError, printable
+from viewer.errors import OutputError
 from viewer.formats import check_targets
 from viewer.media.video_kinds import MOST_GIF_RATE
+from viewer.phrases import printable
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Follow, Recording, Sink, record
 from viewer.rendering.renderer import Renderer

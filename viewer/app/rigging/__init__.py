@@ -1,1 +1,1 @@
-"""Rigging: a mesh gets the rig of a template."""
+"""Rigging of a mesh with the rig of a template: alignment, matching, transfer and results."""

@@ -1,4 +1,4 @@
-"""The part of the Rig panel that lays the template onto the target."""
+"""Section of the Rig panel that aligns the template with the target."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from viewer.app.core.widgets import (
     same_line_if_room,
 )
 from viewer.app.rigging.placing import (
+    aligned_template,
     box_fit,
     is_posed_since,
-    laid_template,
     move_by_hand,
     placing_now,
     posed_template,
@@ -42,18 +42,18 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler
 
 __all__ = ["draw_alignment"]
 
-_FEWEST = 3  # landmarks
-_DOUBTFUL = 0.03  # error over size, as in the report
+_FEWEST = 3  # smallest number of landmarks
+_DOUBTFUL = 0.03  # error relative to the target's size, as in the report
 _WARNING = (1.0, 0.77, 0.30, 1.0)
 _STRETCHED = "stretched, pose kept"
-_HOW = {
+_METHODS = {
     "in place": "about the origin of both",
     "search": "by closest points",
     "fit": "pose and limbs fitted",
     "landmarks": "by landmarks",
     "given": "by hand",
 }
-"""How a template came to where it lies, as ``Alignment.how`` says it."""
+"""Texts for the methods of alignment, the values of ``Alignment.how``."""
 _POSES = "; joints are rotated and limbs resized where that fits much better"
 _FITS = (
     "; joints are rotated and limbs resized, or all of it stretched, where that fits much better"
@@ -62,7 +62,7 @@ _SCALE_TEXTS = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 
 
 def draw_alignment(state: AppState) -> None:
-    """Draw how the template is aligned, how well it is, and how to move it by hand."""
+    """Draw the settings of the alignment, its error, and the tools to move the template by hand."""
     rigging, why = state.of(Rigging), no_job_room(state)
     choices = rigging.choices
     axes = {"": "searched", **{axis: axis for axis in AXES}}
@@ -86,21 +86,21 @@ def draw_alignment(state: AppState) -> None:
     _draw_placing(placing_now(state))
     rigging.ghost = choice(state, "Template shown", rigging.ghost, GHOSTS)
     _draw_tools(state)
-    template = laid_template(state)
+    template = aligned_template(state)
     if template is not None and rigging.tool not in ("", "landmarks"):
         _draw_numbers(state, template)
     if template is not None and (rigging.tool == "landmarks" or rigging.landmarks):
         _draw_landmarks(state, template)
     placing = placing_now(state)
-    # What comes and goes stands below the controls, which stay where they are.
+    # Lines that appear and disappear go below the controls, which must not move.
     for line in placing.lines if placing is not None else ():
         imgui.text_wrapped(line.labelled)
     if is_posed_since(state):
-        imgui.text_wrapped("the template has been posed since: align again")
+        imgui.text_wrapped("the template was posed after the alignment: align it again")
 
 
 def _draw_placing(placing: Placing | None) -> None:
-    """Draw how the template lies: how far the surfaces are apart."""
+    """Draw the distance between the template and the target as they are aligned."""
     if placing is None:
         imgui.text_disabled("not aligned yet")
         return
@@ -112,7 +112,7 @@ def _draw_error(found: Alignment | None) -> None:
     if found is None:
         imgui.text_disabled("error: not measured at this placement")
         return
-    text = f"error {100.0 * found.error:.2f} % ({_how(found)})"
+    text = f"error {100.0 * found.error:.2f} % ({_method_text(found)})"
     if found.error > _DOUBTFUL:
         imgui.push_style_color(imgui.Col_.text, _WARNING)
         imgui.text_wrapped(f"{text}: doubtful")
@@ -125,28 +125,28 @@ def _draw_error(found: Alignment | None) -> None:
     )
 
 
-def _how(found: Alignment) -> str:
-    """Say how a template came to where it lies: fitted limbs come with one scale for all axes."""
+def _method_text(found: Alignment) -> str:
+    """Return a text for the method of an alignment, which with fitted limbs has one scale only."""
     scales = found.similarity.factors, found.similarity.own_factors
     is_even = all((factors == 1.0).all() for factors in scales)
-    return _HOW[found.how] if found.how != "fit" or is_even else _STRETCHED
+    return _METHODS[found.how] if found.how != "fit" or is_even else _STRETCHED
 
 
 def _refine(state: AppState) -> None:
-    """Let closest points improve on where the template lies: corners of its box are landmarks."""
+    """Refine the current alignment by closest points: it is given as landmarks at box corners."""
     rigging = state.of(Rigging)
-    template = laid_template(state)
+    template = aligned_template(state)
     if template is None:
         return
     low, high = (f(posed_template(rigging, template).positions, axis=0) for f in (np.min, np.max))
     corners = np.array([low, *(np.where(np.eye(3)[axis] > 0, high, low) for axis in range(3))])
-    corners[1:] += (high == low) * np.eye(3)  # flat meshes have corners too
+    corners[1:] += (high == low) * np.eye(3)  # flat meshes need four different corners too
     pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
     start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
 
 
 def _draw_tools(state: AppState) -> None:
-    """Draw the ways to move the template in the view."""
+    """Draw the choice of a tool to move the template in the view."""
     imgui.text_disabled("By hand")
     for number, (tool, (name, text)) in enumerate(TOOLS.items()):
         if number:
@@ -158,7 +158,7 @@ def _draw_tools(state: AppState) -> None:
 
 
 def _draw_numbers(state: AppState, template: Template) -> None:
-    """Draw the template's place as numbers: shift, turn about x, y, z, scale."""
+    """Draw the template's placement as numbers: translation, Euler angles about x, y, z, scale."""
     now = similarity_now(state, template)
     angles = np.degrees(matrix_to_euler(now.rotation[None])[0])
     shift, angle, scale = _inputs(state, now.shift, angles, now.scale)
@@ -183,7 +183,7 @@ def _draw_numbers(state: AppState, template: Template) -> None:
 def _inputs(
     state: AppState, shift: Floats, angles: Floats, scale: float
 ) -> tuple[Floats | None, Floats | None, float | None]:
-    """Draw the fields; return what was typed, None for each that was not."""
+    """Draw the input fields; return the values that were typed, None for unchanged fields."""
     flags = imgui.InputTextFlags_.enter_returns_true
     typed: list[Floats | None] = []
     for label, values, digits in (
@@ -194,12 +194,12 @@ def _inputs(
             label, [plain_zero(value, digits) for value in values.tolist()], digits, flags
         )
         note_item(state, label)
-        fits = changed and bool(np.isfinite(new).all())
-        typed.append(np.array(new, dtype=np.float64) if fits else None)
+        is_valid = changed and bool(np.isfinite(new).all())
+        typed.append(np.array(new, dtype=np.float64) if is_valid else None)
     changed, size = imgui.input_float("Scale factor", scale, 0.0, 0.0, "%.6g", flags)
     note_item(state, "Scale factor")
-    fits = changed and math.isfinite(size) and size > 0.0
-    return typed[0], typed[1], size if fits else None
+    is_valid = changed and math.isfinite(size) and size > 0.0
+    return typed[0], typed[1], size if is_valid else None
 
 
 def _move(state: AppState, template: Template, similarity: Similarity) -> None:
@@ -208,7 +208,7 @@ def _move(state: AppState, template: Template, similarity: Similarity) -> None:
 
 
 def _draw_landmarks(state: AppState, template: Template) -> None:
-    """Draw the list of pairs, and the button that aligns by them."""
+    """Draw the list of landmarks, and the button to align by them."""
     view = state.of(Rigging)
     if view.tool == "landmarks":
         side = "the same point of the target" if view.pending else "a point of the blue template"

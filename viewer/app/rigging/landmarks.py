@@ -1,4 +1,4 @@
-"""Landmarks: points of the template and the same of the target, clicked in the view."""
+"""Landmarks: pairs of corresponding points of template and target, clicked in the view."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from viewer.app.core.fitting import fit_points
 from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import ViewFrame, view_frame
 from viewer.app.rigging.placing import (
+    aligned_template,
     ghost_place,
-    laid_template,
     posed_template,
     set_aside,
     target_place,
@@ -31,8 +31,8 @@ _DOT = 5.0  # radius, window coordinates
 
 
 def show_both(state: AppState) -> None:
-    """Show the template beside the target, and both whole."""
-    view, template = state.of(Rigging), laid_template(state)
+    """Show the template beside the target, and fit the view to both."""
+    view, template = state.of(Rigging), aligned_template(state)
     if template is None or view.target is None:
         return
     set_aside(state)
@@ -45,8 +45,8 @@ def show_both(state: AppState) -> None:
 
 
 def take_click(state: AppState) -> None:
-    """Take a click for a landmark: on the template first, then on the target."""
-    picking, view, template = state.of(Picking), state.of(Rigging), laid_template(state)
+    """Use a click for a landmark: on the template first, then on the target."""
+    picking, view, template = state.of(Picking), state.of(Rigging), aligned_template(state)
     wanted = picking.wanted
     if wanted is None or wanted[2] or template is None:
         return
@@ -60,7 +60,7 @@ def take_click(state: AppState) -> None:
             "template",
         )
     else:
-        assert view.target is not None  # there is a tool
+        assert view.target is not None  # tools need a target
         mesh, matrix, what = target_mesh(state), target_place(view.target), "target"
     hit = _hit(view_frame(state), mesh, matrix, place)
     if hit is None:
@@ -76,7 +76,7 @@ def take_click(state: AppState) -> None:
 
 
 def _hit(frame: ViewFrame, mesh: Mesh, matrix: Floats, place: tuple[float, float]) -> RayHit | None:
-    """Return what of a mesh is seen at a place of the window."""
+    """Return the point of a mesh that is visible at a position in the window."""
     origin, direction = frame.ray(place)
     back = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     return first_hit(
@@ -88,9 +88,9 @@ def _hit(frame: ViewFrame, mesh: Mesh, matrix: Floats, place: tuple[float, float
 
 
 def draw_landmarks(state: AppState, template: Template) -> None:
-    """Draw all pairs as numbered dots, and the one that lacks its other half."""
+    """Draw all pairs as numbered dots, and the point whose partner is still to be clicked."""
     view = state.of(Rigging)
-    assert view.target is not None  # the caller looked
+    assert view.target is not None  # checked by the caller
     posed, place = posed_template(view, template), ghost_place(state, template)
     for number, pair in enumerate(view.landmarks, start=1):
         _draw_dot(state, posed, place, pair.template, str(number), _TEMPLATE_INK)

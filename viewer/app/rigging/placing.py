@@ -1,4 +1,4 @@
-"""Placement of the template over the target: as aligned, as dragged, or beside it for landmarks."""
+"""Placement of the template: aligned with the target, moved by hand, or beside it for landmarks."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
 
 __all__ = [
+    "aligned_template",
     "as_similarity",
     "box_fit",
     "ghost_of",
     "ghost_place",
     "is_posed_since",
-    "laid_template",
     "move_by_hand",
     "placing_now",
     "posed_template",
@@ -36,17 +36,18 @@ __all__ = [
     "target_place",
 ]
 
-_DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")  # true wherever the template lies
-_GAP = 1.25  # of both widths' mean, between target and template where they stand side by side
+# Messages about the fit of the template, which stay true when it is moved.
+_DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")
+_GAP = 1.25  # distance between target and template side by side, relative to their mean width
 
 
 def target_place(actor: Actor) -> Floats:
-    """Return where an actor's mesh stands in the scene: (4, 4)."""
+    """Return the matrix that places an actor's mesh in the scene: (4, 4)."""
     return actor.placement @ placement_matrix(actor.pose) if actor.pose else actor.placement
 
 
 def posed_template(view: Rigging, template: Template) -> Mesh:
-    """Return the template as it is posed now, as a mesh; remembered until the pose changes."""
+    """Return the template's mesh in its current pose; cached until the pose changes."""
     key = (template.figure, pose_key(template.pose))
     if view.ghost_figure is None or view.ghost_key != key:
         positions, normals = deform(template.figure, template.pose)
@@ -54,12 +55,12 @@ def posed_template(view: Rigging, template: Template) -> Mesh:
         mesh = Mesh(positions, normals, template.figure.mesh.triangles)
         view.ghost_key, view.ghost_figure = key, Figure(template.figure.name, mesh)
     mesh_now = view.ghost_figure.mesh
-    assert mesh_now is not None  # it consists of one
+    assert mesh_now is not None  # it was built from a mesh
     return mesh_now
 
 
 def box_fit(template: Mesh, target: Mesh) -> Similarity:
-    """Return the similarity that lays the middles of boxes onto each other, diagonals alike."""
+    """Return the similarity that aligns the centres and diagonals of two bounding boxes."""
     boxes = [bounding_box(mesh.positions[mesh.triangles.ravel()]) for mesh in (template, target)]
     scale = (box_size(boxes[1]) or 1.0) / (box_size(boxes[0]) or 1.0)
     shift = boxes[1].mean(axis=0) - scale * boxes[0].mean(axis=0)
@@ -67,7 +68,7 @@ def box_fit(template: Mesh, target: Mesh) -> Similarity:
 
 
 def placing_now(state: AppState) -> Placing | None:
-    """Return where the template was laid, None if that was for another target or template."""
+    """Return the template's placement, None if it is for another target or template."""
     rigging, template = state.of(Rigging), current_template(state)
     placing = rigging.placing
     if placing is None or template is None or rigging.target is None:
@@ -77,13 +78,13 @@ def placing_now(state: AppState) -> Placing | None:
 
 
 def is_posed_since(state: AppState) -> bool:
-    """Return whether the template was posed otherwise since it was laid onto the target."""
+    """Return whether the template's pose has changed since it was aligned with the target."""
     placing, template = placing_now(state), current_template(state)
     return placing is not None and template is not None and placing.pose != pose_key(template.pose)
 
 
-def laid_template(state: AppState) -> Template | None:
-    """Return the template in the pose in which it lies on the target; None if it is unread."""
+def aligned_template(state: AppState) -> Template | None:
+    """Return the template as fitted to the target; None if it has not been read yet."""
     placing, template = placing_now(state), current_template(state)
     if placing is None or template is None or placing.fitted is None or is_posed_since(state):
         return template
@@ -91,7 +92,7 @@ def laid_template(state: AppState) -> Template | None:
 
 
 def similarity_now(state: AppState, template: Template) -> Similarity:
-    """Return where the template lies, box on box if nobody has aligned it."""
+    """Return the similarity that places the template: by its box until it has been aligned."""
     placing = placing_now(state)
     if placing is not None:
         return placing.similarity
@@ -99,15 +100,15 @@ def similarity_now(state: AppState, template: Template) -> Similarity:
 
 
 def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
-    """Return the similarity next to a matrix, whose scale is the mean of its three.
+    """Return the similarity nearest to a matrix; its scale is the geometric mean of the axes'.
 
     Parameters
     ----------
     matrix : (4, 4)
-        Not mirrored, nearly one; digits that are missing to a rotation are made up for.
+        Nearly a similarity, without reflection; rounding errors of its rotation are removed.
     like : Similarity or None
-        What was moved: if it is stretched, so is the result, along the template's own axes, which
-        turn with it.
+        Similarity before the change. If it stretches the template along its own axes, so does the
+        result.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     own = np.ones(3)
@@ -122,9 +123,9 @@ def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
 
 
 def move_by_hand(state: AppState, template: Template, similarity: Similarity) -> None:
-    """Lay the template somewhere else; its error is not known there."""
+    """Move the template; the error of its new placement is not known yet."""
     own, before = current_template(state), placing_now(state)
-    assert own is not None  # it is moved
+    assert own is not None  # only an existing template can be moved
     fitted = template if before is not None and before.fitted is template else None
     state.of(Rigging).placing = Placing(
         similarity=similarity,
@@ -138,13 +139,13 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
 
 
 def _still_true(lines: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
-    """Return what was done to the template, without the gap that it left where it lay."""
+    """Return the messages about the fit of the template, without its distance from the target."""
     return tuple(line for line in lines if line.key in _DONE)
 
 
 def set_aside(state: AppState) -> None:
     """Show the template to the right of the target, as the camera sees it."""
-    view, template = state.of(Rigging), laid_template(state)
+    view, template = state.of(Rigging), aligned_template(state)
     view.aside = np.zeros(3)
     if template is None or view.target is None:
         return
@@ -160,8 +161,8 @@ def set_aside(state: AppState) -> None:
 
 
 def ghost_of(state: AppState) -> Ghost | None:
-    """Return the template as it is to be drawn over the scene, None if it is not."""
-    view, template = state.of(Rigging), laid_template(state)
+    """Return the template to be drawn over the scene, None if it is hidden."""
+    view, template = state.of(Rigging), aligned_template(state)
     if template is None or view.target is None:
         return None
     if view.tool == "landmarks":
@@ -181,9 +182,9 @@ def ghost_of(state: AppState) -> Ghost | None:
 
 
 def ghost_place(state: AppState, template: Template) -> Floats:
-    """Return where the template is shown: (4, 4), from its posed mesh to the scene."""
+    """Return the matrix that places the posed template in the scene: (4, 4)."""
     view = state.of(Rigging)
-    assert view.target is not None  # the callers looked
+    assert view.target is not None  # checked by the callers
     matrix = target_place(view.target) @ similarity_now(state, template).matrix
     if view.tool == "landmarks":
         matrix = translation_matrix(view.aside) @ matrix

@@ -1,4 +1,4 @@
-"""Results of rigging: shown in place of the target, as colours and as motion, and saved."""
+"""Results of rigging: display in place of the target, colours, motion, and saving."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.state import Comparison, Result, Rigging
 from viewer.autorig.rigged import clip_for
-from viewer.errors import RigError, ViewerError, printable
+from viewer.errors import RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.formats import check_targets
+from viewer.phrases import printable
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import Pairs
@@ -49,21 +50,21 @@ MATCH_COLORS = {
     "field:match distance": "distance",
     "field:match angle": "angle",
 }
-"""Scalar views of where a target meets the template."""
+"""Scalar quantities that show how the target matches the template, with their labels."""
 
 RESULT_COLORS = {
     "class:confidence": "confidence",
     "field:distance": "distance",
     "class:guarded": "guarded",
 }
-"""Scalar views of how a rig was found."""
+"""Scalar quantities that show how the weights of a result were found, with their labels."""
 
 TARGET = "target"
-"""The version that is the mesh as it was, beside those of the methods."""
+"""Key of the original mesh among the versions; the others are named after methods."""
 
 
 def compare(first: Result, second: Result) -> Comparison:
-    """Return how far the weights of two results for one target are apart."""
+    """Return the differences between the weights of two results for one target."""
     one, other = first.rigged.figure.skin, second.rigged.figure.skin
     assert one is not None and other is not None  # both are rigged
     joints = np.arange(one.n_joints, dtype=np.int32)
@@ -73,7 +74,7 @@ def compare(first: Result, second: Result) -> Comparison:
 
 
 def _dominant(skin: Skin) -> Ints:
-    """Return each vertex's strongest joint, -1 for those without influences: (V,)."""
+    """Return each vertex's dominant joint, -1 for those without influences: (V,)."""
     order = np.lexsort((-skin.joints, skin.weights, owners(skin)))
     last = np.cumsum(np.diff(skin.starts)) - 1
     has_some = np.diff(skin.starts) > 0
@@ -83,7 +84,7 @@ def _dominant(skin: Skin) -> Ints:
 
 
 def put_results(state: AppState, results: list[Result], comparison: Comparison | None) -> None:
-    """Put rigged meshes into the scene: the first is seen in place of the target."""
+    """Add rigged meshes to the scene, and show the first in place of the target."""
     view, actors = state.of(Rigging), state.scene.actors
     target = results[0].target
     if not any(actor is target for actor in actors):
@@ -98,7 +99,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
         if row >= 0:
             actors[row] = result.actor
         elif not any(_row(actors, one.actor) >= 0 for one in view.results.values()):
-            # The target goes to the end, so that nobody else gets another number.
+            # The target moves to the end, so that the other actors keep their numbers.
             actors[_row(actors, target)] = result.actor
             actors.append(target)
         else:
@@ -112,17 +113,17 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
     ):
         state.choose_actor(_row(actors, results[0].actor))
     if state.options.scalar in MATCH_COLORS:
-        show_colors(state, "")  # those numbers were the target's
+        show_colors(state, "")  # only the target has these quantities
     state.say_status(f"Rigged: {printable(target.name, 60)}; A shows the original mesh")
 
 
 def _row(actors: list[Actor], actor: Actor) -> int:
-    """Return an actor's index, -1 if it is not there."""
+    """Return an actor's index, -1 if it is not in the list."""
     return next((row for row, one in enumerate(actors) if one is actor), -1)
 
 
 def versions(state: AppState) -> dict[str, Actor]:
-    """Return what A/B goes through: the target and its results that are in the scene."""
+    """Return the versions that A cycles through: the target and its results in the scene."""
     view, actors = state.of(Rigging), state.scene.actors
     if view.target is None:
         return {}
@@ -131,25 +132,25 @@ def versions(state: AppState) -> dict[str, Actor]:
 
 
 def shown_version(state: AppState) -> str:
-    """Return the one that is seen; empty if none is."""
+    """Return the key of the visible version; empty if none is visible."""
     return next((name for name, actor in versions(state).items() if actor.visible), "")
 
 
 def shown_result(state: AppState) -> Result | None:
-    """Return the result that is seen, else the last one that is in the scene."""
+    """Return the visible result, or else the last one in the scene."""
     known = versions(state)
-    there = [one for name, one in state.of(Rigging).results.items() if name in known]
-    seen = [one for one in there if one.actor.visible]
-    return (seen or there)[-1] if there else None
+    present = [one for name, one in state.of(Rigging).results.items() if name in known]
+    visible = [one for one in present if one.actor.visible]
+    return (visible or present)[-1] if present else None
 
 
 def no_other_version(state: AppState) -> str:
-    """Say why A/B has nothing to switch to."""
+    """Return why there is no other version to switch to."""
     return "" if len(versions(state)) > 1 else "nothing is rigged yet: press Run"
 
 
 def switch_version(state: AppState) -> None:
-    """Show the next of the target and its results, in the same place."""
+    """Show the next version, the target or one of its results, in place of the current one."""
     known = list(versions(state))
     if len(known) < 2:
         state.say_status("A/B: nothing is rigged yet, see Window > Rig")
@@ -160,8 +161,8 @@ def switch_version(state: AppState) -> None:
 
 
 def show_version(state: AppState, name: str) -> None:
-    """Show one of ``versions``; that is no step of undoing."""
-    # What else was changed in this frame keeps its own step.
+    """Show one of ``versions``, without a step to undo."""
+    # Other changes in this frame keep their own undo step.
     state.history.observe(state.scene, state.options, busy=False)
     _look(state, name)
     state.history.accept(state.scene, state.options)
@@ -179,21 +180,21 @@ def _look(state: AppState, name: str) -> None:
 
 
 def show_match(
-    state: AppState, actor: Actor, fields: tuple[VertexField, ...], share: float
+    state: AppState, actor: Actor, fields: tuple[VertexField, ...], fraction: float
 ) -> None:
-    """Colour the target by where it meets the template."""
+    """Colour the target by its match with the template."""
     rigging = state.of(Rigging)
     names = {field.name for field in fields}
     kept = tuple(field for field in actor.figure.fields if field.name not in names)
     actor.figure = replace(actor.figure, fields=(*fields, *kept))
-    rigging.match_share, rigging.ghost = share, ""
+    rigging.match_fraction, rigging.ghost = fraction, ""
     if not actor.visible:
         _look(state, TARGET)
     show_colors(state, "class:match")
 
 
 def show_colors(state: AppState, view: str) -> None:
-    """Show a scalar view, or plain surfaces if its name is empty."""
+    """Show a scalar quantity, or plain shading if its name is empty."""
     options = state.options
     if view:
         options.shading, options.scalar, options.scalar_range = "scalar", view, None
@@ -202,21 +203,21 @@ def show_colors(state: AppState, view: str) -> None:
 
 
 def plays_motion(result: Result) -> bool:
-    """Return whether a result moves as its template does."""
+    """Return whether a result plays the motion of its template."""
     return result.actor.clip is not None
 
 
 def no_motion_of(result: Result | None) -> str:
-    """Say why a result cannot move as its template does."""
+    """Return why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
     if isinstance(result.template.clip, Clip | SampledClip):
         return ""
-    return "the template has no motion: give it one before running"
+    return "the template has no motion: it needs one before Run"
 
 
 def set_motion(state: AppState, result: Result, plays: bool) -> None:
-    """Let a result move as its template where the target stands, or pose it as the target."""
+    """Play the template's motion at the target's position, or pose the result like the target."""
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
     place = target_place(result.target)
     if not plays or not isinstance(clip, Clip | SampledClip):
@@ -228,27 +229,27 @@ def set_motion(state: AppState, result: Result, plays: bool) -> None:
     except RigError as problem:
         state.error = str(problem)
         return
-    # The clip sets what the template's does; how the target was turned is no part of it.
+    # The clip sets the same DOFs as the template's; the target's rotation is not part of it.
     actor.pose = figure_pose(rigged.figure)
     actor.offset = result.template.actor.offset if result.template.actor else 0.0
-    actor.placement = place @ _stand(result)
+    actor.placement = place @ _template_space(result)
 
 
-def _stand(result: Result) -> Floats:
-    """Return where the template's space lies in the target's frame, without its scale: (4, 4)."""
+def _template_space(result: Result) -> Floats:
+    """Return the matrix from the template's space to the target's, without scale: (4, 4)."""
     alignment = result.rigged.alignment
     if alignment is None:
         return result.rigged.placement
-    stand = np.eye(4)
-    stand[:3, :3], stand[:3, 3] = alignment.similarity.rotation, alignment.similarity.shift
-    return stand
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = alignment.similarity.rotation, alignment.similarity.shift
+    return matrix
 
 
 def save_rigged(state: AppState, result: Result, path: Path) -> None:
-    """Write a result beside the frame loop, all of its files or none."""
+    """Write a result in the background, all of its files or none."""
     try:
         files = files_of(path)
-        # The dialog has asked what becomes of files that are there.
+        # The dialog has already asked whether to replace existing files.
         check_targets(files, [*state.inputs, *result.template.paths], force=True)
     except ViewerError as problem:
         state.error = str(problem)

@@ -1,4 +1,4 @@
-"""The part of the Rig panel about what rigging gave."""
+"""Section of the Rig panel with the results of rigging."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from viewer.app.rigging.results import (
 )
 from viewer.app.rigging.sources import no_results
 from viewer.app.rigging.state import Result, Rigging
-from viewer.errors import printable
 from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of
 from viewer.formats import file_stem
+from viewer.phrases import printable
 
 __all__ = ["draw_results"]
 
 _WARNING = (1.0, 0.77, 0.30, 1.0)
-_LINES_HEIGHT = 9.0  # lines of the report that are seen at once
+_LINES_HEIGHT = 9.0  # visible lines of the report
 
 
 def draw_results(state: AppState) -> None:
-    """Draw what is seen, how sure it is, the numbers of both methods, and the report."""
+    """Draw the choice of version and colours, the statistics of each method, and the report."""
     why, result = no_results(state), shown_result(state)
     if why or result is None:
         imgui.text_wrapped("The rig was undone; Ctrl+Shift+Z restores it.")
@@ -48,7 +48,7 @@ def draw_results(state: AppState) -> None:
     still = no_motion_of(result)
     plays = checkbox(state, "Move like the template", moves, still)
     if not still:
-        explain("its motion, at the target's place")
+        explain("play the template's motion at the target's position")
     if plays != moves:
         set_motion(state, result, plays)
     _draw_table(state)
@@ -87,7 +87,7 @@ def _draw_colors(state: AppState) -> None:
 
 
 def _draw_table(state: AppState) -> None:
-    """Draw the numbers of each method side by side."""
+    """Draw the statistics of the methods side by side."""
     view, known = state.of(Rigging), versions(state)
     found = [one for name, one in view.results.items() if name in known]
     if not imgui.begin_table("methods", 1 + len(found), imgui.TableFlags_.sizing_stretch_same):
@@ -96,7 +96,7 @@ def _draw_table(state: AppState) -> None:
     _row("", "", [one.method for one in found])
     _row(
         "matched",
-        "vertices with the weights of the template's surface under them",
+        "vertices with weights taken from the closest points of the template",
         [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
     )
     _row(
@@ -117,7 +117,7 @@ def _draw_table(state: AppState) -> None:
     imgui.end_table()
     if view.comparison is not None and len(found) > 1:
         text = (
-            f"weights differ by {view.comparison.weights:.3f} (mean L1), same strongest joint at "
+            f"weights differ by {view.comparison.weights:.3f} (mean L1), same dominant joint at "
             f"{100.0 * view.comparison.dominant:.1f} % of the vertices"
         )
         imgui.text_wrapped(text)
@@ -132,7 +132,7 @@ def _row(title: str, meaning: str, cells: list[str]) -> None:
 
 
 def _draw_lines(state: AppState, result: Result) -> None:
-    """Draw the report, warnings in their colour."""
+    """Draw the report, with warnings highlighted."""
     height = _LINES_HEIGHT * imgui.get_text_line_height_with_spacing()
     if imgui.begin_child("report", (0.0, height), imgui.ChildFlags_.borders):
         for line in result.rigged.lines:
@@ -160,5 +160,5 @@ def _ask_where(state: AppState, result: Result) -> None:
 
 
 def _written(path: Path) -> list[Path]:
-    """Return all files that a name stands for; one with another suffix is refused afterwards."""
+    """Return all files written for a name; other suffixes are rejected when it is saved."""
     return files_of(path) if path.suffix.lower() in RIGGED_SUFFIXES else [path]

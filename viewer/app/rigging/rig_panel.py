@@ -1,4 +1,4 @@
-"""Rig: a mesh without a rig gets that of a template: choose, align, match, run, compare, save."""
+"""Rig panel: choice of target and template, alignment, matching, rigging, and results."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ from viewer.app.rigging.sources import (
 from viewer.app.rigging.state import RigChoices, Rigging, Template
 from viewer.app.rigging.work import start_adding, start_match, start_reading, start_run
 from viewer.autorig.settings import JOINTS, METHODS
-from viewer.errors import printable
 from viewer.formats import MESHES
+from viewer.phrases import printable
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Actor, actor_points, free_title
 
 __all__ = ["draw"]
 
-_MOST_ROUNDS, _MOST_INFLUENCES = 50, 16
-_NEAREST_WHY = "the method nearest has no such option"
+_MOST_ITERATIONS, _MOST_INFLUENCES = 50, 16
+_NEAREST_WHY = 'the method "nearest" has no such option'
 _ADVANCED = ("refines", "joints", "smoothing", "max_influences", "correctives")
-_GAP = 1.2  # of the template's width, between it and the target
+_GAP = 1.2  # distance of the template from other actors, relative to its width
 
 
 def draw(state: AppState) -> None:
@@ -62,14 +62,14 @@ def draw(state: AppState) -> None:
     with disabled(why):
         if _section("Align", "align the template with the target"):
             draw_alignment(state)
-        if _section("Match", "which vertices take the template's weights unchanged"):
+        if _section("Match", "conditions for taking the template's weights unchanged"):
             _draw_match(state)
-        if _section("Rig", "weights, joints and the rest pose"):
+        if _section("Rig", "transfer of weights, joints and rest pose"):
             _draw_run(state)
     if not rigging.results:
         return
     if rigging.scrolls:
-        # Its height counts from the second frame on.
+        # The height of the section is known from the second frame on.
         rigging.scrolls -= 1
         imgui.set_scroll_here_y(0.0)
     if _section("Result", "the rigged mesh, in place of the target"):
@@ -85,7 +85,7 @@ def _section(title: str, text: str) -> bool:
 
 
 def _draw_sources(state: AppState) -> None:
-    """Draw what is rigged, and from what."""
+    """Draw the choice of target and template."""
     view, found, why = state.of(Rigging), targets(state), no_job_room(state)
     names = {str(row): printable(actor.name, 60) for row, actor in enumerate(found)}
     rows = [str(row) for row, actor in enumerate(found) if actor is view.target]
@@ -106,7 +106,7 @@ def _draw_sources(state: AppState) -> None:
     if not why:
         explain("any figure that opens: a body model, .npz, or .skel and .skin together")
     template = current_template(state)
-    # A template that was not read yet has the same controls: nothing moves away from the pointer.
+    # A template that has not been read yet has the same controls, so that buttons do not move.
     if template is None or template.actor is None:
         same_line_if_room("Pose it…")
         refuses = no_target(state) or why
@@ -116,16 +116,16 @@ def _draw_sources(state: AppState) -> None:
             else:
                 _add_template(state)
         if not refuses:
-            explain("adds the template beside the target, to pose it like the target")
+            explain("add the template beside the target, to pose it like the target")
     imgui.push_text_wrap_pos(0.0)
     imgui.text_disabled(_template_text(template))
     imgui.pop_text_wrap_pos()
 
 
 def _template_text(template: Template | None) -> str:
-    """Say what the template is."""
+    """Return a description of the template."""
     if template is None:
-        return "read when it is needed"
+        return "read on first use"
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
     assert skeleton is not None and mesh is not None  # it is attached
     pose = "in its current pose" if template.actor is not None else "in its file's pose"
@@ -147,7 +147,7 @@ def _read_template(state: AppState, paths: list[Path]) -> None:
 
 
 def _add_template(state: AppState) -> None:
-    """Put the template into the scene, to the right of what is there."""
+    """Add the template to the scene, to the right of the other actors."""
     template = current_template(state)
     assert template is not None  # it was read
     actor = Actor(template.figure, template.pose.copy(), template.clip)
@@ -164,14 +164,14 @@ def _add_template(state: AppState) -> None:
 
 
 def _draw_match(state: AppState) -> None:
-    """Draw when a vertex matches, and what that gives."""
+    """Draw the conditions for a match, and the fraction of vertices that match."""
     view = state.of(Rigging)
     choices = view.choices
     why = _NEAREST_WHY if choices.method == "nearest" else ""
     with disabled(why):
         percent = 100.0 * choices.max_distance
         moved = slider(state, "Max. distance", percent, 0.1, 30.0, "%.1f %%")
-        explain("between the surfaces, of the target's size", why)
+        explain("between the surfaces, relative to the target's size", why)
         choices.max_distance = min(max(moved, 0.0), 1000.0) / 100.0
         moved = slider(state, "Max. angle", choices.max_angle, 0.0, 180.0, "%.0f\N{DEGREE SIGN}")
         explain("between the surfaces' normals", why)
@@ -179,10 +179,10 @@ def _draw_match(state: AppState) -> None:
     why = no_job_room(state) or ("" if placing_now(state) else "align the template first")
     if button(state, "Show match", why):
         start_match(state)
-    if view.match_share is None:
+    if view.match_fraction is None:
         return
     same_line_if_room("100.0 % of the vertices match")
-    imgui.text_unformatted(f"{100.0 * view.match_share:.1f} % of the vertices match")
+    imgui.text_unformatted(f"{100.0 * view.match_fraction:.1f} % of the vertices match")
     _draw_colors(state, MATCH_COLORS, "Colours")
 
 
@@ -195,7 +195,7 @@ def _draw_colors(state: AppState, views: dict[str, str], label: str) -> None:
 
 
 def _draw_run(state: AppState) -> None:
-    """Draw how the rig is carried over, and the buttons that do it."""
+    """Draw the settings of the transfer, and the buttons that start it."""
     choices = state.of(Rigging).choices
     choices.method = choice(state, "Method", choices.method, {name: name for name in METHODS})
     explain(METHODS[choices.method])
@@ -204,16 +204,16 @@ def _draw_run(state: AppState) -> None:
     if button(state, "Run", why):
         start_run(state, (choices.method,))
     if not why:
-        explain("the template is aligned first if it is not aligned yet")
+        explain("rig the target; aligns the template first if necessary")
     same_line_if_room("Compare methods")
     if button(state, "Compare methods", why):
         start_run(state, tuple(METHODS))
     if not why:
-        explain("runs both; A cycles through the original mesh and both results")
+        explain("run both methods; A cycles through the original mesh and both results")
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
-    """Draw what is seldom asked for, folded away; what was changed there is counted."""
+    """Draw the rarely used settings, collapsed; the label counts those that were changed."""
     usual = RigChoices()
     changed = sum(getattr(choices, name) != getattr(usual, name) for name in _ADVANCED)
     text = f"Advanced ({changed} changed)" if changed else "Advanced"
@@ -232,16 +232,16 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         explain("refine the result of the search or the landmarks by closest points", why)
         choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
         explain("carried: move with the surface around them; copied: with the alignment only", why)
-        changed, rounds = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ROUNDS)
+        changed, count = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ITERATIONS)
         note_item(state, "Smoothing")
         explain("smoothing iterations for inpainted weights", why)
-        choices.smoothing = min(max(rounds, 0), 1000) if changed else choices.smoothing
+        choices.smoothing = min(max(count, 0), 1000) if changed else choices.smoothing
         text = "%d" if choices.max_influences else "all"
         changed, most = imgui.slider_int(
             "Max. influences", choices.max_influences, 0, _MOST_INFLUENCES, text
         )
         note_item(state, "Max. influences")
-        explain("per vertex, the largest; 0 keeps all", why)
+        explain("largest influences to keep per vertex; 0 keeps all", why)
         choices.max_influences = max(most, 0) if changed else choices.max_influences
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
-        explain("transfer those of the template, if any", why)
+        explain("transfer the template's pose correctives, if any", why)

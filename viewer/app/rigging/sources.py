@@ -1,4 +1,4 @@
-"""Targets and templates of the Rig panel, and the reasons why there is none."""
+"""Targets and templates of the Rig panel, and reasons why they are missing."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from pathlib import Path
 
 from viewer.app.core.state import AppState
 from viewer.app.rigging.state import Rigging, Template
-from viewer.errors import RigError, one_of, printable
+from viewer.errors import RigError
 from viewer.formats import MESHES
 from viewer.loading import bundled_body, bundled_files, load
+from viewer.phrases import one_of, printable
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 
@@ -48,7 +49,7 @@ def templates(state: AppState) -> list[Actor]:
 
 
 def refresh(state: AppState) -> None:
-    """Forget what belongs to another scene, and choose what is there; to be called each frame."""
+    """Drop state of another scene, and choose a target and a template; called in each frame."""
     view = state.of(Rigging)
     if view.scene is not state.scene:
         view = state.put(Rigging(scene=state.scene, choices=view.choices))
@@ -62,24 +63,24 @@ def refresh(state: AppState) -> None:
 
 
 def target_mesh(state: AppState) -> Mesh:
-    """Return the mesh that is to be rigged; there must be a target."""
+    """Return the mesh of the target, which must exist."""
     target = state.of(Rigging).target
-    assert target is not None and target.figure.mesh is not None  # it was chosen for it
+    assert target is not None and target.figure.mesh is not None  # targets have meshes
     return target.figure.mesh
 
 
 def choose_target(state: AppState, target: Actor | None) -> None:
-    """Take another mesh to rig; what was found for the one before means nothing to it."""
+    """Choose the mesh to rig, and drop the placement and results of the previous one."""
     view = state.of(Rigging)
     if target is not view.target:
-        view.target, view.placing, view.match_share = target, None, None
+        view.target, view.placing, view.match_fraction = target, None, None
         view.landmarks, view.pending, view.tool = [], None, ""
-        if target is not None:  # an undone run keeps its results: it may be redone
+        if target is not None:  # an undone run keeps its results, because it may be redone
             view.results, view.comparison = {}, None
 
 
 def template_texts(state: AppState) -> dict[str, str]:
-    """Return the entries of the list of templates: keys and names."""
+    """Return the entries of the list of templates: keys and labels."""
     texts = {_actor_key(actor): printable(actor.name, 60) for actor in templates(state)}
     texts |= _BUNDLED
     read = state.of(Rigging).template
@@ -93,7 +94,7 @@ def _actor_key(actor: Actor) -> str:
 
 
 def choose_template(state: AppState, key: str) -> None:
-    """Take another template, a key of ``template_texts``."""
+    """Choose a template, a key of ``template_texts``."""
     view = state.of(Rigging)
     if key != view.template_key:
         view.template_key, view.placing = key, None
@@ -101,7 +102,7 @@ def choose_template(state: AppState, key: str) -> None:
 
 
 def current_template(state: AppState) -> Template | None:
-    """Return the chosen template as it is now; None if it is still to be read."""
+    """Return the chosen template in its current pose; None if it has not been read yet."""
     view = state.of(Rigging)
     for actor in templates(state):
         if _actor_key(actor) == view.template_key and actor.pose is not None:
@@ -121,7 +122,7 @@ def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
     Raises
     ------
     ViewerError
-        If a file cannot be read, or holds no rigged mesh.
+        If a file cannot be read, or contains no rigged mesh.
     """
     scene = load(*paths)
     attached = [actor for actor in scene.actors if actor.figure.is_attached]
@@ -134,14 +135,14 @@ def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
 
 
 def no_target(state: AppState) -> str:
-    """Say why there is nothing to rig."""
+    """Return why there is nothing to rig."""
     if state.of(Rigging).target is not None:
         return ""
-    return f"every mesh in the scene has a rig: add one without, an {one_of(MESHES)}"
+    return f"every mesh in the scene has a rig: add a mesh without one, {one_of(MESHES)}"
 
 
 def no_results(state: AppState) -> str:
-    """Say why there is no rigged mesh to look at."""
+    """Return why there is no rigged mesh to show."""
     there = {id(actor) for actor in state.scene.actors}
     if any(id(result.actor) in there for result in state.of(Rigging).results.values()):
         return ""

@@ -41,30 +41,30 @@ TOOLS = {
     "scale": ("Scale", "drag the ring out or in to scale the template uniformly"),
     "landmarks": ("Landmarks", "click a point of the template, then the same point of the target"),
 }
-"""Ways to lay the template onto the target by hand: name and what the mouse does."""
+"""Tools to align the template with the target by hand: label and tooltip."""
 
 GHOSTS = {"": "hidden", "translucent": "translucent", "wireframe": "wireframe", "solid": "solid"}
-"""Ways to show the template where it lies."""
+"""Styles in which the template is drawn, with their labels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """A rigged figure whose rig is carried over.
+    """A rigged figure whose rig is transferred.
 
     Attributes
     ----------
     key : str
-        Of the list of templates.
+        Key in the list of templates.
     figure : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     pose : Pose
-        Its own; of an actor of the scene the actor's present one counts.
+        Pose of the figure; for an actor of the scene its current pose.
     clip : Motion or None
-        Its motion.
+        Motion of the figure.
     actor : Actor or None
-        That of the scene; None if it was read from files for this.
+        Actor of the scene; None if the template was read from files.
     paths : tuple of Path
-        Those files; empty for an actor.
+        These files; empty for an actor.
     """
 
     key: str
@@ -77,24 +77,24 @@ class Template:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placing:
-    """Where the posed template lies in the target's frame.
+    """Placement of the posed template in the target's frame.
 
     Attributes
     ----------
     similarity : Similarity
-        Template to target.
+        Transform from template to target.
     alignment : Alignment or None
-        With its errors; None until those are measured.
+        Alignment with its errors; None until they have been measured.
     settings : AlignmentSettings
-        How to come there again.
+        Settings that reproduce the placement.
     fitted : Template or None
-        The template with its joints turned and its limbs resized; None where it fits as it is.
+        The template with rotated joints and resized limbs; None if it fits unchanged.
     lines : tuple of Diagnostic
-        What was done to it.
+        Messages about the fit.
     meshes : tuple of object
-        The target's mesh and the template's figure: for others it means nothing.
+        Target mesh and template figure for which the placement is valid.
     pose : tuple
-        Key of the template's pose that it was found for.
+        Key of the template's pose for which it was found.
     """
 
     similarity: Similarity
@@ -108,7 +108,7 @@ class Placing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Landmark:
-    """The same point on both surfaces."""
+    """A pair of corresponding points on both surfaces."""
 
     template: RayHit
     target: RayHit
@@ -123,13 +123,13 @@ class Result:
     method : str
         A key of ``METHODS``.
     rigged : Rigged
-        What the transfer made.
+        Result of the transfer.
     actor : Actor
-        The one that shows it.
+        Actor that shows the rigged figure.
     target : Actor
-        The one that was rigged.
+        Actor whose mesh was rigged.
     template : Template
-        Whose rig it has.
+        Template whose rig was transferred.
     """
 
     method: str
@@ -141,14 +141,14 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How far two results for one target are apart.
+    """Differences between two results for one target.
 
     Attributes
     ----------
     weights : float
-        Mean over vertices of sum_j |w - w'|; 2 if all weight is elsewhere.
+        Mean over vertices of sum_j |w - w'|; 2 if no vertex has a joint in common.
     dominant : float
-        Share of vertices with the same strongest joint.
+        Fraction of vertices with the same dominant joint.
     """
 
     weights: float
@@ -157,7 +157,7 @@ class Comparison:
 
 @dataclass(slots=True, eq=False)
 class Running:
-    """Work in a thread, which leaves here what is to be done with what it found."""
+    """A job in a thread, and the function that applies its result in the frame loop."""
 
     source: Scene
     job: CountedJob | None = None
@@ -166,30 +166,30 @@ class Running:
 
 @dataclass(slots=True)
 class RigChoices:
-    """What is asked for, as the panel's controls say it.
+    """Settings of the panel's controls.
 
     Attributes
     ----------
     up, facing : str
-        The target's axes; empty to search for them.
+        Up and forward axis of the target; empty to search for them.
     scale : str
         One of ``SCALES``.
     refines : bool
-        Whether closest points improve on landmarks.
+        Whether an alignment is refined by closest points.
     fits : bool
-        Whether the template's joints are turned and its limbs resized where that is needed.
+        Whether the template's joints are rotated and its limbs resized where necessary.
     method, joints : str
         As in ``TransferSettings``.
     max_distance : float
-        Of the target's size.
+        Largest distance of a match, relative to the target's size.
     max_angle : float
-        Degrees.
+        Largest angle between the normals of a match, degrees.
     smoothing : int
-        Rounds.
+        Number of smoothing iterations.
     max_influences : int
-        0 for all.
+        Largest number of influences per vertex; 0 for all.
     correctives : bool
-        Whether pose correctives are carried.
+        Whether pose correctives are transferred.
     """
 
     up: str = ""
@@ -208,22 +208,22 @@ class RigChoices:
 
 @dataclass(slots=True)
 class Rigging:
-    """The Rig panel's own state.
+    """State of the Rig panel.
 
     Attributes
     ----------
     scene : Scene or None
-        The one that all of this is about.
+        Scene for which the state is valid.
     target : Actor or None
-        The mesh that is to be rigged.
+        Actor whose mesh is to be rigged.
     template_key : str
-        The entry of the list of templates that is chosen.
+        Chosen entry in the list of templates.
     template : Template or None
-        What was read for it; of actors it is made anew each time.
+        Template that was read from files; one of an actor is built on each use.
     choices : RigChoices
-        What the controls say.
+        Settings of the controls.
     placing : Placing or None
-        Where the template lies, once it was aligned or moved.
+        Placement of the template; None until it has been aligned or moved.
     ghost : str
         A key of ``GHOSTS``.
     tool : str
@@ -231,30 +231,30 @@ class Rigging:
     holds_mouse : bool
         Whether the pointer is on a handle of the gizmo, or holds one.
     scaling : (float, float) or None
-        While the ring that scales is held: how far from the middle it was taken, and the
-        template's scale then.
+        While the scaling ring is dragged: the pointer's distance from the centre and the
+        template's scale at the start of the drag.
     was_dragged : bool
         Whether the gizmo has moved the template since its error was measured.
     landmarks : list of Landmark
         Pairs that were clicked.
     pending : RayHit or None
-        The template's point of the pair that lacks the target's.
+        Point of the template whose partner on the target is still to be clicked.
     aside : (3,)
-        By how much the template is shown beside the target while landmarks are clicked.
-    match_share : float or None
-        Share of matched vertices that the target's colours show.
+        Offset of the template from the target while landmarks are clicked.
+    match_fraction : float or None
+        Fraction of matched vertices that the target's colours show.
     running : Running or None
-        The work that goes on.
+        Job that is running.
     results : dict of str to Result
-        The last one of each method, all for one target.
+        Latest result of each method, all for one target.
     comparison : Comparison or None
-        Of both methods' results.
+        Comparison of the results of both methods.
     scrolls : int
-        Frames for which the panel still brings the result into view.
+        Number of frames in which the panel still scrolls to the result.
     ghost_key, ghost_figure : object, Figure or None
-        The posed template as a mesh, and what it was posed for.
+        Key of the template's pose, and its mesh in that pose.
     shown : Ghost or None
-        What is drawn over the scene; the same object as long as it looks the same.
+        Template that is drawn over the scene; the same object as long as it looks the same.
     """
 
     scene: Scene | None = None
@@ -271,7 +271,7 @@ class Rigging:
     landmarks: list[Landmark] = field(default_factory=list)
     pending: RayHit | None = None
     aside: Floats = field(default_factory=lambda: np.zeros(3))
-    match_share: float | None = None
+    match_fraction: float | None = None
     running: Running | None = None
     results: dict[str, Result] = field(default_factory=dict)
     comparison: Comparison | None = None
@@ -285,5 +285,5 @@ class Rigging:
         return self.placing
 
     def restore(self, kept: object | None) -> None:
-        """Put the template where it was."""
+        """Restore the template's placement."""
         self.placing = kept if isinstance(kept, Placing) else None

@@ -1,4 +1,4 @@
-"""Computations of the Rig panel's threads: figures and numbers, no state of the window."""
+"""Computations of the Rig panel's jobs, independent of the state of the window."""
 
 from __future__ import annotations
 
@@ -24,9 +24,15 @@ from viewer.rig.pose import pose_key
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
 
-__all__ = ["align_template", "match_fields", "match_settings", "retold", "transfer_settings"]
+__all__ = [
+    "align_template",
+    "match_fields",
+    "match_settings",
+    "transfer_settings",
+    "with_known_method",
+]
 
-_Tell = Callable[[float, str], None]
+_Progress = Callable[[float, str], None]
 
 
 def align_template(
@@ -35,24 +41,24 @@ def align_template(
     target: Mesh,
     settings: AlignmentSettings,
     fits: bool,
-    tell: _Tell,
+    progress: _Progress,
 ) -> Placing:
-    """Lay a template onto a target.
+    """Align a template with a target.
 
     Parameters
     ----------
     template : Template
-        In the pose to begin with.
+        Template in its initial pose.
     own : Template
-        In the pose that is its own.
+        Template before any fit.
     target : Mesh
-        What it is laid onto.
+        Mesh to align it with.
     settings : AlignmentSettings
-        How.
+        Settings of the alignment.
     fits : bool
-        Whether its joints may be turned and its limbs resized.
-    tell : callable
-        Told the share that is done, and what is being done; may raise to cancel.
+        Whether its joints may be rotated and its limbs resized.
+    progress : callable
+        Called with the fraction done and the name of the current step; may raise to cancel.
 
     Raises
     ------
@@ -60,9 +66,9 @@ def align_template(
         As ``align``.
     """
     plain = template.pose.copy()
-    plain.shape_weights = np.zeros(0)  # the shape is the mesh's own from here on
+    plain.shape_weights = np.zeros(0)  # the shape is part of the figure from here on
     figure = shaped(template.figure, template.pose.shape_weights)
-    found = align_posed(figure, plain, target, settings, fits, tell)
+    found = align_posed(figure, plain, target, settings, fits, progress)
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
     is_fitted = is_other or bool(found.lines)
     return Placing(
@@ -76,49 +82,49 @@ def align_template(
     )
 
 
-def retold(rigged: Rigged, placing: Placing | None) -> Rigged:
-    """Let a report say how its alignment was found: the transfer only knows where it was given.
+def with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
+    """Return a result whose report has the method of its alignment, which the transfer was given.
 
     Parameters
     ----------
     rigged : Rigged
-        What the transfer made.
+        Result of the transfer.
     placing : Placing or None
-        Where it was told that the template lies; None if it was told nothing.
+        Placement that the transfer was given; None if it was given none.
     """
     known = placing.alignment if placing is not None else None
     if placing is None or known is None or rigged.alignment is None:
         return rigged
     if rigged.alignment.how != "given":
-        return rigged  # it was found anew
-    told = replace(rigged.alignment, how=known.how)
+        return rigged  # the transfer has aligned the template itself
+    known_alignment = replace(rigged.alignment, how=known.how)
     rest = rigged.lines[len(alignment_lines(rigged.alignment)) :]
-    lines = (*alignment_lines(told), *placing.lines, *rest)
-    return replace(rigged, alignment=told, lines=lines)
+    lines = (*alignment_lines(known_alignment), *placing.lines, *rest)
+    return replace(rigged, alignment=known_alignment, lines=lines)
 
 
 def match_fields(
     template: Template, similarity: Similarity, mesh: Mesh, settings: MatchSettings
 ) -> tuple[tuple[VertexField, ...], float]:
-    """Return where a target meets a template that lies on it.
+    """Return which vertices of a target match an aligned template.
 
     Parameters
     ----------
     template : Template
-        As it is posed there.
+        Template as it is posed.
     similarity : Similarity
-        Template to target.
+        Transform from template to target.
     mesh : Mesh
-        The target.
+        Mesh of the target.
     settings : MatchSettings
-        When a vertex matches.
+        Conditions for a match.
 
     Returns
     -------
     fields : tuple of VertexField
         Matched or not, distance, and angle in degrees, of each vertex.
-    share : float
-        Of the vertices that match.
+    fraction : float
+        Fraction of the vertices that match.
     """
     assert template.figure.mesh is not None  # it is attached
     posed = similarity.apply(deform(template.figure, template.pose)[0])
@@ -128,7 +134,7 @@ def match_fields(
     found = match(surface, welded, size, settings)
     matched, rows = found.matched[welded.vertices], welded.vertices
     distances, angles = found.points.distances[rows], np.degrees(found.angles[rows])
-    # In the order of CONFIDENCE, so that both maps have one colour for what is matched.
+    # In the order of CONFIDENCE, so that matched vertices have the same colour in both maps.
     classes = ("matched", "unmatched")
     fields = (
         VertexField("match", "Match with the template", (~matched).astype(float), names=classes),
@@ -139,7 +145,7 @@ def match_fields(
 
 
 def match_settings(choices: RigChoices) -> MatchSettings:
-    """Return when a vertex matches, as the panel says."""
+    """Return the conditions for a match that are set in the panel."""
     angle, usual = math.radians(choices.max_angle), MatchSettings()
     return MatchSettings(
         max_distance=choices.max_distance, max_angle=angle, near_angle=max(angle, usual.near_angle)
@@ -149,16 +155,16 @@ def match_settings(choices: RigChoices) -> MatchSettings:
 def transfer_settings(
     choices: RigChoices, method: str, placing: Placing | None
 ) -> TransferSettings:
-    """Return how a rig is carried over from a template that lies where it was laid.
+    """Return the settings to transfer the rig of a template from its current placement.
 
     Parameters
     ----------
     choices : RigChoices
-        What the panel says.
+        Settings of the panel.
     method : str
         A key of ``METHODS``.
     placing : Placing or None
-        Where the template lies; None for a method that does not ask.
+        Placement of the template; None for a method that needs none.
     """
     alignment = AlignmentSettings()
     if placing is not None:
@@ -172,6 +178,6 @@ def transfer_settings(
             max_influences=choices.max_influences or None,
         ),
         joints=choices.joints,
-        fits=False,  # it was fitted when it was laid there
+        fits=False,  # it was fitted during the alignment
         correctives=choices.correctives,
     )

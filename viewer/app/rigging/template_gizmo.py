@@ -1,7 +1,7 @@
-"""The gizmo that moves the template over the target: ImGuizmo's, and a ring of our own.
+"""Gizmo that moves the template over the target: that of ImGuizmo, and our own ring for scaling.
 
-ImGuizmo turns and moves a matrix. It counts in float32: what it gives is made a similarity again.
-Its handles for scaling cannot be taken hold of from far away, so for that there is a plain ring.
+ImGuizmo rotates and translates a matrix in float32, so its results are projected back to
+similarities. Its scale handles cannot be grabbed from a distance, so a plain ring replaces them.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from viewer.rig.mesh import bounding_box
 __all__ = ["RADIUS", "use_gizmo"]
 
 RADIUS = 80.0
-"""Of the ring that scales, window coordinates."""
+"""Radius of the scaling ring, window coordinates."""
 
 _G = imguizmo.im_guizmo
 _OPERATIONS = {"move": _G.OPERATION.translate, "rotate": _G.OPERATION.rotate}
-_SIZE = 0.22  # of the gizmo, in clip space
-_FAR = 50.0  # half heights of the view, from where a parallel one is looked at
-_REACH = 8.0  # window coordinates around the ring in which it is taken
-_LEAST = 0.02  # of a scale: the pointer on the middle must not make the template vanish
+_SIZE = 0.22  # size of the gizmo, in clip space
+_FAR = 50.0  # distance of the eye that replaces a parallel projection, in half heights of the view
+_REACH = 8.0  # window coordinates around the ring within which it is grabbed
+_LEAST = 0.02  # smallest factor: a pointer at the centre must not make the template vanish
 _INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 
 
 def use_gizmo(state: AppState, template: Template) -> None:
-    """Draw the handles in the middle of the template, and take over what they did.
+    """Draw the handles at the centre of the template, and apply their movement.
 
     Parameters
     ----------
     state : AppState
-        With a target, and a tool other than landmarks.
+        Holds a target, and a tool other than landmarks.
     template : Template
-        As it is now.
+        Template in its current pose.
     """
     view = state.of(Rigging)
-    assert view.target is not None  # the caller looked
+    assert view.target is not None  # checked by the caller
     place = target_place(view.target)
     middle = bounding_box(posed_template(view, template).positions).mean(axis=0)
     now = similarity_now(state, template)
@@ -59,19 +59,19 @@ def use_gizmo(state: AppState, template: Template) -> None:
     after = _scaled(state, before) if view.tool == "scale" else _manipulated(state, before)
     if after is not None:
         moved = np.linalg.inv(place) @ after @ translation_matrix(-middle)
-        laid = as_similarity(moved, now)
-        # What is left of a shear must not push the template aside, frame by frame.
-        slip = apply_transform(moved, middle) - laid.apply(middle)
-        move_by_hand(state, template, replace(laid, shift=laid.shift + slip))
+        placed = as_similarity(moved, now)
+        # The residual of a removed shear must not displace the template from frame to frame.
+        slip = apply_transform(moved, middle) - placed.apply(middle)
+        move_by_hand(state, template, replace(placed, shift=placed.shift + slip))
         view.was_dragged = True
 
 
 def _manipulated(state: AppState, before: Floats) -> Floats | None:
-    """Return where ImGuizmo has moved a matrix, None if it stays."""
+    """Return the matrix as moved by ImGuizmo, None if it is unchanged."""
     view = state.of(Rigging)
     size = float(np.cbrt(np.linalg.det(before[:3, :3])))
     rigid = before.copy()
-    rigid[:3, :3] /= size  # the handles' reach must not grow with the template
+    rigid[:3, :3] /= size  # the handles must not grow with the template
     now = _matrix(rigid)
     _G.begin_frame()
     _G.set_drawlist(imgui.get_background_draw_list())
@@ -82,7 +82,7 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
     changed = _G.manipulate(seen, projection, _OPERATIONS[view.tool], _G.MODE.world, now)
     hovers = _G.get_hovered_handle_type() != _G.MOVETYPE.mt_none
     view.holds_mouse = _G.is_using() or (hovers and not imgui.get_io().want_capture_mouse)
-    # It reports a change once more when it was let go of: that would be another step of undoing.
+    # ImGuizmo reports a change once more on release, which would be another undo step.
     if not changed or not imgui.is_mouse_down(imgui.MouseButton_.left):
         return None
     after = np.array(now.values, dtype=np.float64).reshape(4, 4).T
@@ -93,8 +93,9 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
 def _camera_matrices(state: AppState, middle: Floats) -> tuple[Floats, Floats]:
     """Return view and projection for ImGuizmo: (4, 4) both.
 
-    Its rays go astray in parallel projections. A perspective from far away shows what is as deep
-    in the view as the gizmo's middle at the same place, and what is near it almost so.
+    ImGuizmo computes wrong rays for parallel projections. They are replaced by a perspective from
+    far away, which projects points at the depth of the gizmo's centre to the same positions, and
+    points near it almost so.
     """
     camera = state.camera
     view = camera.view_matrix()
@@ -111,12 +112,12 @@ def _camera_matrices(state: AppState, middle: Floats) -> tuple[Floats, Floats]:
 
 
 def _matrix(values: Floats) -> imguizmo.im_guizmo.Matrix16:
-    """Return a matrix as ImGuizmo has them: column by column."""
+    """Return a matrix in ImGuizmo's column-major layout."""
     return _G.Matrix16([float(value) for value in values.T.ravel()])
 
 
 def _scaled(state: AppState, before: Floats) -> Floats | None:
-    """Return a matrix scaled by what the ring around its middle was drawn out; None if it stays."""
+    """Return a matrix scaled by dragging the ring; None if it is unchanged."""
     view, io, frame = state.of(Rigging), imgui.get_io(), view_frame(state)
     center = frame.place(before[:3, 3])
     if center is None:
@@ -141,7 +142,7 @@ def _scaled(state: AppState, before: Floats) -> Floats | None:
 
 
 def _draw_ring(center: tuple[float, float], radius: float, is_hot: bool) -> None:
-    """Draw the ring, and squares that say that it is drawn out or in."""
+    """Draw the ring, with squares that indicate that it can be dragged out or in."""
     ink, color = imgui.get_background_draw_list(), imgui.get_color_u32(_HOT if is_hot else _INK)
     ink.add_circle(center, radius, color, 64, 3.0 if is_hot else 2.0)
     for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):

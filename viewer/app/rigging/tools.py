@@ -1,4 +1,4 @@
-"""The tools that move the template by hand, and what the Rig panel does each frame."""
+"""Tools to move the template by hand, and the update of the Rig panel in each frame."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.posing.state import Posing
 from viewer.app.rigging.landmarks import draw_landmarks, show_both, take_click
-from viewer.app.rigging.placing import ghost_of, laid_template, placing_now
+from viewer.app.rigging.placing import aligned_template, ghost_of, placing_now
 from viewer.app.rigging.sources import refresh
 from viewer.app.rigging.state import TOOLS, Rigging
 from viewer.app.rigging.template_gizmo import use_gizmo
-from viewer.app.rigging.work import start_align, start_reading, take_finished
+from viewer.app.rigging.work import finish_work, start_align, start_reading
 from viewer.rendering.passes.ghost_pass import Ghost
 
 __all__ = ["choose_rig_tool", "draw_rig_tools", "drop_rig_tool", "holds_mouse", "show_rig"]
 
 
 def choose_rig_tool(state: AppState, tool: str) -> None:
-    """Take a way to move the template in hand, a key of ``TOOLS``."""
+    """Choose a tool to move the template, a key of ``TOOLS``."""
     view = state.of(Rigging)
-    if tool and laid_template(state) is None:
+    if tool and aligned_template(state) is None:
         start_reading(state)
         return
     state.of(Posing).tool = "select"
@@ -33,7 +33,7 @@ def choose_rig_tool(state: AppState, tool: str) -> None:
 
 
 def drop_rig_tool(state: AppState) -> bool:
-    """Put the tool, or the half of a pair of landmarks, away; return whether there was one."""
+    """Drop an incomplete pair of landmarks, or else the tool; return whether there was one."""
     view = state.of(Rigging)
     if view.pending is not None:
         view.pending = None
@@ -43,19 +43,19 @@ def drop_rig_tool(state: AppState) -> bool:
 
 
 def holds_mouse(state: AppState) -> bool:
-    """Return whether the mouse belongs to the gizmo: on a handle a drag does not orbit."""
+    """Return whether the gizmo uses the mouse, in which case a drag does not orbit."""
     return state.of(Rigging).holds_mouse
 
 
 def show_rig(state: AppState) -> Ghost | None:
-    """Go on with what the Rig panel began; return the template if it is to be drawn.
+    """Apply finished jobs and clicks of the Rig panel; return the template if it is to be drawn.
 
-    To be called when the scene has been posed, before it is drawn.
+    Called in each frame after the scene is posed and before it is drawn.
     """
     refresh(state)
-    take_finished(state)
+    finish_work(state)
     view = state.of(Rigging)
-    if view.target is None or laid_template(state) is None:
+    if view.target is None or aligned_template(state) is None:
         view.tool = ""
     if not view.tool:
         view.holds_mouse = False
@@ -67,7 +67,7 @@ def show_rig(state: AppState) -> Ghost | None:
 
 
 def _measure(state: AppState) -> None:
-    """Measure how well the template lies once it was let go of."""
+    """Measure the error of the template's placement once its handle is released."""
     view, placing = state.of(Rigging), placing_now(state)
     if not view.was_dragged or imgui.is_mouse_down(imgui.MouseButton_.left):
         return
@@ -79,8 +79,8 @@ def _measure(state: AppState) -> None:
 
 
 def draw_rig_tools(state: AppState) -> None:
-    """Draw the gizmo or the landmarks over the picture of the scene, and drag by the gizmo."""
-    view, template = state.of(Rigging), laid_template(state)
+    """Draw the gizmo or the landmarks over the picture of the scene, and handle drags."""
+    view, template = state.of(Rigging), aligned_template(state)
     x, y, width, height = state.view_rect
     if not view.tool or template is None or view.target is None or min(width, height) < 40.0:
         return

@@ -1,4 +1,4 @@
-"""The Rig panel's long work, in a thread: read a template, align, match, rig; and what follows."""
+"""Jobs of the Rig panel in threads: reading, aligning, matching, rigging; and their results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
-from viewer.app.rigging.placing import laid_template, placing_now, target_place
+from viewer.app.rigging.placing import aligned_template, placing_now, target_place
 from viewer.app.rigging.results import compare, put_results, show_match
 from viewer.app.rigging.sources import (
     choose_target,
@@ -34,27 +34,28 @@ from viewer.app.rigging.steps import (
     align_template,
     match_fields,
     match_settings,
-    retold,
     transfer_settings,
+    with_known_method,
 )
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import METHODS
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
 from viewer.loading import load
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import surface_point
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, free_title
 
 __all__ = [
+    "finish_work",
     "landmark_settings",
     "start_adding",
     "start_align",
     "start_match",
     "start_reading",
     "start_run",
-    "take_finished",
 ]
 
 _Finish = Callable[[AppState], None]
@@ -66,12 +67,12 @@ _STEPS = {
     "checks": "checking the result",
     "weighing": "transferring weights",
 }
-"""What the transfer calls its steps, in words for somebody who waits."""
-_CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # what is added to the mesh's name
+"""Progress texts for the steps of the transfer."""
+_CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the mesh's name
 
 
 def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> None:
-    """Let a thread work; what it returns is done in the frame loop when it has ended."""
+    """Start a thread; the function that it returns is later called in the frame loop."""
     if no_job_room(state):
         state.say_status(no_job_room(state))
         return
@@ -85,8 +86,8 @@ def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> Non
     state.of(Rigging).running = running
 
 
-def take_finished(state: AppState) -> None:
-    """Do what follows from work that has ended; of a scene that is gone nothing does."""
+def finish_work(state: AppState) -> None:
+    """Apply the result of a job that has ended, unless the scene has been replaced."""
     rigging = state.of(Rigging)
     running = rigging.running
     if running is None or running.job is state.job:
@@ -97,7 +98,7 @@ def take_finished(state: AppState) -> None:
 
 
 def start_adding(state: AppState, path: Path) -> None:
-    """Read a mesh that is to be rigged, and put it into the scene."""
+    """Read a mesh to rig, and add it to the scene."""
 
     def act(report: Report) -> _Finish:
         report(0, 0, f"Reading {printable(path.name, 60)}")
@@ -115,7 +116,7 @@ def start_adding(state: AppState, path: Path) -> None:
             actor.called = free_title(state.scene.actors, actor.title)
             state.scene.actors.append(actor)
             state.paths = (*state.paths, path)
-            state.of(Rigging).target = None  # so that the panel chooses anew
+            state.of(Rigging).target = None  # so that the panel chooses again
             state.say(*scene.diagnostics)
             _show_added(state, actor)
 
@@ -125,7 +126,7 @@ def start_adding(state: AppState, path: Path) -> None:
 
 
 def _show_added(state: AppState, actor: Actor) -> None:
-    """Choose a mesh that came to the scene, and bring it into view."""
+    """Choose a mesh that was added to the scene, and fit the camera to it."""
     choose_target(state, actor)
     state.choose_actor(len(state.scene.actors) - 1)
     state.framing.restart()
@@ -139,11 +140,11 @@ def start_reading(
     Parameters
     ----------
     state : AppState
-        With a template that is to be read, if there are no paths.
+        Holds the chosen template, which is read if there are no paths.
     paths : tuple of Path
-        Its files.
+        Files of the template.
     then : callable, optional
-        Goes on with it.
+        Called in the frame loop once the template has been read.
     """
     key = "file" if paths else state.of(Rigging).template_key
 
@@ -163,18 +164,18 @@ def start_reading(
     _begin(state, "Reading the template", act)
 
 
-def _snapshot(state: AppState, laid: bool) -> Callable[[Report], Template]:
-    """Return what gives a thread the template as it is now, or as it lies on the target.
+def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
+    """Return a function that gives a thread the template in its current or its aligned pose.
 
-    It is read there if it has to be.
+    The thread reads the template first if necessary.
     """
     known, key = (
-        laid_template(state) if laid else current_template(state),
+        aligned_template(state) if aligned else current_template(state),
         state.of(Rigging).template_key,
     )
     if known is not None:
-        taken = replace(known, pose=known.pose.copy())
-        return lambda report: taken
+        copied = replace(known, pose=known.pose.copy())
+        return lambda report: copied
 
     def read(report: Report) -> Template:
         report(0, 0, "Reading the template")
@@ -184,29 +185,29 @@ def _snapshot(state: AppState, laid: bool) -> Callable[[Report], Template]:
 
 
 def _keep(state: AppState, template: Template) -> None:
-    """Remember a template that was read on the way."""
+    """Keep a template that was read by a job."""
     view = state.of(Rigging)
     is_new = view.template is None or view.template.key != template.key
     if is_new and template.actor is None and view.template_key == template.key:
         view.template = template
 
 
-def _shares(
+def _part_progress(
     report: Report, low: float = 0.0, high: float = 1.0, title: str = ""
 ) -> Callable[[float, str], None]:
-    """Return what tells a job of shares of the work, which is itself a part of all."""
+    """Return a callable that reports the progress of one part of a job."""
 
-    def tell(share: float, what: str) -> None:
+    def progress(fraction: float, what: str) -> None:
         text = title + _STEPS.get(what, what)
-        report(round(100 * (low + (high - low) * share)), 100, text[:1].upper() + text[1:])
+        report(round(100 * (low + (high - low) * fraction)), 100, text[:1].upper() + text[1:])
 
-    return tell
+    return progress
 
 
 def start_align(state: AppState, settings: AlignmentSettings | None = None) -> None:
-    """Lay the template onto the target: by searching, or from where it lies as the settings say."""
+    """Align the template with the target, by a search unless settings are given."""
     choices, target = state.of(Rigging).choices, target_mesh(state)
-    take = _snapshot(state, laid=settings is not None)
+    take = _snapshot(state, aligned=settings is not None)
     how = settings or _search_settings(choices)
     own = current_template(state)
     fits = choices.fits and how.matrix is None
@@ -214,7 +215,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
     def act(report: Report) -> _Finish:
         template = take(report)
-        found = align_template(template, own or template, target, how, fits, _shares(report))
+        found = align_template(template, own or template, target, how, fits, _part_progress(report))
 
         def finish(state: AppState) -> None:
             _keep(state, template)
@@ -223,7 +224,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
                 return
             state.of(Rigging).placing = found
             if state.of(Rigging).tool == "landmarks":
-                state.of(Rigging).tool = ""  # so that the template is seen where it lies
+                state.of(Rigging).tool = ""  # show the template aligned, not beside the target
 
         return finish
 
@@ -231,7 +232,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
 
 
 def _take_measured(state: AppState, asked: Placing, found: Placing) -> None:
-    """Take over the error of a template that was laid by hand, and may lie elsewhere by now."""
+    """Store the error of a placement by hand, unless the template has been moved since."""
     rigging = state.of(Rigging)
     known = replace(found, lines=asked.lines) if found.fitted is not None else found
     if rigging.placing is asked:
@@ -249,16 +250,16 @@ def _search_settings(choices: RigChoices) -> AlignmentSettings:
 
 
 def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSettings:
-    """Return an alignment by the landmarks; there must be three or more.
+    """Return the settings of an alignment by three or more landmarks.
 
     Parameters
     ----------
     state : AppState
-        With landmarks.
+        Holds the landmarks.
     mesh : Mesh
-        The template as it is posed.
+        Mesh of the posed template.
     refines : bool
-        Whether closest points improve on it.
+        Whether the alignment is refined by closest points.
     """
     target = target_mesh(state)
 
@@ -275,27 +276,27 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
 
 
 def start_match(state: AppState) -> None:
-    """Find which vertices of the target lie on the template, and show them as colours."""
+    """Find the vertices of the target that match the template, and show them as colours."""
     rigging, placing = state.of(Rigging), placing_now(state)
     settings, actor = match_settings(rigging.choices), rigging.target
     if placing is None or actor is None:
         return
-    take, similarity = _snapshot(state, laid=True), placing.similarity
+    take, similarity = _snapshot(state, aligned=True), placing.similarity
     mesh = target_mesh(state)
 
     def act(report: Report) -> _Finish:
         template = take(report)
         report(0, 0, "Finding closest points")
-        fields, share = match_fields(template, similarity, mesh, settings)
-        return lambda state: show_match(state, actor, fields, share)
+        fields, fraction = match_fields(template, similarity, mesh, settings)
+        return lambda state: show_match(state, actor, fields, fraction)
 
     _begin(state, "Finding closest points", act)
 
 
 def start_run(state: AppState, methods: tuple[str, ...]) -> None:
-    """Rig the target by one or several methods; the first one's result takes its place.
+    """Rig the target by one or several methods, and show the first result in its place.
 
-    The template is aligned first if it was not, and taken as it is shown if it was.
+    The template is used as it is placed; if it has no placement, it is aligned first.
     """
     target, choices, placing = (
         state.of(Rigging).target,
@@ -304,25 +305,25 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
     )
     if target is None:
         return
-    take, mesh, name = _snapshot(state, laid=True), target_mesh(state), target.title
+    take, mesh, name = _snapshot(state, aligned=True), target_mesh(state), target.title
     place, own = target_place(target), current_template(state)
 
     def act(report: Report) -> _Finish:
         template, found, start = take(report), placing, 0.0
-        laid = template
+        aligned = template
         if found is None and "robust" in methods:
             start, how = 0.4, _search_settings(choices)
-            tell = _shares(report, 0.0, start)
-            found = align_template(template, own or template, mesh, how, choices.fits, tell)
-            laid = found.fitted or template
+            progress = _part_progress(report, 0.0, start)
+            found = align_template(template, own or template, mesh, how, choices.fits, progress)
+            aligned = found.fitted or template
         results = []
         for number, method in enumerate(methods):
             low, high = (start + (1.0 - start) * (number + k) / len(methods) for k in (0, 1))
-            tell = _shares(report, low, high, f"{printable(name, 40)}, {method}: ")
+            progress = _part_progress(report, low, high, f"{printable(name, 40)}, {method}: ")
             settings = transfer_settings(choices, method, found)
             called = f"{name} {_CALLED[method]}"
-            rigged = transfer(laid.figure, laid.pose, mesh, settings, tell, name=called)
-            rigged = retold(rigged, found)
+            rigged = transfer(aligned.figure, aligned.pose, mesh, settings, progress, name=called)
+            rigged = with_known_method(rigged, found)
             actor = Actor(rigged.figure, rigged.pose.copy(), placement=place @ rigged.placement)
             results.append(Result(method, rigged, actor, target, template))
         return lambda state: _put(state, results, found)
@@ -331,7 +332,7 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
 
 
 def _put(state: AppState, results: list[Result], placing: Placing | None) -> None:
-    """Take over what a run has made."""
+    """Add the results of a run to the scene."""
     _keep(state, results[0].template)
     state.of(Rigging).placing = placing
     put_results(state, results, compare(*results) if len(results) == len(METHODS) else None)

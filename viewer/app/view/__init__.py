@@ -1,1 +1,1 @@
-"""View: how the scene is drawn, from where, and what lies under the pointer."""
+"""View: camera, display settings, lights, statistics and picking."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from viewer.app.core.fitting import fit_again, fit_shown
 from viewer.app.core.state import AppState
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, look_from
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.inspection.front import Front
@@ -18,20 +19,20 @@ def fit_view(state: AppState) -> None:
 
 
 def look(state: AppState, name: str) -> None:
-    """Turn the camera to a named view, and fill the view with what is shown."""
+    """Rotate the camera to a named view, and fit it to the scene."""
     state.camera.fixed = None
     look_from(state.camera, name)
     fit_again(state)
 
 
 def face(state: AppState, front: Front) -> None:
-    """Say which axis the figures face, "auto" for a guess; the camera sees them as before."""
+    """Set the axis that the figures face, "auto" to estimate it, and rotate the camera with it."""
     state.set_front(front)
     fit_again(state)
 
 
 def look_through(state: AppState, index: int) -> None:
-    """See what a calibrated camera of the capture saw; -1 leaves it where it is."""
+    """Look through a calibrated camera of the capture; -1 frees the camera at its position."""
     if index < 0:
         state.camera.fixed = None
         return
@@ -47,9 +48,7 @@ def look_through(state: AppState, index: int) -> None:
         setattr(state.camera, name, getattr(seen, name))
     error = distortion_error(view)
     if error >= 0.5:
-        state.say(
-            f"The lens of {printable(view.name)} distorts pictures by up to {error:.1f} pixels"
-        )
+        state.say(f"The lens of {printable(view.name)} distorts images by up to {error:.1f} pixels")
 
 
 def toggle_projection(state: AppState) -> None:

@@ -1,4 +1,4 @@
-"""Camera: distance, azimuth, inclination, and named views."""
+"""Camera panel: distance, azimuth, inclination, projection and named views."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider
 from viewer.app.view.camera_actions import face, fit_view, look, look_through, toggle_projection
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.camera import VIEWS, front_azimuth
 from viewer.rig.inspection.front import front_axes
 from viewer.rig.mesh import box_size
@@ -36,7 +36,7 @@ def draw(state: AppState) -> None:
         state, "Field of view", camera.fov, 5.0, 120.0, "%.0f\N{DEGREE SIGN}", _CLAMP
     )
     if camera.fixed is not None and _place(state) != before:
-        camera.fixed = None  # go on from where the calibrated camera stands
+        camera.fixed = None  # continue from the position of the calibrated camera
     if checkbox(state, "Orthographic", camera.orthographic) != camera.orthographic:
         toggle_projection(state)
     imgui.same_line()
@@ -51,12 +51,12 @@ def draw(state: AppState) -> None:
 
 
 def _draw_front(state: AppState) -> None:
-    """Draw the choice of the axis that the figures face, from which named views count."""
+    """Draw the choice of the axis that the figures face, which defines the named views."""
     up, ahead = state.scene.up, state.camera.front
     texts = {axis: axis for axis in front_axes(up)}
     now = next((axis for axis in texts if front_azimuth(axis, up) == ahead), "auto")
-    chosen = choice(state, "Front axis", now, {**texts, "auto": "guess"})
-    explain("axis that the figures face, from which named views are derived")
+    chosen = choice(state, "Front axis", now, {**texts, "auto": "automatic"})
+    explain("axis that the figures face, which defines the named views")
     if chosen != now:
         face(state, chosen)
 
@@ -81,5 +81,5 @@ def _draw_views(state: AppState) -> None:
 
 
 def _digits(size: float) -> str:
-    """Return a format with digits enough for the figure's unit."""
+    """Return a format with enough digits for the figure's unit."""
     return "%.3g" if size < 0.1 or size > 1e4 else "%.2f"

@@ -9,7 +9,7 @@ __all__ = ["reset_lights", "show", "toggle_binding", "toggle_option", "toggle_sk
 
 
 def toggle_skeleton(state: AppState) -> None:
-    """Draw the skeleton with the skin, or leave it out."""
+    """Show or hide the skeleton beside the skin."""
     shown = {"skin": "both", "both": "skin", "skeleton": "skin", "binding": "skeleton"}
     show(state, shown[state.options.show])
 
@@ -20,18 +20,18 @@ def toggle_binding(state: AppState) -> None:
 
 
 def show(state: AppState, what: str) -> None:
-    """Choose what is drawn, a key of ``SHOWN``, and say so."""
+    """Choose the visible parts, a key of ``SHOWN``, and show a status message."""
     state.options.show = what
     state.say_status(SHOWN[what])
 
 
 def toggle_option(state: AppState, name: str, text: str) -> None:
-    """Flip a display option and say so."""
+    """Toggle a display option, and show its new state."""
     value = not getattr(state.options, name)
     setattr(state.options, name, value)
     state.say_status(f"{text} {'on' if value else 'off'}")
 
 
 def reset_lights(state: AppState) -> None:
-    """Set both lights, ambient and highlight back to what they were at first."""
+    """Reset both lights, the ambient light and the highlight to their defaults."""
     state.options.lights = Lights()

@@ -1,4 +1,4 @@
-"""Display: what of the figure is drawn, and how."""
+"""Display panel: visible parts of figures, shading, background and joint overlays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.app.core.widgets import (
 from viewer.app.view.display_actions import show
 from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, OPACITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
@@ -87,7 +87,7 @@ def _draw_opacity(state: AppState) -> None:
 
 
 def _draw_joint_toggles(state: AppState) -> None:
-    """Draw what is seen of joints beside their boxes, in one line if there is room."""
+    """Draw check boxes for joint overlays, in one line if there is room."""
     options, why = state.options, no_skeleton(state)
     for name, (text, key) in JOINT_TOGGLES.items():
         short = text.removeprefix("Joint ").capitalize()
@@ -99,7 +99,7 @@ def _draw_joint_toggles(state: AppState) -> None:
 
 
 def _draw_extras(state: AppState) -> None:
-    """Draw what only some figures have: keypoints, a coarser mesh, body parts."""
+    """Draw settings that only some figures have: keypoints, a reduced mesh, body parts."""
     options, figure = state.options, state.actor.figure
     if figure.keypoints is not None:
         options.keypoints = checkbox(state, "Keypoints", options.keypoints)
@@ -131,7 +131,7 @@ def _draw_parts(state: AppState, parts: BodyParts) -> None:
 
 
 def _beside(text: str) -> None:
-    """Put a check box with this text into the right half of the last one's line if it fits."""
+    """Place a check box with this text in the right half of the last one's line if it fits."""
     start, room = imgui.get_cursor_screen_pos().x, imgui.get_content_region_avail().x
     gap = imgui.get_style().item_spacing.x
     begins_free = imgui.get_item_rect_max().x + gap <= start + room * 0.5
@@ -140,6 +140,7 @@ def _beside(text: str) -> None:
 
 
 def _draw_background(state: AppState) -> None:
+    """Draw the choice of a background, with its colour if it is plain."""
     options = state.options
     is_color = options.background.startswith("#")
     chosen = choice(state, "Background", "#" if is_color else options.background, _BACKGROUNDS)

@@ -1,4 +1,4 @@
-"""Lights: direction, colour and strength of two lights; ambient light and highlight."""
+"""Lights panel: direction, colour and strength of two lights; ambient light and highlight."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Picking in the view: actors, joints and vertices under a click or a mouse that rests."""
+"""Picking of actors, joints and vertices in the view, by clicking or hovering."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.hover_text import tells_vertices
 from viewer.app.weights.state import Hover, Weights, wants_vertex
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.picking import Pick
 from viewer.rendering.renderer import Renderer
@@ -32,27 +33,27 @@ from viewer.rig.skinning import Skinning
 
 __all__ = ["answer_picks", "take_pick", "vertex_at"]
 
-_LONGEST = 40  # letters of a name
-_REST = 0.2  # seconds for which the mouse must lie still
+_LONGEST = 40  # characters of a name
+_REST = 0.2  # seconds without mouse movement before a vertex is described
 
 
 def answer_picks(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
-    """Choose or pin what was clicked, and look what lies under a mouse that rests.
+    """Handle the pending click, and describe the vertex under the mouse once it is still.
 
     Parameters
     ----------
     state : AppState
-        Told what was found.
+        Receives the results.
     renderer : Renderer
-        Has drawn the scene.
+        Renderer that has drawn the scene.
     size : (int, int)
-        Of the view, pixels.
+        Size of the view, pixels.
     scale : float
         Pixels per window coordinate.
     picture : object
-        Equal as long as the picture of the scene is the same.
+        Key of the drawn picture, which changes whenever the picture does.
     """
     picking = state.of(Picking)
     wanted, picking.wanted = picking.wanted, None
@@ -72,15 +73,16 @@ def _take_click(
     pixel: tuple[float, float],
     aims: bool,
 ) -> None:
-    """Pin the vertex at a pixel if vertices are wanted; else choose, or aim the camera there.
+    """Pin the vertex at a pixel if vertices are picked; otherwise select there or aim the camera.
 
-    On a skin the joint is chosen that moves it most there, on the background none.
+    A click on a skin selects the joint with the largest weight there; one on the background
+    deselects.
     """
     if not aims and wants_vertex(state.of(Weights)):
         found = vertex_at(state, renderer, size, pixel)
         if found is not None:
             pin_vertex(state, found[0], found[1])
-            imgui.set_window_focus(PANELS["vertex"].title)  # other tabs may lie over it
+            imgui.set_window_focus(PANELS["vertex"].title)  # another tab may hide it
         return
     pick = _pick(state, renderer, size, pixel, state.options)
     if pick is None:
@@ -95,7 +97,7 @@ def _take_click(
 
 
 class _Mover(NamedTuple):
-    """The joint that moves a vertex most."""
+    """The joint with the largest weight at a vertex."""
 
     joint: int
     vertex: int
@@ -145,21 +147,21 @@ def vertex_at(
     Parameters
     ----------
     state : AppState
-        With the scene.
+        Holds the scene.
     renderer : Renderer
-        Has drawn it.
+        Renderer that has drawn it.
     size : (int, int)
-        Of the view, pixels.
+        Size of the view, pixels.
     pixel : (float, float)
         From its left and upper edge.
 
     Returns
     -------
     (actor, vertex, triangle) or None
-        Indices; the triangle is -1 where the reduced mesh is drawn, which has others.
+        Indices; the triangle is -1 if the reduced mesh, which has other triangles, is drawn.
     """
     options = state.options
-    # Only surfaces count, whatever lies over them.
+    # Only surfaces are picked, even where joints or keypoints are drawn over them.
     show = "skin" if options.show == "both" else options.show
     seen = replace(
         options, show=show, keypoints=False, xray=False, joint_names=False, joint_axes=False
@@ -185,7 +187,7 @@ def _vertex_of(state: AppState, found: Pick) -> tuple[int, int, int]:
 
 
 def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> Floats:
-    """Return where vertices are drawn, before the actor's placement: (N, 3)."""
+    """Return the drawn positions of vertices, before the actor's placement: (N, 3)."""
     mesh = actor.figure.mesh
     assert mesh is not None  # it has vertices
     if options.show == "binding":
@@ -196,7 +198,7 @@ def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> F
 def _look_under_mouse(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
-    """Describe the vertex under the mouse once mouse and picture have come to rest."""
+    """Describe the vertex under the mouse once the mouse and the picture are still."""
     view, io = state.of(Weights), imgui.get_io()
     x, y, width, height = state.view_rect
     place = (io.mouse_pos.x, io.mouse_pos.y)
@@ -217,7 +219,7 @@ def _look_under_mouse(
     on_skin = pick is not None and pick.joint < 0 and pick.triangle >= 0
     if pick is not None and on_skin:
         found: tuple[int, int, int] | None = _vertex_of(state, pick)
-    else:  # something lies over the surface
+    else:  # something is drawn over the surface
         found = vertex_at(state, renderer, size, pixel)
     if found is not None:
         _describe(state, hover, *found)
@@ -225,7 +227,7 @@ def _look_under_mouse(
 
 
 def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
-    """Return a line on what a click would choose here, if it would choose a joint."""
+    """Return a line with the joint that a click would select here; none if it would not."""
     mouse = imgui.get_io().mouse_pos
     if wants_vertex(state.of(Weights)) or pick is None:
         return ()
@@ -241,6 +243,7 @@ def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
 
 
 def _describe(state: AppState, hover: Hover, index: int, vertex: int, triangle: int) -> None:
+    """Set the hover text for a vertex, and its position in the scene."""
     actor, options = state.scene.actors[index], state.options
     skinning: Skinning = options.skinning
     facts = vertex_facts(actor.figure, actor.pose, skinning, vertex, triangle)

@@ -1,11 +1,11 @@
-"""Skinning: the method, and how many influences count."""
+"""Skinning panel: the method, and the number of influences used."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import checkbox, note_item, slider
+from viewer.app.core.widgets import checkbox, explain, note_item, slider
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import strongest
 from viewer.rig.skinning import METHODS, Skinning
@@ -13,14 +13,14 @@ from viewer.rig.skinning import METHODS, Skinning
 __all__ = ["draw"]
 
 _CLAMP = imgui.SliderFlags_.always_clamp
-_ENGINE = 4  # influences of most engines
+_ENGINE = 4  # influences per vertex in most game engines
 
 
 def draw(state: AppState) -> None:
-    """Draw the panel for the chosen actor; the settings hold for all."""
+    """Draw the panel for the chosen actor; the settings apply to all actors."""
     figure, skinning = state.actor.figure, state.options.skinning
     if not figure.is_attached:
-        imgui.text_wrapped("This figure has no skin that follows a skeleton.")
+        imgui.text_wrapped("This figure has no skin attached to a skeleton.")
         return
     _draw_method(state, skinning)
     imgui.separator()
@@ -40,30 +40,33 @@ def _draw_method(state: AppState, skinning: Skinning) -> None:
             imgui.set_tooltip(method.title)
     for key, method in METHODS.items():
         if method.ends:
-            _draw_share(state, skinning, key, method.ends)
+            _draw_blend_factor(state, skinning, key, method.ends)
 
 
-def _draw_share(state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]) -> None:
+def _draw_blend_factor(
+    state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]
+) -> None:
     """Draw the blend factor of a method between two others; moving it selects the method."""
     shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(skinning.method, skinning.blend_factor)
-    share = slider(state, f"{METHODS[ends[1]].short} fraction", shown, 0.0, 1.0, flags=_CLAMP)
-    if share != shown:
-        skinning.method, skinning.blend_factor = key, share
+    factor = slider(state, f"{METHODS[ends[1]].short} fraction", shown, 0.0, 1.0, flags=_CLAMP)
+    if factor != shown:
+        skinning.method, skinning.blend_factor = key, factor
 
 
 def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> None:
     most = strongest(figure)
-    is_cut = skinning.max_influences > 0
+    is_limited = skinning.max_influences > 0
     count = skinning.max_influences or _ENGINE
-    text = f"As a {count}-influence engine shows it"
-    if checkbox(state, f"{text}###engine", is_cut) != is_cut:
-        skinning.max_influences = 0 if is_cut else _ENGINE
+    text = f"Limit to {count} influences"
+    if checkbox(state, f"{text}###engine", is_limited) != is_limited:
+        skinning.max_influences = 0 if is_limited else _ENGINE
     note_item(state, "engine")
+    explain("preview of an engine that supports this many influences per vertex")
     imgui.begin_disabled(skinning.max_influences == 0)
     changed, chosen = imgui.slider_int("Influences", count, 1, max(most, _ENGINE), "%d", _CLAMP)
     note_item(state, "Influences")
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        imgui.set_tooltip(f"the file lists up to {most} per vertex")
+        imgui.set_tooltip(f"the file has up to {most} per vertex")
     if changed and skinning.max_influences:
         skinning.max_influences = chosen
     imgui.end_disabled()

@@ -1,4 +1,4 @@
-"""State of the view: where it was clicked."""
+"""State of picking: the click that has not been handled yet."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ __all__ = ["Picking"]
 
 @dataclass(slots=True)
 class Picking:
-    """What was asked for with the mouse.
+    """State of picking in the view.
 
     Attributes
     ----------
     wanted : (x, y, aims) or None
-        Where the view was clicked, from its corner; whether the camera aims there.
+        Position of a click, relative to the upper left corner of the view, and whether the camera
+        is aimed there.
     """
 
     wanted: tuple[float, float, bool] | None = None

@@ -1,11 +1,11 @@
-"""Stats: how large the scene is, how long a frame takes, and who draws it."""
+"""Stats panel: size of the scene, duration of a frame, and renderer."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.scene import Scene

@@ -1,4 +1,4 @@
-"""The menu "View": what is seen of joints and vertices."""
+"""The View menu: joint overlays, weights of the selected joint, and vertices."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ JOINT_TOGGLES = {
     "joint_names": ("Joint names", "J"),
     "joint_axes": ("Joint axes", "Shift+J"),
 }
-"""Display options for joints: what they are called, and their key."""
+"""Display options for joints, with their label and key."""
 
 
 def draw_view_menu(state: AppState) -> None:

@@ -6,7 +6,7 @@ from viewer.app.core.state import AppState
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.shown_panels import is_open, set_open
 from viewer.app.weights.state import Pinned, Weights
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.inspection.explanation import Explanation, explain
 from viewer.rig.pose import pose_key
 from viewer.rig.scalars import (
@@ -154,9 +154,7 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
     """
     figure = state.scene.actors[actor].figure
     if not figure.is_attached:
-        state.say_status(
-            "This figure has no skin that follows a skeleton: no influences to explain"
-        )
+        state.say_status("This figure has no skin attached to a skeleton: no influences to explain")
         return
     state.of(Weights).pinned = Pinned(actor, figure, vertex)
     set_open(state, "vertex", True)

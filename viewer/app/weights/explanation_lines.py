@@ -8,7 +8,8 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.weights.actions import explained, unpin
 from viewer.app.weights.state import Weights
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
 from viewer.rendering.overlay.segments import Manner, Segments, dots, joined
 from viewer.rendering.palettes import joint_palette

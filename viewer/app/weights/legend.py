@@ -6,7 +6,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, begin_overlay, overlay_rect
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.overlay.legend import Entry, Legend
 from viewer.rendering.overlay.legend_columns import legend_columns
 

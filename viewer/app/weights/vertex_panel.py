@@ -14,7 +14,8 @@ from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.weights.actions import explained, toggle_picking, unpin
 from viewer.app.weights.explanation_lines import influence_colors
 from viewer.app.weights.state import Weights
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.explanation import DualTerms, Explanation
 from viewer.rig.inspection.explanation_text import explanation_text
@@ -210,7 +211,7 @@ def _draw_dual(sheet: _Sheet, dual: DualTerms) -> None:
     imgui.separator_text("Dual quaternions")
     for index, values in enumerate(dual.duals):
         flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
-        imgui.text_wrapped(f"q{index + 1}: weight {dual.shares[index]:.{_DIGITS}f}{flip}")
+        imgui.text_wrapped(f"q{index + 1}: weight {dual.fractions[index]:.{_DIGITS}f}{flip}")
         _draw_quaternions(sheet, f"dual {index}", values)
     imgui.text_wrapped("q = sum of weight times q, negated as above")
     _draw_quaternions(sheet, "blended", dual.blended)

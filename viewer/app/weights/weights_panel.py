@@ -20,7 +20,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.weights.actions import no_view, show_scalar, shown_joint, start_heat_map, unpin
 from viewer.app.weights.state import Weights
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.figure import Figure
 from viewer.rig.number_text import short_number

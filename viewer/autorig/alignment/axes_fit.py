@@ -32,7 +32,7 @@ def fit_axes(
     template, target, rounds
         As for ``slide``.
     start : Similarity
-        Roughly right, with one scale.
+        Approximate alignment, with one scale.
     rotations : bool
         Whether the rotation is refined too: one found with a single scale is biased
         towards the stretched target's diagonal.
@@ -55,6 +55,7 @@ def fit_axes(
         if (found <= 0.0).any():
             break
         scales = found
+        # The geometric mean is the common scale, so that the product of the factors is 1.
         scale = float(np.cbrt(np.prod(scales)))
         rotation = rotation_vector_to_matrix(vector) @ similarity.rotation
         factors, own_factors = np.ones(3), np.ones(3)
@@ -79,7 +80,7 @@ def _columns(
     if rotations:
         x, y, z = arms.T
         null = np.zeros_like(x)
-        # Columns are the axes crossed with the arm.
+        # Each column is a coordinate axis crossed with the lever arm.
         crossed = np.stack([null, z, -y, -z, null, x, y, -x, null], axis=1).reshape(-1, 3, 3)
         parts.append(lift[:, None] * crossed)
     return np.concatenate(parts, axis=2)

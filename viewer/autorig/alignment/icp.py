@@ -38,19 +38,19 @@ __all__ = [
     "trimmed_rms",
 ]
 
-_FAR = 3.0  # medians: pairs farther apart than this are rejected
+_FAR = 3.0  # multiple of the median distance; pairs farther apart are rejected
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end
 _EXACT = 1e-12  # error over size that counts as zero
 _ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
 HOLD = 3e-3  # weight of point-to-point beside point-to-plane distances, before squaring
-_PATIENCE = 3  # iterations without improvement: new pairs may raise the error for a while
-FEWEST = 8  # pairs that determine seven unknowns
+_PATIENCE = 3  # iterations without improvement; new pairs may raise the error for a while
+FEWEST = 8  # minimum number of pairs for seven unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """Partners of N points: positions and normals (N, 3), and which are usable (N,)."""
+    """Partners of N points: positions and normals (N, 3), and a mask of usable ones (N,)."""
 
     positions: Floats
     normals: Floats
@@ -161,7 +161,7 @@ def iterate(
     """Improve an alignment until it converges.
 
     Pairs farther apart than three times the median, with normals more than 60 degrees apart
-    (whichever way they point), or on the border of a hole are left out of each iteration.
+    (ignoring their signs), or on the border of a hole are left out of each iteration.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def iterate(
         pairs = pairs_between(template, target, similarity)
         if len(pairs.points) < FEWEST:
             break
-        # Factors belong to the target's axes: without them the remainder is a similarity.
+        # Factors apply along the target's axes: dividing by them leaves a plain similarity to fit.
         fit = fit_similarity(
             pairs.points, pairs.targets / start.factors, None if scales else start.scale
         )
@@ -243,7 +243,8 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     center = moved.mean(axis=0)
     arms = moved - center
     size = float(np.sqrt(np.einsum("na,na->", arms, arms) / len(arms)))
-    arms = arms / size  # gives all unknowns the same magnitude
+    # Dividing by the size gives all unknowns the same magnitude.
+    arms = arms / size
     gaps = (pairs.targets - moved) / size
     # Columns: rotation, shift, scale; rows: along the normal, then along x, y and z.
     x, y, z = arms.T
@@ -259,7 +260,8 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
     rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
-    grow = min(max(grow, 0.5), 2.0)  # beyond this the linearisation is invalid
+    grow = min(max(grow, 0.5), 2.0)  # the linearisation is invalid beyond these
+    # The step rotates and scales about the centre: p' = g R (p - c) + c + v.
     shift = grow * rotation @ (similarity.shift - center) + center + size * solved[3:6]
     return Similarity(
         grow * similarity.scale, rotation @ similarity.rotation, shift, similarity.factors

@@ -28,13 +28,14 @@ AXES = ("x", "y", "z", "-x", "-y", "-z")
 """Allowed values of an up axis or a facing."""
 
 _UNITS = (1.0, 100.0, 0.01, 1000.0, 0.001, 39.37, 1.0 / 39.37)
-"""Metres to centimetres, millimetres and inches, and back."""
+"""Ratios between metres and centimetres, millimetres and inches, in both directions."""
 
-_NEAR_UNIT = 0.15  # relative tolerance for taking a ratio of sizes for a ratio of units
+_NEAR_UNIT = 0.15  # relative tolerance for interpreting a ratio of sizes as a ratio of units
 _TRIM = 0.8  # fraction of distances that counts: excludes hair, skirts and cropped parts
 _QUICK, _LONG = 12, 60  # iterations for every candidate, and for the best few
 _FINALISTS = 4
-_NO_BETTER = 0.7  # of an error: rotating a mesh that is in place must reduce it below this
+# A mesh that is in place is only rotated if that reduces the error below this fraction.
+_NO_BETTER = 0.7
 _IN_PLACE = 300  # samples that decide whether a mesh is in place already
 
 
@@ -128,9 +129,9 @@ def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bo
     Returns
     -------
     Candidate
-        Its error is one-way: a shirt that lies on the body fits, whatever it leaves uncovered. Of
-        several similar ones the first, so that nothing is rotated unnecessarily: most
-        figures look nearly the same from behind.
+        Its error is one-way: a shirt that lies on the body fits, regardless of what it leaves
+        uncovered. Of several with similar errors the first, so that nothing is rotated
+        unnecessarily: most figures look nearly the same from behind.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []

@@ -2,8 +2,8 @@
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
-moves all joints at once (``pose_step``). Partners may be far apart at first, as lowered arms are
-from stretched ones, and come closer with every iteration.
+moves all joints at once (``pose_step``). Partners may be far apart at first, such as lowered and
+outstretched arms, and come closer with every iteration.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ __all__ = ["Fitted", "fit_pose"]
 
 _ROUNDS = 32
 _NEARING = 16  # iterations over which the search radius shrinks
-_VERTICES = 1500  # of the template that are matched with the target
-_FAR, _NEAR = 0.25, 0.03  # of the size: search radius at the start and at the end
+_VERTICES = 1500  # vertices of the template that are matched with the target
+_FAR, _NEAR = 0.25, 0.03  # search radius at the start and at the end, over the size
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_STILL = 2e-3  # radians: iterations end when no joint rotates by more
-_FEWEST = 50  # pairs that determine a pose
-_SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # of limbs
+_STILL = 2e-3  # radians; iterations end when no joint rotates by more
+_FEWEST = 50  # minimum number of pairs for fitting a pose
+_SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # logarithms of limb scales
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +157,7 @@ def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -
 
 
 def _moved(template: Figure, limbs: Limbs, state: Fitted, step: PoseStep) -> Fitted:
-    """Return the state after an iteration; the whole moves by x' = e^u R (x - m) + m + t."""
+    """Return the state after an iteration. The whole figure moves by x' = e^u R (x - m) + m + t."""
     similarity, skeleton = state.similarity, state.figure.require_skeleton()
     growths = state.grown + step.limb_growths
     growths = np.clip(0.5 * (growths + growths[:, limbs.partners]), _SMALLEST, _LARGEST)

@@ -31,11 +31,12 @@ from viewer.rig.arrays import Floats, Ints
 __all__ = ["AlignedTemplate", "Pairs", "PoseStep", "solve_step"]
 
 _HOLD = 0.2  # h: weight of point-to-point beside point-to-plane distances
-_ROTATED, _GROWN = 3e-6, 3e-5  # penalties on radians and logarithmic growths, squared, in total
-_NOW = 1e-5  # the same in one iteration, of both
-_WHOLE = 1e-7  # penalty on moving the whole: a surface may slide along itself
-_MOST = 0.3  # radians per joint and iteration: the linearisation holds up to here
-_GROWTH = 0.2  # logarithms of growth per iteration, of the whole or a limb
+# Penalties on the squares of total rotations (radians) and total growths (logarithms).
+_ROTATED, _GROWN = 3e-6, 3e-5
+_NOW = 1e-5  # penalty on both within one iteration
+_WHOLE = 1e-7  # penalty on moving the whole figure, as a surface may slide along itself
+_MOST = 0.3  # radians per joint and iteration; the linearisation is valid up to here
+_GROWTH = 0.2  # growth per iteration (logarithm), of the whole figure or a limb
 _FIXED = 1e6  # penalty on fixed unknowns
 
 
@@ -164,9 +165,9 @@ def solve_step(
     count, n_joints = len(pairs.vertices), len(parents)
     below = np.flatnonzero(parents >= 0)
     matrix, right = matrix / count, right / count
-    price = _prices(len(below), n_joints)
-    right[7:] -= price @ np.concatenate([rotated[below].ravel(), grown.ravel()])
-    matrix[7:, 7:] += price
+    penalty = _penalties(len(below), n_joints)
+    right[7:] -= penalty @ np.concatenate([rotated[below].ravel(), grown.ravel()])
+    matrix[7:, 7:] += penalty
     now = np.full(len(right), _NOW)
     now[:7] = _WHOLE
     if not scales:
@@ -181,21 +182,22 @@ def solve_step(
     return PoseStep(middle, solved[:3], size * solved[3:6], growth, rotations, growths)
 
 
-def _prices(n_rotating: int, n_joints: int) -> Floats:
-    """Return the prices of all rotations and growths as a quadratic form.
+def _penalties(n_rotating: int, n_joints: int) -> Floats:
+    """Return the penalties on all rotations and growths as a quadratic form.
 
-    That all limbs are thicker, as in clothes, costs nothing: only differences do. Without that
-    the whole would grow instead, and reach beyond the target.
+    Making all limbs thicker, as clothes do, costs nothing: only differences between limbs do.
+    Otherwise the figure as a whole would grow instead, and extend beyond the target.
     """
-    prices = np.diag(np.repeat([_ROTATED, _GROWN], [3 * n_rotating, 2 * n_joints]))
-    prices[-n_joints:, -n_joints:] -= _GROWN / n_joints
-    return prices
+    penalties = np.diag(np.repeat([_ROTATED, _GROWN], [3 * n_rotating, 2 * n_joints]))
+    # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised.
+    penalties[-n_joints:, -n_joints:] -= _GROWN / n_joints
+    return penalties
 
 
 def _equations(
     frame: _Frame, vertices: Ints, targets: Floats, normals: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the normal equations of n . (x' - q) = 0; columns as they are named above."""
+    """Return the normal equations of n . (x' - q) = 0, columns as ordered above."""
     x = frame.aligned.positions[vertices]
     count = len(x)
     arms = (x - frame.middle) / frame.size

@@ -1,9 +1,9 @@
 """Alignment of a template whose pose and proportions differ from the target's.
 
-People in scans stand with lowered arms and have their own proportions, templates have stretched
-arms: no similarity aligns one with the other. So where the alignment leaves a gap, pose
-and proportions are fitted too, and kept if that closes most of it. A figure in another pose
-also looks nearly the same from behind: if the alignment is ambiguous, both ways are fitted.
+People in scans have lowered arms and individual proportions, templates have outstretched arms: no
+similarity aligns one with the other. So if the alignment leaves a gap, pose and proportions are
+fitted too, and kept if that closes most of it. A figure in another pose also looks nearly the same
+from behind: if the alignment is ambiguous, both facings are fitted.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ _CLOSE = 0.002  # misfit over size up to which joints are not rotated
 # Fraction of the misfit that may remain if rotated joints are to be kept: clothes fit a
 # little better with a bent body, but only a figure in another pose fits much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
-# A fit that leaves more than this and rotated a joint by more indicates another kind of figure, as
-# with a fox and a pig: it bends the spine until the legs meet something.
+# A misfit above the first after a joint was rotated by more than the second indicates a different
+# kind of figure: a fox fitted to a pig bends its spine until its legs meet any surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
 _SURE = 0.004  # misfit after the fit up to which the facing is accepted without trying another
 _ALIKE = 1.5  # ratio of misfits up to which front and back are ambiguous
-_CLEARLY = 0.85  # of the misfit, which the opposite facing must reach after the fit
-_ROUNDS = 30  # iterations to align the template the other way round
+_CLEARLY = 0.85  # fraction of the misfit that the opposite facing must reach after the fit
+_ROUNDS = 30  # iterations to align the template facing the other way
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that were not given by the user
 # Separate scales are tried if the gap exceeds the first, and kept if they leave at
@@ -136,7 +136,7 @@ def align_posed(
     ours = Posed(posed, template.require_mesh().triangles)
     triangles = target.triangles
     if volume(target.positions, triangles) < 0.0:
-        triangles = triangles[:, ::-1]  # normals distinguish the sides of a limb
+        triangles = triangles[:, ::-1]  # outward normals distinguish the two sides of a limb
     theirs = Posed(target.positions, triangles)
     rigid = align(ours, theirs, template.up, settings, lambda s, what: report(0.5 * s, what))
     kept = PosedAlignment(rigid, template, pose, posed, ())

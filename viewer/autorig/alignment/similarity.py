@@ -11,7 +11,9 @@ from viewer.rig.arrays import Floats, frozen
 
 __all__ = ["Similarity", "fit_similarity"]
 
-_ON_LINE = 1e-6  # second over first extent: below this, points on a line leave a rotation free
+# Ratio of the second to the first extent below which points are collinear and leave a rotation
+# free.
+_ON_LINE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -48,14 +48,14 @@ _ROUNDS, _SLIDES = 60, 25  # iterations of point-to-point and of point-to-plane 
 _AXES_ROUNDS = 20
 _IN_PLACE = 0.03  # misfit over size up to which a mesh may be in place already
 _SURELY = 0.003  # mean distance over size up to which no search is made
-_SLIDING = 0.02  # misfit over size up to which surfaces slide along each other
+_SLIDING = 0.02  # misfit over size up to which sliding refines the fit
 # Fraction of that misfit that a search must reach to move the mesh after all: a part of a figure
 # fits nearly as well in many other positions, the whole of it does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
 PART = 0.05
-"""Of the size: a template with points farther from the target marks the target as a part."""
+"""Fraction of the size: if the template has points farther from the target, that is only a part."""
 
-_CAP = 0.05  # of the size: larger distances, as of hair or a missing hand, are clamped
+_CAP = 0.05  # fraction of the size; larger distances, as of hair or a missing hand, are clamped
 _BAD = 0.03  # RMS over size above which a warning is given
 
 
@@ -132,11 +132,11 @@ class Alignment:
         Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
         size.
     away : float
-        The same of the template from the target: large where the target is only a part.
+        The same of the template from the target; large if the target is only a part of a figure.
     uneven : (float, float)
-        Root mean squares of the same distances over the size: without the median offset of the
-        surfaces, and of all of them, each clamped to 5 %: the latter includes protruding ends
-        of limbs, which the best 90 % exclude.
+        RMS distances over the size in the same two directions, without the median offset between
+        the surfaces. All distances count, each clamped to 5 %, so that protruding ends of limbs are
+        included.
     how : str
         ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` where pose and
         proportions were fitted beyond that, unless landmarks were given.
@@ -251,7 +251,7 @@ def align(
     left = Alignment.of(ours, theirs, stays.similarity, "in place")
     found = Alignment.of(ours, theirs, best.similarity, "search")
     is_part = found.away > PART
-    # Sliding refines a close fit; in another pose it is slow and leads nowhere.
+    # Sliding refines a close fit; between different poses it is slow and does not converge.
     if settings.scale == "axes" or misfit(found, True) <= _SLIDING:
         similarity = _refined(fine, best.similarity, settings, report)
         slid = Alignment.of(ours, theirs, similarity, "search")
@@ -287,7 +287,7 @@ def _refined(
 
 
 def similarity_of(matrix: Floats) -> Similarity:
-    """Return a 4 x 4 matrix as a similarity, with scales along one space's axes at most.
+    """Return a 4 x 4 matrix as a similarity, with separate scales in at most one of the spaces.
 
     Raises
     ------
@@ -304,7 +304,7 @@ def similarity_of(matrix: Floats) -> Similarity:
     if _is_rotation(rotation):
         return Similarity(scale, rotation, shift, np.ones(3))
     for axis in (1, 0):
-        # F R has rows of lengths F, and R H columns of lengths H.
+        # The rows of F R have the lengths F, the columns of R H the lengths H.
         factors = np.linalg.norm(rotation, axis=axis)
         factors = factors / np.cbrt(np.prod(factors))
         plain = rotation / (factors[:, None] if axis else factors)

@@ -17,8 +17,9 @@ from viewer.rig.mesh import Mesh, vertex_normals
 
 __all__ = ["with_reversed_winding", "wound_backwards"]
 
-_CLOSED = 0.25  # squared border edges over triangles: with smaller holes a volume keeps its sign
-_MOST = 0.5  # of the target's area
+# Squared number of border edges over triangles; with smaller holes the volume's sign is reliable.
+_CLOSED = 0.25
+_MOST = 0.5  # fraction of the target's area
 
 
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:

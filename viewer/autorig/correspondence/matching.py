@@ -27,7 +27,8 @@ __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 _INSIDE_OUT = math.radians(120.0)  # a larger angle means "reversed" rather than "folded"
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
 _TOGETHER = math.radians(80.0)  # between a normal and the centre of its group; see _sides
-_CANCELLED = 1e-3  # of the areas around a vertex: remainder below which two sides cancel out
+# Two sides of a sheet cancel out if less than this fraction of the area around a vertex remains.
+_CANCELLED = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class MatchSettings:
         Radians between the normals of both surfaces.
     near_distance, near_angle : float
         Within this fraction, this angle suffices: normals of sharp and thin parts of a coarse
-        mesh are unreliable. Sheets thinner than this are matched on the side that fits.
+        mesh are unreliable. Sheets thinner than this are matched on the side whose normal agrees.
     flipped_normals : bool
         Accept a normal that points the other way as well. An island that is inside out as a
         whole is reversed without this.
@@ -68,7 +69,8 @@ class Matches:
     Attributes
     ----------
     points : SurfacePoints
-        W points of the template: for each matched vertex the one that fits, else the closest.
+        W points of the template: for each matched vertex the closest with an agreeing normal, else
+        the closest.
     matched : (W,) bool
         Whether each vertex lies on the template.
     angles : (W,)
@@ -230,7 +232,7 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
         triangles[inside] = facing[part.triangles]
         barycentric[inside], found[inside] = part.barycentric, part.positions
         distances[inside] = part.distances
-    # No triangle faces that way: an infinite distance, but valid coordinates.
+    # If no triangle faces that way, the distance is infinite but the coordinates are valid.
     distances[np.isinf(distances)] = np.finfo(float).max
     return SurfacePoints(triangles, barycentric, found, distances)
 

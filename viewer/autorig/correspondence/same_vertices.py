@@ -1,10 +1,10 @@
 """Vertices common to target and template: a mesh that was edited or sculpted, not remeshed.
 
-The closest point of the surface slides if a vertex was moved along it, and gets blended
-weights; the vertex itself has the exact ones. A target's vertex is identified with one of the
-template's if each is the other's nearest, it slid by less than half the length of its edges, and
-nearly all of these lead to vertices with the same properties. Another tessellation of the same
-surface has hardly any such vertices.
+The closest point of the surface slides if a vertex was moved along it, and gets blended weights;
+the vertex itself has the exact ones. A target's vertex is identified with one of the template's if
+each is the other's nearest, it slid by less than half the length of its edges, and nearly all of
+its edges correspond to edges of the template. Another tessellation of the same surface has hardly
+any such vertices.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from viewer.rig.geometry.closest_point import SurfacePoints
 __all__ = ["at_vertices", "same_vertices"]
 
 _EDGES = 0.8  # fraction of a vertex's edges that must also be edges of the template
-_SLID = 0.5  # of the mean length of its edges: maximum slide along the surface
-_FEW = 10_000  # points: with fewer, threads cost more than they save
+_SLID = 0.5  # maximum slide along the surface, over the mean length of a vertex's edges
+_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
@@ -70,7 +70,7 @@ def at_vertices(
     corners : (T, 3)
         The surface's triangles, as indices of its U vertices.
     places : (U, 3)
-        Where these are.
+        Positions of these vertices.
     same : (W,)
         The vertex that a point is snapped to, or -1.
     """

@@ -15,7 +15,7 @@ __all__ = ["cotangent_laplacian", "graph_laplacian", "laplacian", "voronoi_areas
 _STEEPEST = 100.0  # cotangent of 0.6 degrees: angles of thinner triangles are meaningless
 _FLAT = 1e-12  # minimum of twice a triangle's area over its squared longest edge
 _EVEN = 1.0 / np.sqrt(3.0)  # cotangent of 60 degrees
-_LIGHTEST = 1e-9  # of the mean: minimum area of a vertex, as it is a divisor
+_LIGHTEST = 1e-9  # minimum area of a vertex over the mean, as areas are divisors
 
 
 def laplacian(mesh: Welded) -> tuple[Any, Floats]:
@@ -120,7 +120,8 @@ def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
     """
     cotangents = _cotangents(positions, triangles)
     corners = positions[triangles]
-    offsets = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)  # opposite each corner
+    # Edge opposite each corner.
+    offsets = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)
     squares = np.einsum("tka,tka->tk", offsets, offsets)
     fractions = squares * cotangents / 8.0
     parts = np.roll(fractions, 1, axis=1) + np.roll(fractions, -1, axis=1)

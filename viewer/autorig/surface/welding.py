@@ -16,7 +16,8 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Welded", "edges", "islands", "non_manifold_edges", "weld"]
 
-_NEAR = 1e-4  # of the median edge: the error of equal vertices after rounding in a text file
+# Fraction of the median edge; rounding in text files separates equal vertices by less.
+_NEAR = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +61,8 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
     Returns
     -------
     Welded
-        A triangle without area is kept if its corners differ: it closes a gap, where only one side
-        of an edge has a vertex.
+        A triangle without area is kept if its corners differ: it closes a gap at a T-junction,
+        where only one side of an edge has a vertex.
 
     Raises
     ------
@@ -131,7 +132,7 @@ def _counted_edges(triangles: Ints) -> tuple[Ints, Any]:
 
 def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
     """Return the first vertex at each position, in vertex order, and each vertex's position."""
-    # Adding 0 changes -0.0 to 0.0, whose bytes differ.
+    # Adding 0 turns -0.0 into 0.0: equal positions must have equal bytes.
     rows = np.ascontiguousarray(positions + 0.0).view(np.dtype((np.void, 24))).ravel()
     _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)

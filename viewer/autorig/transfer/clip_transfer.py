@@ -27,7 +27,7 @@ def transfer_clip(
     """Return a clip of the template for the rigged target.
 
     Angles are unchanged; lengths are scaled with the figure, so that a path takes the same number
-    of steps. The clip keeps the template's own axes: up stays up.
+    of steps. The clip keeps the template's own axes, including its up axis.
 
     Parameters
     ----------

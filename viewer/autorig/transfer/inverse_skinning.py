@@ -20,8 +20,8 @@ SMALLEST_STRETCH = 0.2
 """Singular value below which a blended matrix counts as singular: two joints rotated apart by an
 angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
 
-_RINGS = 2  # neighbours of guarded vertices that may move to repair a tear
-_SMOOTH = 0.01  # weight of the shape against the pose when a tear is repaired
+_RINGS = 2  # rings of neighbours around guarded vertices that may move to repair a tear
+_SMOOTH = 0.01  # weight of smoothness relative to reproducing the pose when a tear is repaired
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +79,8 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
 def _is_singular(linear: Floats) -> Bools:
     """Return the matrices whose smallest singular value is too small: (V,) bool.
 
-    As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; only
-    where that bound is inconclusive the singular values are computed.
+    As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; singular
+    values are computed only where that bound is inconclusive.
     """
     squares = np.einsum("vab,vab->v", linear, linear)
     bound = 2.0 * np.abs(np.linalg.det(linear)) / np.where(squares > 0.0, squares, 1.0)
@@ -96,8 +96,8 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     """Smooth the neighbourhoods of guarded vertices by least squares.
 
     Minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
-    two-ring, all others fixed, with L the graph Laplacian and lambda =
-    0.01. The problem is linear in x: one Gauss-Newton step solves it.
+    two-ring, all others fixed, with the graph Laplacian L and lambda = 0.01. The problem is linear
+    in x, so one linear system solves it.
 
     Parameters
     ----------
@@ -127,6 +127,7 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     own = np.flatnonzero(free)
     laplacian = _laplacian(count, links)
     normal, right = _normal_equations(inverted, posed, welded.vertices, free)
+    # The Laplacian acts on each coordinate separately, hence the Kronecker product.
     smooth = sparse.kron(laplacian.T @ laplacian, sparse.diags_array(np.ones(3)))
     dof = (3 * own[:, None] + np.arange(3)).ravel()
     fixed = np.setdiff1d(np.arange(3 * count), dof)
@@ -134,7 +135,9 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     places = welded.positions.ravel()
     system = sparse.csc_array(normal + _SMOOTH * smooth[:, dof])
     solved = scipy_part("sparse.linalg").spsolve(
-        system, right - _SMOOTH * (smooth[:, fixed] @ places[fixed])
+        # Fixed vertices are known and move to the right-hand side.
+        system,
+        right - _SMOOTH * (smooth[:, fixed] @ places[fixed]),
     )
     moved = inverted.positions.copy()
     result = welded.positions.copy()

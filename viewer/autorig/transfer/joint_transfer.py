@@ -17,7 +17,7 @@ __all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts",
 
 _ENOUGH = 0.5  # fraction of a joint's weights that must be matched
 _SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
-_INSIDE = 0.5  # winding number between outside and inside
+_INSIDE = 0.5  # threshold of the winding number between outside and inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class TransferredJoints:
     transferred : (J,) bool
         Joints moved by the surface around them; the others moved with their parents.
     measurable : (J,) bool
-        Joints with any vertices to be moved by.
+        Joints with a non-empty row in the regressor.
     """
 
     positions: Floats
@@ -119,8 +119,9 @@ def transfer_joints(
     """Move joints by the displacement of the surface around them.
 
     J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the vector d_v to the
-    target and the rows k_j of a regressor: so the error of the regressor itself, which posed ones
-    have, cancels out. If less than half of a row is matched, the joint moves with its parent.
+    target and the rows k_j of a regressor. As only displacements are regressed, the error of the
+    regressor in a posed mesh cancels out. If less than half of a row is matched, the joint moves
+    with its parent.
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def transfer_joints(
     whole = np.bincount(rows, np.abs(weights), minlength=count)
     present = np.bincount(rows, np.abs(used), minlength=count)
     total = np.bincount(rows, used, minlength=count)
-    # Rows of both signs may nearly cancel, which makes them unreliable.
+    # Rows with weights of both signs may nearly cancel out, which makes them unreliable.
     transferred = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
     sums = [np.bincount(rows, used * shifts[columns, axis], minlength=count) for axis in range(3)]
     moves = np.stack(sums, axis=1) / np.where(transferred, total, 1.0)[:, None]
@@ -157,7 +158,7 @@ def transfer_joints(
 
 
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
-    """Return whether joints lie outside a mesh: (J,) bool; an inverted mesh has an inside too.
+    """Return whether joints lie outside a mesh: (J,) bool, also for a mesh that is inside out.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Ratio of the leg lengths of two figures, by which paths and heights are scaled.
 
-A root is as high as the legs below it are long, and step width is proportional to leg length.
+A root is at the height of the legs' length, and step width is proportional to leg length.
 So if limbs were scaled, or the whole figure stretched, lengths of the root scale with the legs.
 """
 
@@ -15,8 +15,8 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["leg_scale"]
 
-_LOW = 0.1  # of the joints' height: joints this close to the lowest are feet
-_LEGS = 0.2  # of the joints' height: a root less than this above them has no legs
+_LOW = 0.1  # fraction of the joints' extent in height; joints this close to the lowest are feet
+_LEGS = 0.2  # fraction of the joints' extent in height; a root closer to the feet has no legs
 
 
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
@@ -29,7 +29,7 @@ def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> f
     up : "y" or "z"
         The axis that points up, of both.
     otherwise : float
-        Returned if there are no legs: hands, heads, a root on the ground.
+        Returned if there are no legs, as for hands, heads, or a root on the ground.
     """
     axis = "xyz".index(up)
     heights = _heights(before, axis)

@@ -131,7 +131,7 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     below = np.flatnonzero(parents >= 0)
     above = parents[below]
     ways = joints[below] - joints[above]
-    # Solved, not transposed: poses may scale joints.
+    # Solved instead of multiplied by the transpose, as poses may scale joints.
     offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
     return offsets
 
@@ -156,6 +156,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
     straight = np.einsum("jab,jb->ja", frames, changes)
     mirrored = straight[partners] * flip
     own, other = transferred.astype(float), transferred[partners].astype(float)
+    # The mean of both sides if both or neither were measured, else the measured side.
     neither = own + other == 0.0
     own, other = np.where(neither, 1.0, own), np.where(neither, 1.0, other)
     mixed = (own[:, None] * straight + other[:, None] * mirrored) / (own + other)[:, None]
@@ -218,6 +219,8 @@ def _rotate_roots(
         return skeleton, []
     limits = skeleton.dof_limits.copy()
     low, high = limits[rows[ball], 0], limits[rows[ball], 1]
+    # R(quaternion) R(DOFs) must give the wanted rotation: ball joints solve for the DOFs, other
+    # joints keep them and solve for the quaternion.
     angles = _angles_within((np.swapaxes(beneath, 1, 2) @ wanted)[ball], low, high)
     pose.dofs[rows[ball]] = angles
     beyond = ((angles < low) | (angles > high)).any(axis=1)

@@ -24,10 +24,10 @@ __all__ = ["NEGLIGIBLE", "Report", "inpaint"]
 
 Report = Callable[[float, str], None]
 
-NEGLIGIBLE = 1e-6  # a solved weight below this counts as 0: solutions decay, but never reach 0
-_BLOCK = 1 << 22  # unknowns solved for per batch, 32 MB
+NEGLIGIBLE = 1e-6  # smaller solved weights count as 0, as solutions decay without reaching 0
+_BLOCK = 1 << 22  # unknowns per batch, 32 MB
 _TRUE = 1e-4  # maximum error of a solution that must be 1 everywhere
-_SHIFT = 1e-10  # of the mean diagonal, added to a matrix that cannot be factorised
+_SHIFT = 1e-10  # fraction of the mean diagonal, added to a matrix that cannot be factorised
 _STEPS = 2000  # maximum iterations of conjugate gradients
 _CONVERGED = 1e-9  # relative residual
 

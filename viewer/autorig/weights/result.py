@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 _LISTED = 5  # islands listed individually
-_FEW = 0.75  # of the vertices: with fewer matched, many weights are estimates
+_FEW = 0.75  # fraction of matched vertices below which too many weights are estimates
 
 
 @dataclass(frozen=True, slots=True, eq=False)

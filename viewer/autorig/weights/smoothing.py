@@ -14,7 +14,8 @@ __all__ = ["ROUNDS", "smooth", "within"]
 
 ROUNDS = 10
 _FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
-_NEGLIGIBLE = 1e-6  # iterations spread weights by an edge each; smaller ones are dropped at the end
+# Each iteration spreads weights by one edge; weights below this are dropped at the end.
+_NEGLIGIBLE = 1e-6
 
 
 def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -> Any:

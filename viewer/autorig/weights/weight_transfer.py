@@ -88,7 +88,7 @@ def transferred_weights(
     -------
     WeightTransfer
         Rows add up to 1. No weight of the template is dropped, only inpainted ones below 1e-6, and
-        those of corners that have less than 1e-6 of a closest point.
+        those of corners with a barycentric coordinate below 1e-6.
 
     Raises
     ------

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from viewer.errors import ViewerError, printable
+from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bytes

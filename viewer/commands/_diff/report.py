@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from viewer.commands._printing import table_lines
 from viewer.diagnostics import Diagnostic, described
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.comparison import Difference, Measure
 from viewer.rig.units import METRES
 

@@ -31,6 +31,7 @@ MESSAGES = {
     "F007.smpl-symmetry": "`vert_sym_idxs` is not a pairing of vertices: omitted",
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
     # Rigged meshes
+    "F002.rig-material": "{item:text}: row {index} is not a material: {problem:text}",
     "F002.rig-version": "{item:text}: expected version {expected}, found {found}",
     "F002.rig-up": "{item:text}: expected y or z, found {found:quoted}",
     "F002.rig-parts": "{problem:text}",

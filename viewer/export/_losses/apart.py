@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.errors import printable
 from viewer.export._losses.bounds import Bounds
 from viewer.export._losses.estimates import Estimator
 from viewer.export._losses.skinned import Body, Poses, Rows, Side, body_rows, poses_of, vertices
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size

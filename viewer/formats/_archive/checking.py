@@ -31,9 +31,7 @@ _ROWS = {
 
 def archive_of(source: Source) -> Archive:
     """Return the archive of a source, opened once; raises as ``open_archive`` does."""
-    if source.archive is None:
-        source.archive = open_archive(source, source.max_size)
-    return source.archive
+    return source.once(open_archive)
 
 
 def finite(

@@ -203,28 +203,20 @@ def _reason(problem: Exception) -> object:
     return getattr(problem, "strerror", None) or problem
 
 
-def open_npz(source: Source, max_size: int) -> Archive:
-    """Open an ``.npz`` file; raises as ``open_archive`` does.
-
-    Parameters
-    ----------
-    source : Source
-        A zip archive.
-    max_size : int
-        Largest size of all members together, unpacked, in bytes.
-    """
+def open_npz(source: Source) -> Archive:
+    """Open an ``.npz`` file; raises as ``open_archive`` does."""
     storage = _Storage(source)
     try:
         with storage.open() as file, zipfile.ZipFile(file) as archive:
             members = archive.infolist()
-            _check_members(source, members, storage.size, max_size)
+            _check_members(source, members, storage.size)
             values = {_key(member): _open_member(storage, archive, member) for member in members}
     except _DAMAGE as problem:
         raise source.fault("F002.npz", reason=printable(problem, 100)) from None
     return Archive(source, "npz", tuple(values), values.__getitem__)
 
 
-def open_npy(source: Source, max_size: int) -> Archive:
+def open_npy(source: Source) -> Archive:
     """Open an ``.npy`` file as an archive with the single key "arr_0"."""
     key = "arr_0"
     storage = _Storage(source)
@@ -233,8 +225,8 @@ def open_npy(source: Source, max_size: int) -> Archive:
     if isinstance(header, Opaque):
         value: Value = header
     else:
-        if storage.size > max_size:
-            raise source.fault("F001.too-large", most=max_size, size=storage.size)
+        if storage.size > source.max_size:
+            raise source.fault("F001.too-large", most=source.max_size, size=storage.size)
         value = header.deferred(partial(_load_file, storage, key, header))
     return Archive(source, "npy", (key,), {key: value}.__getitem__)
 
@@ -243,9 +235,7 @@ def _key(member: zipfile.ZipInfo) -> str:
     return member.filename.removesuffix(".npy")
 
 
-def _check_members(
-    source: Source, members: list[zipfile.ZipInfo], size: int, max_size: int
-) -> None:
+def _check_members(source: Source, members: list[zipfile.ZipInfo], size: int) -> None:
     """Refuse unreadable or too large members, before anything is unpacked."""
     for name, count in Counter(map(_key, members)).items():
         if count > 1:
@@ -259,8 +249,8 @@ def _check_members(
         if method not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise source.fault("F002.npz-method", item=name, method=method)
     total = sum(member.file_size for member in members)
-    if total > max_size:
-        raise source.fault("F001.too-large", most=max_size, size=total)
+    if total > source.max_size:
+        raise source.fault("F001.too-large", most=source.max_size, size=total)
     if total > max(_SMALL, _MAX_RATIO * size):
         raise source.fault("F002.npz-ratio", most=_MAX_RATIO, found=total, size=size)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from viewer.formats._archive.values import Archive
-from viewer.formats._source import MAX_SIZE, Source
+from viewer.formats._source import Source
 
 __all__ = ["is_archive", "open_archive"]
 
@@ -28,15 +28,14 @@ def is_archive(head: bytes) -> bool:
     return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None
 
 
-def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
+def open_archive(source: Source) -> Archive:
     """Open a pickle, ``.npz`` or ``.npy`` file, detected by its first bytes.
 
     Parameters
     ----------
     source : Source
-        The file. Harmless faults are added to its warnings.
-    max_size : int
-        Largest size of all members of an ``.npz`` together, unpacked, in bytes.
+        The file. Harmless faults are added to its warnings. Its ``max_size`` is also the largest
+        size of all members of an ``.npz`` together, unpacked.
 
     Raises
     ------
@@ -49,9 +48,9 @@ def open_archive(source: Source, max_size: int = MAX_SIZE) -> Archive:
 
     head = source.peek(4096)
     if head.startswith(_ZIP):
-        return open_npz(source, max_size)
+        return open_npz(source)
     if head.startswith(_NPY):
-        return open_npy(source, max_size)
+        return open_npy(source)
     if head.startswith(_LFS):
         raise source.fault("F002.archive-pointer")
     if not is_archive(head):

@@ -15,7 +15,7 @@ from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
-from viewer.rig.mesh import Material
+from viewer.rig.material import Material, Texture
 
 __all__ = ["read_libraries"]
 
@@ -58,7 +58,7 @@ def read_libraries(
         file, where, library = pictures[name]
         if file not in loaded:
             loaded[file] = load_image(library, file, where)
-        materials.append(Material(name, file, loaded[file]))
+        materials.append(Material(name, Texture(file, loaded[file])))
     return tuple(materials)
 
 

@@ -9,7 +9,7 @@ from viewer.formats._numbers import is_number
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
-from viewer.rig.mesh import Material
+from viewer.rig.material import Material, Texture
 
 __all__ = ["read_material"]
 
@@ -68,7 +68,7 @@ def read_material(
         return Material(name), word.end()
     if texture not in pictures:
         pictures[texture] = load_image(source, texture, named)
-    return Material(name, texture, pictures[texture]), word.end()
+    return Material(name, Texture(texture, pictures[texture])), word.end()
 
 
 def _name(source: Source, header: Word, keywords: Container[bytes]) -> tuple[str, Word]:

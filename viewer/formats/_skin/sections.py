@@ -14,7 +14,7 @@ from viewer.formats._skin.rows import OffsetOf, read_rows, whole_corners
 from viewer.formats._skin.weights import read_weights
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bytes, Floats, Ints
-from viewer.rig.mesh import Material
+from viewer.rig.material import Material
 
 __all__ = ["Sections", "TriangleRun", "check_declared", "read_sections"]
 
@@ -52,6 +52,7 @@ class Sections:
     materials: list[Material] = field(default_factory=list)
     pictures: dict[str, Bytes | None] = field(default_factory=dict)
     triangles: list[TriangleRun] = field(default_factory=list)
+    n_triangles: int = 0  # of all sections read so far
     bindings: Floats | None = None
     offsets: dict[str, int] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)  # as declared
@@ -115,7 +116,9 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
     if name == "skinweights":
         _read_weights(source, sections, block, count)
     elif name == "triangles":
-        sections.triangles.append(_read_triangles(source, sections, block, count))
+        run = _read_triangles(source, sections, block, count)
+        sections.triangles.append(run)
+        sections.n_triangles += len(run.triangles)
     else:
         sections.tables[name] = _read_table(source, block, count)
     if not block.closed:
@@ -131,7 +134,7 @@ def _read_table(source: Source, block: Block, count: int) -> Floats:
 
 
 def _read_triangles(source: Source, sections: Sections, block: Block, count: int) -> TriangleRun:
-    first = sum(len(run.triangles) for run in sections.triangles)
+    first = sections.n_triangles
     rows, offset_of = read_rows(source, block, count, 3, first, "triangle")
     corners = whole_corners(source, rows, offset_of, first)
     return TriangleRun(corners, len(sections.materials) - 1, offset_of)

@@ -44,9 +44,9 @@ class ActorBuffers:
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the skinning programs.
+        Provides the skinning programs.
     cube : moderngl.Buffer
-        The mesh that boxes are instances of.
+        Vertices of the cube that boxes are instances of.
     notes : list of str
         Receives messages about limitations of the driver.
     forget : callable
@@ -86,13 +86,13 @@ class ActorBuffers:
         return posed
 
     def skeleton(self, actor: Actor) -> SkeletonBuffers:
-        """Return an actor's boxes; its figure must have a skeleton."""
+        """Return the boxes of an actor's joints; its figure must have a skeleton."""
         figure = actor.figure
         make = lambda: SkeletonBuffers(self.context, figure, self._cube)  # noqa: E731
         return self.skeletons.get(actor, make)
 
     def keypoints_of(self, actor: Actor) -> KeypointBuffers:
-        """Return the markers of an actor's own keypoints; its figure must have some."""
+        """Return the markers of an actor's keypoints; its figure must have keypoints."""
         from viewer.rendering.passes.keypoint_pass import KeypointBuffers
 
         figure = actor.figure

@@ -79,9 +79,9 @@ class BoxBuffers:
         write_matrices(self.world, matrices)
 
     def _hidden(self, matrices: Floats) -> Bools:
-        """Return which boxes coincide with another; they are shrunk to a point to save time.
+        """Return a mask of boxes that coincide with an earlier one; they are collapsed to a point.
 
-        A hundred thousand overlapping boxes take minutes to draw in software.
+        Software drivers take minutes to draw a hundred thousand overlapping boxes.
         """
         rows = np.concatenate([matrices[:, :3].reshape(-1, 12), self._boxes.reshape(-1, 6)], axis=1)
         _, first = np.unique(rows.astype(np.float32), axis=0, return_index=True)

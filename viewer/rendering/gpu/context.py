@@ -31,7 +31,7 @@ _LIBEGL, _LIBGL = "libEGL.so.1", "libGL.so.1"
 _INSTALL = "on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri"
 _EGL_ERRORS = {
     "0x3001": "EGL could not be initialised: its driver files are missing or broken",
-    "0x3002": "EGL was refused access to the graphics device",
+    "0x3002": "EGL was denied access to the graphics device",
     "0x3003": "the driver is out of memory",
     "0x3008": "EGL does not accept this display",
     "0x3009": "OpenGL 3.3 is needed and the driver does not offer it",
@@ -44,17 +44,17 @@ def headless_context(device: int | None = None) -> moderngl.Context:
     Parameters
     ----------
     device : int, optional
-        Index of the EGL device; without it each one is tried in turn.
+        Index of the EGL device; if omitted, each one is tried in turn.
 
     Returns
     -------
     moderngl.Context
-        OpenGL 3.3 core or newer, current in this thread. Whoever calls this releases it.
+        OpenGL 3.3 core or newer, current in this thread; the caller releases it.
 
     Raises
     ------
     RenderError
-        With the cause and the cure.
+        With the cause and a remedy.
     ViewerError
         If there are devices, but none of this index.
     """
@@ -84,14 +84,14 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     try:
         with deferred():
             return moderngl.create_context(**settings)
-    except Exception as problem:  # glcontext raises nothing more specific
+    except Exception as problem:  # glcontext raises plain Exception
         text = str(problem)
         offer = headless_offer(settings) if "0x3009" in text or "version" in text else None
         raise RenderError(explain(text) if offer is None else offer_text(offer)) from None
 
 
 def check_device(device: int) -> None:
-    """Refuse a missing device; accept any if there are none at all, or they have no numbers.
+    """Raise for an index without a device; any is accepted if devices cannot be enumerated.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def check_device(device: int) -> None:
 
 
 def device_count() -> int:
-    """Return the number of devices, from the error about an impossible index."""
+    """Return the number of devices, taken from the error message about an out-of-range index."""
     try:
         _create({"device_index": 1 << 20})
     except RenderError as problem:
@@ -117,7 +117,7 @@ def device_count() -> int:
 
 
 def explain(text: str) -> str:
-    """Return an explanation of a message from glcontext or GLFW, and a cure.
+    """Return an explanation of a message from glcontext or GLFW, with a remedy.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def explain(text: str) -> str:
     Returns
     -------
     str
-        One line: cause and cure, the library's message in brackets.
+        One line: cause and remedy, and the library's message in brackets.
 
     >>> explain("libEGL.so.1 not loaded").startswith("libEGL was not found")
     True
@@ -135,7 +135,7 @@ def explain(text: str) -> str:
     devices = re.search(r"requested device index (\d+), but found (\d+)", text)
     code = re.search(r"0x30[0-9a-fA-F]{2}", text)
     if "not loaded" in text or "cannot open shared object" in text:
-        # In glcontext these variables override the given names.
+        # glcontext lets these environment variables override the given names.
         asked_gl = os.environ.get("GLCONTEXT_LINUX_LIBGL") or _LIBGL
         library = "libGL" if asked_gl in text else "libEGL"
         return f"{library} was not found ({_INSTALL}) [{text}]"

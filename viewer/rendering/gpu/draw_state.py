@@ -1,4 +1,4 @@
-"""OpenGL states that are set for some draws and restored after them."""
+"""OpenGL state that is set for a block of draws and restored afterwards."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["opacities", "without_colors", "without_depth_test", "without_depth_w
 
 @contextmanager
 def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
-    """Draw without writing depths, so that later draws are not hidden."""
+    """Draw without writing depth, so that later draws are not hidden."""
     target = context.fbo
     target.depth_mask = False
-    target.use()  # moderngl hands masks to OpenGL only then
+    target.use()  # moderngl applies masks to OpenGL only when a framebuffer is bound
     try:
         yield
     finally:
@@ -25,10 +25,10 @@ def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
 
 @contextmanager
 def without_colors(context: moderngl.Context) -> Iterator[None]:
-    """Draw depths only."""
+    """Draw depth only."""
     target = context.fbo
     target.color_mask = False, False, False, False
-    target.use()  # moderngl hands masks to OpenGL only then
+    target.use()  # moderngl applies masks to OpenGL only when a framebuffer is bound
     try:
         yield
     finally:
@@ -38,7 +38,7 @@ def without_colors(context: moderngl.Context) -> Iterator[None]:
 
 @contextmanager
 def without_depth_test(context: moderngl.Context) -> Iterator[None]:
-    """Draw over or under everything else, whatever its depth."""
+    """Draw regardless of depth, over what has been drawn."""
     context.disable(moderngl.DEPTH_TEST)
     try:
         yield
@@ -47,9 +47,9 @@ def without_depth_test(context: moderngl.Context) -> Iterator[None]:
 
 
 def opacities(context: moderngl.Context, hidden: float | None) -> Iterator[float]:
-    """Yield the opacity of each draw: first of hidden parts, then of visible ones.
+    """Yield the opacity of each draw, first for hidden parts, then for visible ones.
 
-    ``hidden`` is the opacity of the first; None draws once, over everything.
+    ``hidden`` is the opacity of hidden parts; None draws once, over everything.
     """
     for order, opacity in (("1", 1.0),) if hidden is None else ((">", hidden), ("<=", 1.0)):
         context.depth_func = order

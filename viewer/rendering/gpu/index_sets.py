@@ -1,8 +1,8 @@
 """Index buffers of the drawn triangles, in an order that keeps neighbours together.
 
-Drivers cache the last few computed vertices, at best a few hundred. Files often list triangles
-in an order that misses this cache, so that every vertex is computed three to five times; along a
-space-filling curve it is once or twice (``tests/bench/bench_instances.py``).
+Drivers cache the results of recent vertices, at most a few hundred. Files often list triangles
+in an order that misses this cache, so that every vertex is shaded three to five times; in the
+order of a space-filling curve it is shaded once or twice (``tests/bench/bench_instances.py``).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CURVE_BITS = 10  # per axis
 
 @dataclass(frozen=True, slots=True)
 class MeshRun:
-    """Consecutive triangles with one material: first index, number of indices, its texture."""
+    """Consecutive triangles with one material: first index, number of indices, texture."""
 
     first: int
     count: int
@@ -38,11 +38,11 @@ class IndexSet:
     Attributes
     ----------
     indices : moderngl.Buffer
-        Of split vertices.
+        Indices of split vertices.
     runs : tuple of MeshRun
-        Consecutive.
+        Consecutive runs, one per material.
     order : (N,) int32
-        Index of the given triangle that is drawn first, second …
+        Index of the given triangle at each position of the buffer.
     """
 
     indices: moderngl.Buffer
@@ -67,15 +67,15 @@ def index_set(
     Parameters
     ----------
     context : moderngl.Context
-        Gives the buffer.
+        The context in use.
     triangles : (T, 3)
         Indices of split vertices.
     materials : (T,)
         Index into ``textures`` of each triangle, -1 for none.
     textures : list
-        Of the materials.
+        Texture of each material.
     positions : (R, 3), optional
-        Of the split vertices, at rest; without them triangles keep their order.
+        Rest positions of the split vertices; without them triangles keep their order.
     """
     edges = np.flatnonzero(np.diff(materials)) + 1
     runs = []
@@ -104,7 +104,7 @@ def curve_places(points: Floats) -> NDArray[np.int64]:
     Returns
     -------
     (N,)
-        Bits of x, y and z interleaved, of 1024 cells along the longest side.
+        Morton codes: interleaved bits of x, y and z, with 1024 cells along the longest side.
 
     >>> curve_places(np.array([[0.0, 0, 0], [1023, 0, 0], [0, 1, 0], [1, 1, 1]])).tolist()
     [0, 153391689, 2, 7]
@@ -112,21 +112,21 @@ def curve_places(points: Floats) -> NDArray[np.int64]:
     low = points.min(axis=0)
     size = float((points.max(axis=0) - low).max()) or 1.0
     cells = ((points - low) * ((2**_CURVE_BITS - 1) / size)).astype(np.int64)
-    # Each step spreads groups of bits apart, until two zeros lie between any two.
+    # Each step spreads groups of bits, until there are two zeros between any two bits.
     for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
         cells = (cells | cells << shift) & mask
     return cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2
 
 
 def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> Bools:
-    """Return which triangles have a corner outside the hidden body parts: (T,) bool.
+    """Return a mask of triangles with a corner outside the hidden body parts: (T,) bool.
 
     Parameters
     ----------
     figure : Figure
-        With or without body parts.
+        The figure, with or without body parts.
     hidden : tuple of int
-        Hidden parts.
+        Indices of the hidden body parts.
     triangles : (T, 3)
         Indices of the figure's vertices.
     """

@@ -1,9 +1,9 @@
 """GPU buffers for an instanced draw of several actors with the same figure and shape.
 
-No posed vertices are kept: the vertex shader skins each instance by its own row of matrices, which
-with software rendering takes less time than writing posed vertices and reading them back
-(``tests/bench/bench_instances.py``). Every draw repeats the skinning, so a moving camera has a
-cost, and views that draw a mesh several times use the posed buffers of single actors.
+No posed vertices are stored: the vertex shader skins each instance with its own row of matrices.
+With software rendering this is faster than writing posed vertices and reading them back
+(``tests/bench/bench_instances.py``). Every draw repeats the skinning, so views that draw a mesh
+several times use the posed buffers of single actors instead.
 """
 
 from __future__ import annotations
@@ -60,14 +60,14 @@ _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
 
 class InstanceBuffers:
-    """Matrices, places and colours of actors that share figure and shape.
+    """Matrices, placements and colours of actors that share a figure and a shape.
 
     Parameters
     ----------
     context : moderngl.Context
-        Gives textures and buffers.
+        The context in use.
     mesh : MeshBuffers
-        Mesh of the figure, which has skeleton and skin.
+        Mesh of a figure with skeleton and skin.
     way : str
         Method of summing pose correctives, see ``rest_buffers``.
 
@@ -86,7 +86,7 @@ class InstanceBuffers:
         self._rest = RestBuffers(context, mesh, way)
         self._offsets = SummedOffsets(context, mesh, self._rest.way)
         self._how = Skinning()
-        self._words: tuple[object, ...] = ()
+        self._skinning_key: tuple[object, ...] = ()
         self._keys: list[NumberKey] = []
         self._centers: Floats = np.zeros((0, 3))
         self._is_rigid: Bools = np.ones(0, dtype=np.bool_)
@@ -110,16 +110,16 @@ class InstanceBuffers:
         Raises
         ------
         RenderError
-            If the driver has no room for so many.
+            If there is not enough graphics memory.
         """
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
-        words = (*skinning_words(how), poses[0].shape_weights.tobytes())
+        skinning_key = (*skinning_words(how), poses[0].shape_weights.tobytes())
         keys = [pose.skinning_key for pose in poses]
-        old = self._keys if words == self._words else []
+        old = self._keys if skinning_key == self._skinning_key else []
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
-        self._how, self._words, self.count = how, words, len(poses)
+        self._how, self._skinning_key, self.count = how, skinning_key, len(poses)
         if changed:
-            self._keys = []  # after an error nothing counts as uploaded
+            self._keys = []  # after an error everything is uploaded again
             self._reserve(len(poses))
             # Sums of pose correctives differ between actors and are uploaded separately.
             self._rest.update(figure, poses[0], replace(how, correctives=False))
@@ -128,7 +128,7 @@ class InstanceBuffers:
         self._keys = keys
 
     def _reserve(self, count: int) -> None:
-        """Reserve space; textures grow by half, so that a growing count is not copied each time."""
+        """Reserve space; textures grow by half, so that adding actors seldom reallocates."""
         if self._palette is not None and count <= len(self._rows):
             return
         room = max(count, len(self._rows) * 3 // 2)
@@ -143,16 +143,16 @@ class InstanceBuffers:
         self._is_rigid = np.concatenate([self._is_rigid, np.ones(more, dtype=np.bool_)])
 
     def _write(self, figure: Figure, poses: list[Pose], rows: NDArray[np.intp]) -> None:
-        """Upload T(-center') M T(center) of the poses at ``rows``, as ``PosedMesh`` does of one."""
+        """Upload T(-center') M T(center) for the poses at ``rows``; see ``PosedMesh``."""
         skeleton, skin, how = figure.require_skeleton(), figure.require_skin(), self._how
         assert self._palette is not None
         rotations = local_rotations(skeleton, poses)
         palette = skinning_matrices(posed_worlds(skeleton, poses, rotations), skin.inverse_bind)
         self._is_rigid[rows] = is_rigid(palette)
         palette[..., :3, 3] += palette[..., :3, :3] @ self.mesh.center
-        shares = self.mesh.skin(how).joint_shares
-        moved = np.einsum("j,aji->ai", shares, palette[..., :3, 3])
-        self._centers[rows] = moved if shares.any() else self.mesh.center
+        fractions = self.mesh.skin(how).joint_fractions
+        moved = np.einsum("j,aji->ai", fractions, palette[..., :3, 3])
+        self._centers[rows] = moved if fractions.any() else self.mesh.center
         palette[..., :3, 3] -= self._centers[rows, None]
         method = METHODS[how.method]
         if method.uses_matrices:
@@ -173,7 +173,7 @@ class InstanceBuffers:
     def place(self, actors: Sequence[Actor], view: View) -> None:
         """Upload the actors' placements, relative to a camera, and their colours.
 
-        Products are formed in float64: large translations cancel before float32 sees them.
+        Products are formed in float64: large translations cancel before the conversion to float32.
         """
         assert self._instances is not None  # updated before
         poses = [actor.pose for actor in actors if actor.pose is not None]
@@ -236,7 +236,7 @@ class InstanceBuffers:
                 )
                 if name in program and buffer is not None
             ]
-            # Attributes that the compiler dropped are skipped, four bytes per number.
+            # Skip the bytes of attributes that the compiler dropped, four per number.
             layout = " ".join(
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
             )

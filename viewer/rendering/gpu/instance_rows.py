@@ -1,4 +1,4 @@
-"""Rows of numbers, one per instance, that change with every draw."""
+"""Per-instance attribute rows that change with every draw."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class InstanceRows:
         Raises
         ------
         RenderError
-            If the driver has no room for them.
+            If there is not enough graphics memory.
         """
         self._count = len(rows)
         if not self._count:

@@ -23,16 +23,16 @@ __all__ = ["MeshBuffers"]
 class MeshBuffers:
     """Rest vertices, triangle indices, influences and textures of one figure.
 
-    Along seams a vertex is uploaded once per texture coordinate: these are the split vertices.
-    Positions are stored relative to the middle of the mesh: float32 then keeps its
-    precision for the figure's shape, however far it is from the origin.
+    Along texture seams a vertex is uploaded once per texture coordinate, as several split vertices.
+    Positions are stored relative to the centre of the mesh, so that float32 keeps its precision
+    however far the mesh is from the origin.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use; ``release`` frees all buffers.
     figure : Figure
-        With a mesh.
+        A figure with a mesh.
     notes : list of str
         Receives messages about limitations of the driver.
 
@@ -41,9 +41,9 @@ class MeshBuffers:
     center : (3,)
         The offset that was subtracted, figure space.
     sources : (R,) int32
-        The figure's vertex of each split vertex.
+        Vertex of the figure for each split vertex.
     copies : (V,) int32
-        A split vertex of each of the figure's.
+        One split vertex for each vertex of the figure.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
@@ -80,7 +80,7 @@ class MeshBuffers:
         self.skin(Skinning())
 
     def upload(self, rows: Floats) -> moderngl.Buffer:
-        """Return a buffer with one row of (V, 3) for every split vertex."""
+        """Return a buffer with the row of its vertex, from (V, 3), for every split vertex."""
         return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
 
     def index_set(
@@ -88,7 +88,7 @@ class MeshBuffers:
     ) -> IndexSet:
         """Return the triangles of the full or the reduced mesh, without hidden body parts.
 
-        ``as_listed`` keeps the file's order, on which the look of translucent edges depends.
+        ``as_listed`` keeps the file's order, which affects how translucent edges blend.
         """
         reduced = reduced and self.figure.reduced is not None
         key = (reduced, hidden, as_listed)
@@ -110,7 +110,7 @@ class MeshBuffers:
         return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
     def skin(self, skinning: Skinning) -> SkinBuffers:
-        """Return the influences that the skinning uses."""
+        """Return the influences that a skinning method uses."""
         key = (skinning.max_influences, skinning.normalize)
         if key not in self._skins:
             skin = self.figure.skin
@@ -132,7 +132,7 @@ class MeshBuffers:
         """The pose correctives as a texture, for drivers that sum them in the shader."""
         if self._offsets is None:
             correctives = self.figure.correctives
-            assert correctives is not None  # the caller looked
+            assert correctives is not None  # checked by the caller
             self._offsets = self._owner.keep(offset_texture(self.context, correctives.values()))
         return self._offsets
 
@@ -141,7 +141,7 @@ class MeshBuffers:
         """The pose correctives as float32, (P, 3 V), for sums on the processor."""
         if self._product is None:
             correctives = self.figure.correctives
-            assert correctives is not None  # the caller looked
+            assert correctives is not None  # checked by the caller
             values = correctives.values()
             self._product = float32(values.reshape(len(values), -1))
         return self._product

@@ -1,7 +1,7 @@
-"""Mipmaps of textures, averaged by numpy for software rendering.
+"""Mipmaps of textures, computed by numpy for software rendering.
 
-Mesa compiles two programs for ``glGenerateMipmap``: 60 ms, a fifth of the time from start to
-picture.
+Mesa compiles two programs for ``glGenerateMipmap``, which takes 60 ms, a fifth of the time from
+the start to the first picture.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def add_mipmaps(texture: moderngl.Texture, pixels: Bytes) -> None:
 
 
 def halved_pictures(pixels: Bytes) -> list[Bytes]:
-    """Return pictures of half the size, a quarter, ... one pixel, averaged in linear light.
+    """Return the mipmap levels from half the size down to one pixel, averaged in linear light.
 
     Parameters
     ----------

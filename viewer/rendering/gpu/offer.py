@@ -29,12 +29,12 @@ class Offer:
 
 
 def headless_offer(options: Mapping[str, Any]) -> Offer | None:
-    """Return the OpenGL that a machine offers without a window, None if there is none.
+    """Return the OpenGL version that the machine offers without a window; None if there is none.
 
     Parameters
     ----------
     options : mapping
-        ``backend``, ``device_index``, ``libegl`` and ``libgl``, as moderngl takes them.
+        moderngl's settings ``backend``, ``device_index``, ``libegl`` and ``libgl``.
     """
     chosen = options.get("backend")
     create = glcontext.get_backend_by_name(chosen) if chosen else glcontext.default_backend()
@@ -42,7 +42,7 @@ def headless_offer(options: Mapping[str, Any]) -> Offer | None:
     for version in _TRIED:
         try:
             context = create(mode="standalone", glversion=version, **names)
-        except Exception:  # glcontext raises nothing more specific
+        except Exception:  # glcontext raises plain Exception
             continue
         try:
             return offer_of(context.load("glGetString"))
@@ -57,14 +57,14 @@ def offer_of(address: int) -> Offer:
     Parameters
     ----------
     address : int
-        Of the function ``glGetString``.
+        Address of the function ``glGetString``.
     """
     get_string = ctypes.CFUNCTYPE(ctypes.c_char_p, ctypes.c_uint)(address)
-    words = [
+    strings = [
         (get_string(name) or b"").decode("utf-8", "replace")
         for name in (_VERSION, _LANGUAGE, _RENDERER)
     ]
-    return Offer(*words)
+    return Offer(*strings)
 
 
 def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str:
@@ -73,7 +73,7 @@ def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str
     Parameters
     ----------
     offer : Offer
-        Of a context of an older version.
+        Version strings of a context with an older version.
     environment : mapping of str to str
         Contains the variables that limit the version offered by Mesa.
     """
@@ -82,7 +82,7 @@ def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str
     version, language = _numbers(offer.version), _numbers(offer.language)
     forced = re.match(r"(\d)(\d\d)", environment.get(_OVERRIDES[1], ""))
     if forced:
-        # It applies to core profiles only, and there may be none.
+        # The override applies to core profiles only, and the driver may have none.
         language = min(language, (int(forced[1]), int(forced[2])))
     if version < _NEEDED:
         beside = f" with GLSL {_dotted(language, 2)}" if language < _NEEDED_LANGUAGE else ""
@@ -96,7 +96,7 @@ def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str
 
 
 def _numbers(text: str) -> tuple[int, int]:
-    """Return the version that a text begins with; OpenGL ES has a prefix.
+    """Return the version at the beginning of a text, after OpenGL ES's prefix if present.
 
     >>> _numbers("4.5 (Core Profile) Mesa 22.3.6"), _numbers("OpenGL ES 3.2 Mesa"), _numbers("")
     ((4, 5), (3, 2), (0, 0))

@@ -1,4 +1,4 @@
-"""Ownership of OpenGL objects, which are also freed if creating another one fails."""
+"""Ownership of OpenGL objects, including their release when a later creation fails."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Key = TypeVar("_Key")
 
 
 class Owner:
-    """Owner of objects, which it frees in reverse order."""
+    """Owner of objects; it frees them in reverse order of creation."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()
@@ -53,7 +53,7 @@ class Kept(Generic[_Key, _Item]):
         return len(self._items)
 
     def get(self, of: _Key, make: Callable[[], _Item]) -> _Item:
-        """Return an object's item, made now if there is none."""
+        """Return an object's item, creating it if there is none."""
         if id(of) not in self._items:
             self._items[id(of)] = (of, make())
         return self._items[id(of)][1]

@@ -1,4 +1,4 @@
-"""Shader programs: composed of files and chunks, compiled once, with errors by file and line."""
+"""Shader programs, composed of files and chunks and compiled once; errors give file and line."""
 
 from __future__ import annotations
 
@@ -76,17 +76,17 @@ class Programs:
         Parameters
         ----------
         name : str
-            Of the vertex shader, without suffix.
+            Name of the vertex shader, without suffix.
         chunk : str
             A key of ``SHADING``, for fragment shaders that take one.
         fragment : str
-            Of the fragment shader; the same name if omitted.
+            Name of the fragment shader; the same name if omitted.
         skin : str
             A key of ``viewer.rig.skinning.METHODS``, for vertex shaders that skin.
         geometry : str
-            Of the geometry shader, if there is one between the two.
+            Name of the geometry shader between the two, if any.
         affine : bool
-            For vertex shaders that skin: joints may scale or shear.
+            Whether joints may scale or shear, for vertex shaders that skin.
 
         Raises
         ------
@@ -100,7 +100,7 @@ class Programs:
     ) -> moderngl.Program:
         """Return a program without a fragment shader, whose interleaved outputs are captured.
 
-        Its chunk skins; ``affine`` says whether joints may scale or shear.
+        The chunk is a skinning method; ``affine`` tells whether joints may scale or shear.
         """
         return self._get((name, chunk, "", "", "", affine), outputs)
 
@@ -117,8 +117,8 @@ class Programs:
                 # Both stages output the fragment shader's inputs: the vertex shader's are renamed.
                 vertex = re.sub(r"\bv_(\w+)", r"v_vertex_\1", vertex)
             try:
-                # moderngl has functions in Python describe what a program has, and crashes if one
-                # of them raises, as handlers of signals may (5.13: no check for NULL).
+                # moderngl 5.13 calls Python functions to list a program's members. It crashes if
+                # one of them raises, as signal handlers may, since it does not check for NULL.
                 with deferred():
                     self._cache[key] = self.context.program(
                         vertex_shader=vertex,
@@ -186,7 +186,7 @@ def _included(name: str, files: list[str]) -> str:
 
 
 def _chunk(folder: str, chunk: str, files: list[str]) -> str:
-    """Return a chunk's text after those that it needs, whose functions get their file's name."""
+    """Return a chunk's text after the chunks it needs, whose functions get a suffix: their name."""
     inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     needs = _NEEDS.match(inner)
     parts = []

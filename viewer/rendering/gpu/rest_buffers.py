@@ -1,8 +1,8 @@
-"""The rest vertices of one actor: the figure's own, or changed by its shape and correctives.
+"""Rest vertices of one actor: those of its figure, or a copy with shape and correctives applied.
 
-Pose correctives are summed in one of two ways. Drivers on a graphics card sum them in the vertex
-shader from a texture: a frame then uploads only the weights. Software drivers are several
-times faster with one product of matrix and vector per changed pose (``tests/bench`` prints both).
+Pose correctives are summed in one of two ways. On a graphics card the vertex shader sums them
+from a texture, and a frame uploads only the weights. Software drivers are several times faster
+with one matrix-vector product per changed pose (``tests/bench`` prints both).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ WAYS = ("texture", "product")
 
 
 class RestBuffers:
-    """Positions and normals that the skinning shader starts from.
+    """Positions and normals that are the input of the skinning shader.
 
     Parameters
     ----------
     context : moderngl.Context
-        Gives the buffers.
+        The context in use.
     mesh : MeshBuffers
         Used unchanged while shape and correctives are 0.
     way : str
@@ -41,7 +41,7 @@ class RestBuffers:
     Attributes
     ----------
     positions, normals : moderngl.Buffer
-        Of every split vertex, positions minus the mesh's centre.
+        One row per split vertex; positions are relative to the mesh's centre.
     n_offsets : int
         Number of rows of correctives that the shader adds.
     """
@@ -61,7 +61,7 @@ class RestBuffers:
         Parameters
         ----------
         figure : Figure
-            Already shaped.
+            Figure with its shape applied.
         pose : Pose
             DOFs in lengths and radians.
         how : Skinning

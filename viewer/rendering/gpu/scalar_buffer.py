@@ -1,4 +1,4 @@
-"""Per-vertex numbers of a scalar quantity on the GPU, recomputed on change."""
+"""Per-vertex values of a scalar quantity on the GPU, recomputed on change."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ __all__ = ["ScalarBuffer"]
 
 
 class ScalarBuffer:
-    """One actor's numbers.
+    """Values of a scalar quantity on one actor.
 
     Parameters
     ----------
     context : moderngl.Context
-        Gives the buffer.
+        The context in use.
     mesh : MeshBuffers
-        Its split vertices.
+        Provides the split vertices.
 
     Attributes
     ----------
     values : moderngl.Buffer or None
-        One float32 for every split vertex; None before the first computation.
+        One float32 per split vertex; None before the first computation.
     numbers : (V,)
-        The same for the figure's own vertices.
+        The same values per vertex of the figure.
     range : (float, float)
         Lowest and highest value, in the unit that ``SCALARS`` names.
     span : (float, float)
-        The same, or the typical span of a quantity with a robust range.
+        The same, or the typical range of a quantity with a robust range.
     name : str
-        Name of the quantity.
+        Name of the scalar quantity.
     version : int
         Number of computations.
     look : ScalarLook or None
-        Colours of the numbers; None for a figure without the quantity.
+        Colours of the values; None for a figure without the quantity.
     is_shown : bool
         Whether ``show`` was called.
     """
@@ -73,10 +73,10 @@ class ScalarBuffer:
         key = (name, repr(skinning), pose is None, pose_key(pose) if depends and pose else None)
         if key == self._key:
             return
-        figure, view = self.mesh.figure, find_quantity(name)
-        if view.about and missing_part(name, figure):
+        figure, quantity = self.mesh.figure, find_quantity(name)
+        if quantity.about and missing_part(name, figure):
             # The joint or field may belong to another figure of the scene.
-            nothing = -1.0 if view.kind == "categorical" else 0.0
+            nothing = -1.0 if quantity.kind == "categorical" else 0.0
             self.numbers = np.full(len(self.mesh.copies), nothing)
         else:
             self.numbers = compute(name, figure, pose, skinning)
@@ -84,12 +84,12 @@ class ScalarBuffer:
             self.values = self.context.buffer(reserve=4 * self.mesh.n_vertices, dynamic=True)
         self.values.write(float32(self.numbers[self.mesh.sources]))
         self.range = float(np.min(self.numbers)), float(np.max(self.numbers))
-        self.span = typical_span(self.numbers) if view.robust else self.range
+        self.span = typical_span(self.numbers) if quantity.robust else self.range
         self.name, self._key = name, key
         self.version += 1
 
     def show(self, look: ScalarLook | None) -> None:
-        """Set the colours of the numbers; None for no colours."""
+        """Set the colours of the values; None for no colours."""
         self.is_shown = True
         if look is not None and (self._colors is None or not self._has(look)):
             if self._colors is not None:

@@ -21,16 +21,16 @@ class SkinBuffers:
     context : moderngl.Context
         The context in use; ``release`` frees all buffers.
     skin : Skin or None
-        None gives no vertex any influence.
+        None for vertices without influences.
     sources : (R,)
-        The skin's vertex of each split vertex.
+        Vertex of the skin for each split vertex.
 
     Attributes
     ----------
     bindings : moderngl.Buffer
         One row per split vertex, see ``include/skinning.glsl``.
-    joint_shares : (J,)
-        Each joint's fraction of all weights; the weighted mean motion is that of the figure.
+    joint_fractions : (J,)
+        Each joint's fraction of the sum of all weights, for the mean motion of the figure.
     """
 
     def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
@@ -41,7 +41,7 @@ class SkinBuffers:
     def _upload(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
         keep = self._owner.keep
         if skin is None:
-            self.joint_shares: Floats = np.zeros(0)
+            self.joint_fractions: Floats = np.zeros(0)
             ranges, excess = np.zeros((len(sources), 2), "u4"), np.zeros(len(sources))
             self.pairs = keep(pair_texture(context, [], []))
         else:
@@ -50,10 +50,10 @@ class SkinBuffers:
             ranges = np.stack([skin.starts[:-1], counts], axis=1)[sources]
             self.pairs = keep(pair_texture(context, skin.joints, skin.weights))
             sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
-            self.joint_shares = sums / (sums.sum() or 1.0)
-            # In float64: float32 sums deviate from 1, which moves vertices far from the origin.
+            self.joint_fractions = sums / (sums.sum() or 1.0)
+            # In float64: float32 sums deviate from 1, which displaces vertices far from the origin.
             excess = (weight_sums(skin) - 1.0)[sources]
-        # One packed attribute: each costs software drivers as much time as a matrix product.
+        # One packed attribute: each attribute costs software drivers as much as a matrix product.
         bindings = np.empty((len(sources), 4), dtype="u4")
         bindings[:, :2], bindings[:, 2] = ranges, sources
         bindings[:, 3] = excess.astype("f4").view("u4")

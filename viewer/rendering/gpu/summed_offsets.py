@@ -23,22 +23,22 @@ __all__ = ["SummedOffsets"]
 class SummedOffsets:
     """Offsets that ``include/skinning.glsl`` adds to the vertices of each instance.
 
-    If the shader sums, its list holds the weights of all instances. If the processor sums, one
-    matrix product computes a row of offsets for every instance.
+    If the shader sums the offsets, a list holds the weights of all instances. If the CPU sums them,
+    one matrix product computes a row of offsets for every instance.
 
     Parameters
     ----------
     context : moderngl.Context
-        Gives textures.
+        The context in use.
     mesh : MeshBuffers
-        Of the figure.
+        Mesh of the figure.
     way : str
         One of ``rest_buffers.WAYS``.
 
     Attributes
     ----------
     n_listed : int
-        Rows of each instance's list; 0 if there are no correctives.
+        Length of each instance's list; 0 if there are no correctives.
     n_summed : int
         1 if there is a row of sums for each instance, else 0.
     """
@@ -57,7 +57,8 @@ class SummedOffsets:
         Parameters
         ----------
         rotations : (C, J, 3, 3) or None
-            Of the joints within their parents, of instances that changed; None adds nothing.
+            Rotations of the joints relative to their parents, for changed instances; None for no
+            correctives.
         rows : (C,)
             Indices of these instances.
         count : int

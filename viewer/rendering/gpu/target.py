@@ -1,4 +1,4 @@
-"""Render targets: a multisampled framebuffer, and a plain one that it is resolved to."""
+"""Render targets: a multisampled framebuffer and the single-sample one it is resolved to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
 def check_size(
     context: moderngl.Context, size: tuple[int, int], what: str = "picture size"
 ) -> None:
-    """Refuse a picture size that the driver cannot draw; ``what`` begins the message.
+    """Raise for a picture size that the driver cannot draw; ``what`` begins the message.
 
     Raises
     ------
@@ -34,8 +34,8 @@ def check_size(
 def target_bytes(size: tuple[int, int], samples: int) -> int:
     """Return the memory in bytes that OpenGL needs for a picture while it is drawn.
 
-    Colour and depth of every sample, 4 bytes each, and the resolved picture;
-    without multisampling that picture and its depth.
+    Colour and depth of every sample, 4 bytes each, plus the resolved picture; without
+    multisampling, the picture and its depth.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Target:
             check_errors(context, f"a picture of {size[0]} x {size[1]} pixels")
         except (moderngl.Error, RenderError):
             self.release()
-            context.clear_errors()  # that of the failed allocation
+            context.clear_errors()  # the error of the failed allocation
             raise self._no_room() from None
 
     def _allocate(self) -> None:
@@ -156,7 +156,7 @@ class Target:
 
 
 def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
-    """Return pixels from OpenGL as a picture: (H, W, 4) uint8, first row at the top, not a copy.
+    """Return pixels from OpenGL as a view: (H, W, 4) uint8, first row at the top.
 
     Parameters
     ----------

@@ -34,8 +34,7 @@ __all__ = [
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 
-# Every driver with OpenGL 3.3 allows textures at least 1024 wide; the shaders rely on
-# these widths.
+# Fixed texture widths, which the shaders rely on: every OpenGL 3.3 driver allows at least 1024.
 _MATRICES_PER_ROW = 256  # three texels each
 _PAIRS_PER_ROW = 1024
 _OFFSETS_PER_ROW = 4096
@@ -50,7 +49,7 @@ def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffe
 
 
 def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:
-    """Return an object if the driver created it without error; else free it and raise."""
+    """Return an object that the driver created without error; otherwise free it and raise."""
     try:
         check_errors(context, what)
     except RenderError:
@@ -83,12 +82,12 @@ def matrix_texture(context: moderngl.Context, count: int) -> moderngl.Texture:
 
 
 def write_matrices(texture: moderngl.Texture, matrices: Floats) -> None:
-    """Upload (J, 4, 4) matrices, the only upload per frame of a posed figure."""
+    """Upload (J, 4, 4) matrices, the only per-frame upload of a posed figure."""
     texture.write(matrix_rows(matrices))
 
 
 def write_stacked(texture: moderngl.Texture, rows: NDArray[np.float32]) -> None:
-    """Upload rows of texels that fill the first rows of a texture, the last one possibly in part.
+    """Upload consecutive texels into the first rows of a texture, padding the last row.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
 
 
 def offset_texture(context: moderngl.Context, offsets: Floats) -> moderngl.Texture:
-    """Return a texture of (P, V, 3) offsets, one texel each, row after row."""
+    """Return a texture of (P, V, 3) offsets, one texel each, in row-major order."""
     texture = empty_offsets(context, offsets.shape[0] * offsets.shape[1])
     write_stacked(texture, float32(offsets))
     return checked(context, texture, f"{offsets.shape[0] * offsets.shape[1]} offsets")

@@ -37,9 +37,9 @@ class VertexArrays:
         program : moderngl.Program
             Cached by ``Programs``, so its id is unique.
         content : callable
-            Returns buffers, layouts and attribute names; called if the array is new.
+            Returns buffers, layouts and attribute names; called only to create the array.
         indices : moderngl.Buffer, optional
-            Of the triangles.
+            Index buffer of the triangles.
         key : tuple
             Distinguishes arrays of one program with different content or indices.
         """

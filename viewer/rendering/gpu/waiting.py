@@ -1,9 +1,9 @@
 """Waiting for the driver without holding Python's lock, so that other threads can run.
 
-moderngl holds the global interpreter lock in every call. Reading a picture that is still being
-drawn takes as long as the drawing, and no other thread can run Python meanwhile: an encoder's
-thread that needs the lock five times per frame would take five frames' time for each. ``ctypes``
-releases the lock during a call, so two functions of OpenGL are called through it.
+moderngl holds the global interpreter lock during every call. Reading a picture that is still being
+drawn blocks until the drawing is finished, and no other thread can run Python meanwhile: an
+encoder thread that needs the lock five times per frame would be delayed by five frames. ``ctypes``
+releases the lock during a call, so two OpenGL functions are called through it.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ class Waiter:
     Parameters
     ----------
     context : moderngl.Context
-        Current whenever a method is called.
+        The context in use; it must be current whenever a method is called.
 
     Attributes
     ----------
     is_free : bool
-        Whether other threads can run meanwhile; False with versions of moderngl that do not expose
-        the functions' addresses. Everything still works then, but slower.
+        Whether other threads can run during the wait. False with versions of moderngl that do not
+        expose the functions' addresses; recording still works then, but more slowly.
     """
 
     def __init__(self, context: moderngl.Context) -> None:

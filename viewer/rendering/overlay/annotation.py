@@ -28,10 +28,10 @@ __all__ = [
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default colour of labels, sRGB."""
 
-_LETTERS = 13.0  # pixels, for a picture of standard height
+_LETTERS = 13.0  # height, pixels, in a picture of standard height
 _GAP = 7.0  # pixels between a point and its label
 _LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
-_RIM = 5.0  # pixels between a point and the line that leads from it
+_RIM = 5.0  # pixels between a point and the start of its leader line
 _DARK = (0.05, 0.06, 0.08, 0.7)
 
 
@@ -43,13 +43,13 @@ class Labels:
     ----------
     words : tuple of N str
         Their texts.
-        points : (N, 3)
-        Scene space.
+    points : (N, 3)
+        Labelled points, scene space.
     ranks : (N,) int
-        Lower ranks take precedence if there is no room for all, also across annotations; among
-        equal ranks, nearer points do.
+        Labels of lower rank take precedence if there is no room for all, also across
+        annotations; among equal ranks, those of nearer points do.
     colors : (N, 3)
-        Of the letters, sRGB, 0 to 1.
+        Colours of the text, sRGB, 0 to 1.
     """
 
     words: tuple[str, ...]
@@ -86,19 +86,19 @@ class PlacedLabels:
     words : tuple of M str
         Their texts.
     corners : (M, 2)
-        Left upper corners, pixels from the picture's left and upper edge.
+        Top left corners, pixels from the picture's left and upper edge.
     colors : (M, 3)
         sRGB, 0 to 1.
     points : (M, 3)
         Labelled points, scene space.
     ends : (M, 2)
-        The point of each label that is nearest to its labelled point, pixels.
+        Point on each label that is nearest to the labelled point, pixels.
     has_line : (M,) bool
         Whether a leader line is needed.
     owners : (M,)
         Indices of the ``Labels`` that they belong to.
     n_seen : tuple of int
-        For each ``Labels``, the number of points within the picture.
+        Number of points within the picture, for each ``Labels``.
     """
 
     words: tuple[str, ...]
@@ -112,13 +112,13 @@ class PlacedLabels:
 
     @property
     def n_left_out(self) -> tuple[int, ...]:
-        """For each ``Labels``, the number of labels omitted for lack of room."""
+        """Number of labels omitted for lack of room, for each ``Labels``."""
         drawn = np.bincount(self.owners, minlength=len(self.n_seen)).tolist()
         return tuple(seen - count for seen, count in zip(self.n_seen, drawn, strict=True))
 
 
 def letters_for(size: tuple[int, int]) -> int:
-    """Return the height of letters in a picture, pixels.
+    """Return the height of text in a picture, pixels.
 
     Parameters
     ----------
@@ -136,13 +136,13 @@ def place_labels(
     Parameters
     ----------
     labels : sequence of Labels
-        The labels; none of them covers another.
+        The labels; they are placed without overlap.
     view : View
         The camera's matrices.
     size : (int, int)
         Width and height of the picture, pixels.
     lettering : Lettering
-        The letters.
+        The font.
     """
     words = [word for one in labels for word in one.words]
     points = np.concatenate([np.zeros((0, 3)), *(one.points for one in labels)])

@@ -34,11 +34,11 @@ def joint_annotation(
     actors : sequence of Actor
         The actors of a scene.
     options : DisplayOptions
-        Display options, which select the marks.
+        Display options that select the marks.
     size : (int, int)
         Width and height of the picture, pixels.
     selected : (int, int)
-        An actor's index and the joint of it that is highlighted; -1 for none.
+        Index of an actor and of its highlighted joint; -1 for none.
     """
     marks = marks_of(actors)
     parts = [part for one in marks for part in _parts(one, options, size, selected)]
@@ -51,7 +51,7 @@ def joint_annotation(
 def _parts(
     marks: JointMarks, options: DisplayOptions, size: tuple[int, int], selected: tuple[int, int]
 ) -> list[Segments]:
-    """Return the lines and dots of one actor, those on top last."""
+    """Return the lines and dots of one actor, the topmost last."""
     scale, joint = picture_scale(size), selected[1] if marks.actor == selected[0] else -1
     parts = [bone_segments(marks, joint, scale)] if options.xray else []
     if options.joint_axes:

@@ -1,4 +1,4 @@
-"""Joints over the picture: bones seen through the skin, axes, and the joint under a pixel."""
+"""Joint marks drawn over the picture: X-ray bones and axes; and the joint at a pixel."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ __all__ = [
 ]
 
 HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
-"""Of the selected joint, sRGB and opacity."""
+"""Colour of the selected joint, sRGB and opacity."""
 
 _AXIS_COLORS = ((0.95, 0.36, 0.33), (0.42, 0.83, 0.36), (0.36, 0.58, 1.0))  # x, y, z; sRGB
-_AXIS_SHARE = 0.4  # of the distance to the nearest connected joint
+_AXIS_FRACTION = 0.4  # of the distance to the nearest connected joint
 _AXIS_LIMITS = 0.005, 0.05  # of the skeleton's size
 _DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels, for a picture of standard height
 _OUTLINE = 2.0
@@ -52,9 +52,9 @@ class JointMarks:
     actor : int
         Index in the scene.
     skeleton : Skeleton
-        Of its figure.
+        Skeleton of its figure.
     matrices : (J, 4, 4)
-        Joint space to scene.
+        Matrices from joint space to scene space.
     """
 
     actor: int
@@ -68,14 +68,14 @@ class JointMarks:
 
 
 def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
-    """Return the joints of all actors that are drawn and have some."""
+    """Return the joints of all drawn actors that have a skeleton."""
     found = []
     for index, actor in enumerate(actors):
         skeleton, pose = actor.figure.skeleton, actor.pose
         if skeleton is None or pose is None or not actor.is_drawn:
             continue
         shape = shaped(actor.figure, pose.shape_weights).skeleton
-        assert shape is not None  # shaping keeps it
+        assert shape is not None  # applying a shape keeps the skeleton
         placement = actor.placement @ placement_matrix(pose)
         matrices = placement @ posed_skeleton(shape, pose).world
         found.append(JointMarks(index, skeleton, matrices))
@@ -88,17 +88,17 @@ def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
     Parameters
     ----------
     marks : JointMarks
-        Of one actor.
+        Joints of one actor.
     selected : int
         The joint whose bones are highlighted, -1 for none.
     scale : float
-        How much larger than usual marks are.
+        Scale of the marks relative to their standard size.
     """
     parents = marks.skeleton.parents
     children = np.flatnonzero(parents >= 0)
     points, above = marks.points, parents[children]
     colors = _colors(marks.skeleton, selected)[above]
-    # A dark line beneath each makes it visible on any background.
+    # A dark outline makes each bone visible on any background.
     starts = np.concatenate([points[above], points[above]])
     ends = np.concatenate([points[children], points[children]])
     dark = np.broadcast_to(_DARK, colors.shape)
@@ -108,7 +108,7 @@ def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
 
 
 def joint_dots(marks: JointMarks, selected: int, scale: float) -> list[Segments]:
-    """Return a dot at each joint, dark ones beneath; parameters are those of ``bone_segments``."""
+    """Return a dark-rimmed dot at each joint; the parameters are those of ``bone_segments``."""
     colors, points = _colors(marks.skeleton, selected), marks.points
     parts = [dots(points, np.array(_DARK), scale * (_DOT + _OUTLINE))]
     parts.append(dots(points, colors, scale * _DOT))
@@ -122,15 +122,15 @@ def joint_dots(marks: JointMarks, selected: int, scale: float) -> list[Segments]
 def axis_segments(marks: JointMarks, scale: float) -> Segments:
     """Return the x, y and z axis of each joint: red, green, blue.
 
-    Their length is a fraction of the distance to the nearest parent or child, so that those of a
-    hand's joints do not overlap.
+    Their length is a fraction of the distance to the nearest parent or child, so that the axes of
+    finger joints do not overlap.
 
     Parameters
     ----------
     marks : JointMarks
-        Of one actor.
+        Joints of one actor.
     scale : float
-        How much larger than usual marks are.
+        Scale of the marks relative to their standard size.
     """
     points, count = marks.points, len(marks.points)
     lengths = _axis_lengths(points, marks.skeleton)
@@ -153,7 +153,7 @@ def _axis_lengths(points: Floats, skeleton: Skeleton) -> Floats:
     nearest = np.full(len(points), np.inf)
     np.minimum.at(nearest, children, apart)
     np.minimum.at(nearest, above, apart)
-    return np.clip(_AXIS_SHARE * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
+    return np.clip(_AXIS_FRACTION * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
 
 
 def _colors(skeleton: Skeleton, selected: int) -> Floats:
@@ -177,7 +177,7 @@ def joint_at(
     Parameters
     ----------
     marks : sequence of JointMarks
-        Of all actors.
+        Joints of all actors.
     view : View
         The camera's matrices.
     size : (int, int)
@@ -210,13 +210,13 @@ def _away(
     pixel: tuple[float, float],
     with_bones: bool,
 ) -> tuple[Floats, Ints, Floats]:
-    """Return distances to dots (up to 1) and bones (1 to 2) at a pixel, their joints and depths."""
+    """Return distances from a pixel, 0..1 for dots and 1..2 for bones, their joints and depths."""
     scale, seen = picture_scale(size), project(view, size, marks.points)
     away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
     away[~seen.seen | (away > 1.0)] = np.inf
     joints: Ints = np.arange(len(away), dtype=np.int32)
     if with_bones:
-        # Dots lie over bones.
+        # Dots are drawn over bones and take precedence.
         beside, parents = _beside_bones(marks, view, size, pixel)
         beside = 1.0 + beside / (scale * _BONE_REACH)
         away = np.concatenate([away, np.where(beside > 2.0, np.inf, beside)])
@@ -234,8 +234,8 @@ def _beside_bones(
     along = ends[:, 1] - ends[:, 0]
     to_pixel = np.asarray(pixel) - ends[:, 0]
     squares = (along**2).sum(axis=1)
-    share = (to_pixel * along).sum(axis=1) / np.where(squares > 0.0, squares, 1.0)
-    nearest = np.clip(share, 0.0, 1.0)[:, None] * along
+    fraction = (to_pixel * along).sum(axis=1) / np.where(squares > 0.0, squares, 1.0)
+    nearest = np.clip(fraction, 0.0, 1.0)[:, None] * along
     away = np.linalg.norm(to_pixel - nearest, axis=1)
     away[~seen] = np.inf
     return away, above

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Labels
 from viewer.rendering.overlay.joint_marks import HIGHLIGHT, JointMarks
 from viewer.rig.skeleton import joint_labels
 
 __all__ = ["name_labels"]
 
-_LONGEST = 40  # letters of a name
-_LATE = 1000  # rank of unselected joints: other labels take precedence
+_LONGEST = 40  # characters of a name
+_LATE = 1000  # rank of unselected joints, so that other labels take precedence
 
 
 def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
@@ -23,16 +23,16 @@ def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Label
     Parameters
     ----------
     marks : sequence of JointMarks
-        Of all actors.
+        Joints of all actors.
     selected : (int, int)
-        An actor's index and a joint of it; -1 for none.
+        Index of an actor and of its selected joint; -1 for none.
     """
-    words = [printable(word, _LONGEST) for one in marks for word in joint_labels(one.skeleton)]
-    if not words:
+    texts = [printable(text, _LONGEST) for one in marks for text in joint_labels(one.skeleton)]
+    if not texts:
         return Labels((), np.zeros((0, 3)), np.zeros(0, dtype=np.int32), np.zeros((0, 3)))
     is_chosen = np.concatenate(
         [(np.arange(len(one.points)) == selected[1]) & (one.actor == selected[0]) for one in marks]
     )
     points = np.concatenate([one.points for one in marks])
     colors = np.where(is_chosen[:, None], HIGHLIGHT[:3], LABEL_COLOR)
-    return Labels(tuple(words), points, np.where(is_chosen, 0, _LATE).astype(np.int32), colors)
+    return Labels(tuple(texts), points, np.where(is_chosen, 0, _LATE).astype(np.int32), colors)

@@ -1,4 +1,4 @@
-"""Spatial grid of a picture: fast queries for the points within many rectangles."""
+"""Uniform grid over a picture, for fast queries of the points within many rectangles."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Cells", "Dots", "summed", "sums_within"]
 
-_FINE = 4  # parts of a pixel, both ways, of which each has one dot
-_BLOCK = 4  # cells, both ways
-_DENSE = 8  # dots in a block on average, from which on they are looked at in layers
-_PAIRS = 1 << 18  # pairs of a rectangle and a dot that are tested at once
+_FINE = 4  # subdivisions of a pixel per axis; each keeps at most one dot
+_BLOCK = 4  # cells per axis
+_DENSE = 8  # mean number of dots per block from which they are split into layers
+_PAIRS = 1 << 18  # pairs of a rectangle and a dot per batch
 
 
 class Cells:
-    """The cells: 1 to ``n`` both ways within the picture, 0 and ``n + 1`` are what lies outside.
+    """The cells: 1 to ``n`` per axis within the picture; 0 and ``n + 1`` are outside it.
 
     Parameters
     ----------
     picture : (int, int)
         Width and height, pixels.
     side : int
-        Of a cell, pixels.
+        Side length of a cell, pixels.
 
     Attributes
     ----------
     shape : (int, int)
-        Rows and columns of a table with a number for every cell.
+        Rows and columns of an array with one element per cell.
     """
 
     def __init__(self, picture: tuple[int, int], side: int) -> None:
@@ -39,25 +39,26 @@ class Cells:
         self.shape = int(self._counts[1]) + 2, int(self._counts[0]) + 2
 
     def of(self, points: Floats) -> Ints:
-        """Return the cells of points: (..., 2), column and row."""
+        """Return the cells that contain points: (..., 2), column and row."""
         found = np.clip(np.floor(points / self.side) + 1.0, 0, self._counts + 1)
         return np.asarray(found.astype(np.int32))
 
     def within(self, low: Floats, high: Floats) -> tuple[Ints, Ints]:
-        """Return the first cells wholly within rectangles, and those after the last: (..., 2)."""
+        """Return the half-open ranges of cells within rectangles, first and end: (..., 2)."""
         first = np.clip(np.ceil(low / self.side) + 1.0, 1, self._counts + 1)
         after = np.clip(np.floor(high / self.side) + 1.0, first, self._counts + 1)
         return first.astype(np.int32), after.astype(np.int32)
 
     def touching(self, low: Floats, high: Floats) -> tuple[Ints, Ints]:
-        """Return the first cells that rectangles touch, and those after the last: (..., 2)."""
+        """Return the half-open ranges of cells that rectangles touch, first and end: (..., 2)."""
         return self.of(low), self.of(high) + np.int32(1)
 
 
 def summed(table: Ints) -> Ints:
-    """Return a table's sums from its corner to every cell, one row and column larger.
+    """Return the summed-area table of an array, one row and column larger.
 
-    Crow 1984, Summed-area tables for texture mapping: four of them give the sum of a rectangle.
+    Four of its elements give the sum over a rectangle (Crow 1984, Summed-area tables for texture
+    mapping).
     """
     sums = np.zeros((table.shape[0] + 1, table.shape[1] + 1), dtype=np.int32)
     table.cumsum(axis=0, out=sums[1:, 1:], dtype=np.int32)
@@ -66,14 +67,14 @@ def summed(table: Ints) -> Ints:
 
 
 def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
-    """Return the sums of rectangles of cells: (...,).
+    """Return the sums over rectangles of cells: (...,).
 
     Parameters
     ----------
     sums : (rows + 1, columns + 1)
-        As ``summed`` gives them.
+        Result of ``summed``.
     first, after : (..., 2)
-        Column and row of the first cells and of those after the last; nothing where they are equal.
+        Column and row of the first cell and one past the last; empty where they are equal.
     """
     flat, width = sums.ravel(), sums.shape[1]
     low, high = first[..., 1] * width, after[..., 1] * width
@@ -82,15 +83,15 @@ def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
 
 
 class Dots:
-    """Points in cells.
+    """Points sorted into grid cells.
 
     Parameters
     ----------
     cells : Cells
-        Of the picture.
+        Grid over the picture.
     points : (N, 2)
-        Pixels from the picture's left and upper edge. Of those within a quarter of a pixel both
-        ways, one counts: else all joints of a figure far away would be compared with each other.
+        Pixels from the picture's left and upper edge. Points within the same quarter of a pixel
+        are merged: otherwise all joints of a distant figure would be compared with each other.
     """
 
     def __init__(self, cells: Cells, points: Floats) -> None:
@@ -111,16 +112,16 @@ class Dots:
 
     @property
     def n_layers(self) -> int:
-        """Parts of the dots; the first has few of them, enough to see most dense blocks."""
+        """Number of layers; the first one holds few dots, enough to reject most crowded places."""
         return len(self._layers)
 
     def _starts(self, places: Ints) -> Ints:
-        """Return where the dots of each cell begin, and their number at the end."""
+        """Return the index of each cell's first dot, followed by the number of dots."""
         counts = np.bincount(places, minlength=math.prod(self.cells.shape))
         return np.concatenate([[0], counts.cumsum()]).astype(np.int32)
 
     def count_at(self, pixels: Ints) -> Ints:
-        """Return how many dots are in the cells of pixels within the picture: (...,)."""
+        """Return the number of dots in the cells of pixels within the picture: (...,)."""
         places = pixels // self.cells.side + 1
         return self._counts[places[..., 1], places[..., 0]]
 
@@ -133,21 +134,21 @@ class Dots:
         return sums_within(self._sums, *self.cells.touching(low, high))
 
     def pairs(self, low: Floats, high: Floats, layer: int) -> Iterator[tuple[Ints, Floats]]:
-        """Yield pairs of rectangles and dots of a layer in the cells that they touch, in batches.
+        """Yield batches of pairs of a rectangle and a dot of one layer in the cells it touches.
 
         Parameters
         ----------
         low, high : (M, 2)
             Corners of the rectangles.
         layer : int
-            Which dots, less than ``n_layers``.
+            Index of the layer, less than ``n_layers``.
 
         Yields
         ------
         owners : (P,)
             Indices of rectangles.
         dots : (P, 2)
-            A point in or near each, pixels.
+            A point in or near each of these rectangles, pixels.
         """
         points, begins = self._layers[layer]
         first, after = self.cells.touching(low, high)
@@ -163,7 +164,7 @@ class Dots:
 
 
 def _levels(places: Ints) -> Ints:
-    """Return the layers of dots by their cells: one of a block, of a cell, and the others; (N,)."""
+    """Return layers of dots: 0 for one dot per block, 1 for one per cell, 2 for the rest; (N,)."""
     firsts = _firsts(places // _BLOCK)
     if len(places) < _DENSE * len(firsts):
         return np.zeros(len(places), dtype=np.int32)
@@ -174,13 +175,13 @@ def _levels(places: Ints) -> Ints:
 
 
 def _firsts(rows: Floats | Ints) -> Ints:
-    """Return the first of each kind of rows of two whole numbers: (M,), indices."""
-    pairs = rows.astype(np.float64).view(np.complex128)[:, 0]  # sorted faster than rows are
+    """Return the indices of the first occurrence of each distinct row of two integers: (M,)."""
+    pairs = rows.astype(np.float64).view(np.complex128)[:, 0]  # sorts faster than rows
     return np.unique(pairs, return_index=True)[1].astype(np.int32)
 
 
 def spread(starts: Ints, counts: Ints) -> tuple[Ints, Ints]:
-    """Return the numbers of ranges one after the other, and before them whose they are: (P,)."""
+    """Return the owners and the integers of ranges, concatenated: (P,) each."""
     owners = np.repeat(np.arange(len(counts)), counts)
     before = starts - (counts.cumsum() - counts)
     numbers = np.arange(len(owners)) + before[owners]

@@ -1,4 +1,4 @@
-"""Layout of labels: which are drawn, and where, without overlap or ambiguity."""
+"""Layout of labels: choice and placement without overlap or ambiguity."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Layout", "lay_out"]
 
-_FEWEST, _MOST = 256, 1024  # labels whose places are tried together, the first and later ones
-_CELL = 0.5  # gaps, side of a cell unless they are too many
-_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000  # sums over more cost more than they save
-_SAMPLES = 5  # columns of a label whose pixels tell most labels that are in its way
+_FEWEST, _MOST = 256, 1024  # labels per batch: the first batch, and the limit of later ones
+_CELL = 0.5  # side length of a cell in gaps, unless this gives too many cells
+_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000  # more cells cost more than they save
+_SAMPLES = 5  # columns of a label that are tested first; they detect most overlaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,13 +34,13 @@ class Layout:
     Attributes
     ----------
     chosen : (M,)
-        Indices of the labels, in the order in which they were placed.
+        Indices of the placed labels, in the order of placement.
     corners : (M, 2)
-        Their left upper corners, whole pixels.
+        Their top left corners, integer pixels.
     ends : (M, 2)
-        The point of each that is nearest to its own point, pixels.
+        Point on each label that is nearest to the labelled point, pixels.
     has_line : (M,) bool
-        Whether a leader line is needed, because there was no room next to the point.
+        Whether the label needs a leader line because there was no room next to its point.
     """
 
     chosen: Ints
@@ -58,20 +58,20 @@ def lay_out(
 ) -> Layout:
     """Place labels next to their points in order, and omit those without room.
 
-    A label lies right of its point, left, askew, above or below, where the most room is; else a
-    little away from it with a line. It is never nearer to another point than to its own,
-    which is known to a quarter of a pixel.
+    A label is placed right or left of its point, diagonally, above or below, where there is most
+    room; otherwise a little away from it with a leader line. It is never nearer to another point
+    than to its own; distances are accurate to a quarter of a pixel.
 
     Parameters
     ----------
     anchors : (N, 2)
         The points, pixels from the picture's left and upper edge.
     order : (N,)
-        Indices of the labels: those that come first are placed first.
+        Indices of the labels in the order of placement.
     sizes : (N, 2)
         Width and height of the labels, pixels, 1 or more.
     picture : (int, int)
-        Width and height of the picture; labels lie within it.
+        Width and height of the picture; labels stay within it.
     gap : float
         Pixels between a point and its label.
     """
@@ -83,7 +83,7 @@ def lay_out(
     ends, has_line = [np.zeros((0, 2))], [np.zeros(0, np.bool_)]
     for some in _portions(order):
         places = places_of(anchors[some], sizes[some], picture, gap)
-        # Most places without room among others are found out here, all at once.
+        # Vectorized rejection of most places that overlap others.
         may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
         places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
         places = places.take(_with_free_lines(places, taken, dots, gap))
@@ -100,7 +100,7 @@ def lay_out(
 
 
 def _portions(order: Ints) -> Iterator[Ints]:
-    """Give the labels in parts that grow: the more lie there, the fewer places are still open."""
+    """Yield batches of growing size: the more labels are placed, the fewer places remain open."""
     first, count = 0, _FEWEST
     while first < len(order):
         yield order[first : first + count]
@@ -108,7 +108,7 @@ def _portions(order: Ints) -> Iterator[Ints]:
 
 
 def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> Ints:
-    """Return the places to which lines can lead, or need not: (M,), indices."""
+    """Return the places that need no leader line or have a clear path for it: (M,), indices."""
     rows = np.flatnonzero(places.has_line)
     led = places.take(rows)
     pixels, are_part = line_pixels(led, gap)
@@ -118,10 +118,10 @@ def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> I
 
 
 def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
-    """Take the first place of each label that is still open: (M,), indices of places."""
+    """Choose the first open place of each label: (M,), indices of places."""
     found: list[int] = []
-    settled = -1  # the label that was placed last
-    closed: set[tuple[int, ...]] = set()  # the same places of labels of the same point
+    settled = -1  # the most recently placed label
+    closed: set[tuple[int, ...]] = set()  # occupied places, shared by labels of coincident points
     pixels, are_part = line_pixels(places, gap)
     corners = list(map(tuple, np.hstack([places.low, places.high]).tolist()))
     for row, label in enumerate(places.labels.tolist()):
@@ -139,7 +139,7 @@ def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
 
 
 class _Taken:
-    """The pixels beneath labels and lines.
+    """Mask of the pixels occupied by labels and lines.
 
     ``picture``: width and height, pixels.
     ``gap``: pixels between a point and its label.
@@ -147,12 +147,12 @@ class _Taken:
 
     def __init__(self, picture: tuple[int, int], gap: float) -> None:
         self._pixels = np.zeros(picture[::-1], dtype=np.bool_)
-        # Half a gap stays free around each: two words beside each other are not one.
+        # Keep half a gap free at both sides, so that adjacent labels do not read as one.
         self._apart = round(0.5 * gap)
 
     def may_be_open(self, low: Ints, high: Ints) -> Bools:
-        """Return which rectangles may have nothing beneath them: (M,); the others have for sure."""
-        # Labels have one height, so what another one covers has a pixel of an upper or lower edge.
+        """Return a mask of rectangles that may be free: (M,); all others are certainly occupied."""
+        # Labels have equal heights, so an overlap always covers a pixel of the upper or lower edge.
         left = np.maximum(low[:, :1] - self._apart, 0)
         right = np.minimum(high[:, :1] + self._apart, self._pixels.shape[1]) - 1
         columns = left + (right - left) * np.arange(_SAMPLES) // (_SAMPLES - 1)
@@ -160,17 +160,17 @@ class _Taken:
         return ~edges.any(axis=1)
 
     def at(self, pixels: Ints) -> Bools:
-        """Return whether something is at pixels, columns and rows: (...,)."""
+        """Return whether pixels, given as column and row, are occupied: (...,)."""
         return self._pixels[pixels[..., 1], pixels[..., 0]]
 
     def is_open(self, corners: tuple[int, ...]) -> bool:
-        """Return whether nothing is beneath a label: left, top, right, bottom."""
+        """Return whether the rectangle of a label is free; corners are left, top, right, bottom."""
         left, top, right, bottom = corners
         around = slice(max(left - self._apart, 0), right + self._apart)
         return not self._pixels[top:bottom, around].any()
 
     def take(self, corners: tuple[int, ...], path: Ints) -> None:
-        """Put a label there, and the pixels (S, 2) of its line."""
+        """Mark the rectangle of a label and the pixels (S, 2) of its line as occupied."""
         left, top, right, bottom = corners
         self._pixels[path[:, 1], path[:, 0]] = True
         self._pixels[top:bottom, left:right] = True

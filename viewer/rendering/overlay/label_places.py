@@ -27,16 +27,17 @@ _WAYS = np.array(
      [0, -1], [0, 1]],
     dtype=np.float64,
 )  # fmt: skip
-"""From a point to its label, in the order of preference; y grows downwards."""
+"""Directions from a point to its label, in order of preference; y points down."""
 
 _REACHES = (1.0, 3.0, 5.0)
-"""How far labels are from their points, gaps; from the second on a line leads there."""
+"""Distances of labels from their points, in gaps; all but the first have a leader line."""
 
-_ALIKE = 1.0  # pixels between points whose labels cannot be told apart by their places
-_CLEARER = 1.5  # times as far from other points as from its own, a label without a line; with
-# one, so many gaps
-_FREE = 3.0  # the same where there is much room
-_BESIDE_LINE = 0.75  # gaps between a line and other points
+_ALIKE = 1.0  # pixels; labels of points nearer than this are allowed at the same place
+# Minimum distance of a label from other points: times its distance from its own point, or in gaps
+# for a label with a leader line.
+_CLEARER = 1.5
+_FREE = 3.0  # the same for a place with plenty of room
+_BESIDE_LINE = 0.75  # minimum distance of a leader line from other points, in gaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,19 +47,19 @@ class Places:
     Attributes
     ----------
     labels : (M,)
-        Whose place each is.
+        Index of the label that each place belongs to.
     ranks : (M,)
-        Which of its places, the lower the better.
+        Preference of the place, lower is better.
     anchors : (M, 2)
         The labels' points, pixels.
     low, high : (M, 2)
-        Left upper and right lower corners, whole pixels.
+        Top left and bottom right corners, integer pixels.
     ends : (M, 2)
-        What of each is nearest to its point, pixels.
+        Point of each rectangle that is nearest to the labelled point, pixels.
     own : (M,)
-        How far that is.
+        Distance between these two points, pixels.
     has_line : (M,) bool
-        Whether a line leads there.
+        Whether the place needs a leader line.
     """
 
     labels: Ints
@@ -71,7 +72,7 @@ class Places:
     has_line: Bools
 
     def take(self, rows: NDArray[np.integer[Any]]) -> Places:
-        """Return some of them."""
+        """Return a selection of the places."""
         return Places(
             self.labels[rows],
             self.ranks[rows],
@@ -85,7 +86,7 @@ class Places:
 
 
 def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> Places:
-    """Return the places of labels that lie within a picture.
+    """Return all candidate places of labels that lie within a picture.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
     ways = np.tile(_WAYS, (len(_REACHES), 1))
     nearest = anchors[:, None] + gap * np.repeat(_REACHES, len(_WAYS))[:, None] * ways
     low = np.rint(nearest - 0.5 * (1.0 - np.sign(ways)) * sizes[:, None])
-    # What lies straight beside its point may be shifted along it to stay within the picture.
+    # Labels straight above, below or beside their point may be shifted to stay in the picture.
     room = np.maximum(np.array(picture) - sizes, 0)[:, None]
     low = np.where(ways == 0.0, np.clip(low, 0.0, room), low)
     is_inside = (low >= 0.0) & (low + np.maximum(sizes, 1)[:, None] <= picture)
@@ -115,12 +116,12 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
 
 
 def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
-    """Return which places are for certain too near to other points, or over their own: (M,).
+    """Return a mask of places that certainly are too near to other points or cover their own: (M,).
 
     Parameters
     ----------
     places : Places
-        Within the picture.
+        Candidate places within the picture.
     anchors : (N, 2)
         The labels' points, pixels.
     dots : Dots
@@ -128,7 +129,7 @@ def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
     gap : float
         Pixels between a point and its label.
     """
-    # A rectangle that is this much larger all around has its corners within the least distance.
+    # 0.7 < 1 / sqrt(2): all points of the enlarged rectangle are within the minimum distance.
     more = 0.7 * _least(places, gap)[:, None]
     around = dots.most_within(anchors - _ALIKE, anchors + _ALIKE)
     found = dots.fewest_within(places.low - more, places.high + more)
@@ -137,39 +138,39 @@ def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
 
 
 def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
-    """Return the pixels of lines from beside points to just before their labels.
+    """Return the pixels of leader lines from next to the points to just before their labels.
 
     Parameters
     ----------
     places : Places
-        Within the picture.
+        Candidate places within the picture.
     gap : float
         Pixels between a point and its label.
 
     Returns
     -------
     pixels : (M, S, 2)
-        Column and row, one pixel after the other from the point on.
+        Column and row of the pixels, starting from the point.
     are_part : (M, S) bool
-        Which of them the line has: it ends before its label, and some places have none.
+        Which of them belong to the line; places without a line have none.
     """
     start, length = places.anchors[:, None], places.own[:, None]
     steps = np.arange(0.5 * gap, places.own.max(initial=0.0))
     are_part = places.has_line[:, None] & (steps < length - 1.0)
-    shares = np.where(are_part, steps, 0.0)[..., None] / length[..., None]
-    pixels = np.floor(start + shares * (places.ends[:, None] - start)).astype(np.int32)
+    fractions = np.where(are_part, steps, 0.0)[..., None] / length[..., None]
+    pixels = np.floor(start + fractions * (places.ends[:, None] - start)).astype(np.int32)
     return np.where(are_part[..., None], pixels, 0), are_part
 
 
 def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap: float) -> Bools:
-    """Return which lines for certain pass too near to other points: (M,).
+    """Return a mask of lines that certainly pass too near to other points: (M,).
 
     Parameters
     ----------
     places : Places
-        To which they lead.
+        Places that the lines lead to.
     pixels, are_part : (M, S, 2), (M, S) bool
-        As ``line_pixels`` gives them.
+        Result of ``line_pixels``.
     dots : Dots
         All points.
     gap : float
@@ -178,20 +179,20 @@ def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap
     diagonal = math.sqrt(2.0) * dots.cells.side
     if diagonal > _BESIDE_LINE * gap:
         return np.zeros(len(pixels), dtype=np.bool_)
-    # A dot in a cell through which the line passes is nearer than the cell's diagonal; the points
-    # that are alike are in no cell so far from the line's beginning.
+    # A dot in a cell that the line crosses is nearer to the line than the cell's diagonal. Skip
+    # the start of the line, where the cells may contain its own point or coincident ones.
     across, down = np.moveaxis(np.abs(pixels + 0.5 - places.anchors[:, None]), 2, 0)
     is_away = are_part & (np.maximum(across, down) > _ALIKE + dots.cells.side + 0.5)
     return np.asarray((is_away & (dots.count_at(pixels) > 0)).any(axis=1))
 
 
 def clear_places(places: Places, dots: Dots, gap: float) -> Places:
-    """Return the places that are far enough from other points, the best of each label first.
+    """Return the places that are far enough from other points, best first for each label.
 
     Parameters
     ----------
     places : Places
-        Within the picture.
+        Candidate places within the picture.
     dots : Dots
         All points.
     gap : float
@@ -203,19 +204,19 @@ def clear_places(places: Places, dots: Dots, gap: float) -> Places:
         clear = np.minimum(clear, nearest)
         rows = np.flatnonzero((clear >= _least(places, gap)) & (beside_line >= _BESIDE_LINE * gap))
         places, clear = places.take(rows), clear[rows]
-    # Free places come before those that are near other points, and these before those with lines.
+    # Places with plenty of room come first, then crowded ones, then those with leader lines.
     is_free = ~places.has_line & (clear >= _FREE * places.own)
     order = np.lexsort((places.ranks, places.has_line, ~is_free, places.labels))
     return places.take(order)
 
 
 def _least(places: Places, gap: float) -> Floats:
-    """Return how far places have to be from other points, pixels: (M,)."""
+    """Return the minimum distance of places from other points, pixels: (M,)."""
     return _CLEARER * np.where(places.has_line, gap, places.own)
 
 
 def _clearances(places: Places, dots: Dots, layer: int, gap: float) -> tuple[Floats, Floats]:
-    """Return how far other points are from the places and from lines there: (M,), inf if far."""
+    """Return distances of the nearest other points from places and lines: (M,), inf if far."""
     reach = np.where(places.has_line, _CLEARER * gap, _FREE * places.own)[:, None]
     low = np.minimum(places.low - reach, places.anchors - _BESIDE_LINE * gap)
     high = np.maximum(places.high + reach, places.anchors + _BESIDE_LINE * gap)
@@ -229,6 +230,6 @@ def _clearances(places: Places, dots: Dots, layer: int, gap: float) -> tuple[Flo
         led = np.flatnonzero(places.has_line[owners])
         owners, away = owners[led], away[led]
         along = places.ends[owners] - places.anchors[owners]
-        shares = np.clip((away * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-        np.minimum.at(beside_line, owners, np.hypot(*(away - shares[:, None] * along).T))
+        fractions = np.clip((away * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+        np.minimum.at(beside_line, owners, np.hypot(*(away - fractions[:, None] * along).T))
     return clear, beside_line

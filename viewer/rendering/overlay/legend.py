@@ -29,13 +29,13 @@ from viewer.rig.skinning import Skinning
 __all__ = ["Entry", "Legend", "Shown", "Tick", "legend_of", "round_ticks"]
 
 _MOST_TICKS = 6
-_MOST_COUNTS = 10  # blocks of a bar that each have a number
-_SAME = 1e-9  # relative difference of numbers that count as equal
+_MOST_COUNTS = 10  # maximum number of labelled blocks of a bar
+_SAME = 1e-9  # relative tolerance for equal numbers
 
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """A number next to the bar: its position, 0 at the left end to 1, and its text."""
+    """A number next to the bar: position, 0 at the left end to 1 at the right, and text."""
 
     place: float
     text: str
@@ -43,7 +43,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A named item: its colour, sRGB 0 to 255, and its name."""
+    """A named item: colour, sRGB 0 to 255, and name."""
 
     color: tuple[int, int, int]
     text: str
@@ -56,9 +56,9 @@ class Legend:
     Attributes
     ----------
     title, unit : str
-        Of the numbers; the unit may be empty.
+        Title and unit of the values; the unit may be empty.
     colors : (N, 4) uint8
-        The bar from left to right, sRGB; empty for named items.
+        Colours of the bar from left to right, sRGB; empty for named items.
     ticks : tuple of Tick
         Round numbers along the bar.
     entries : tuple of Entry
@@ -66,7 +66,7 @@ class Legend:
     lines : tuple of float
         Positions of isolines on the bar.
     note : str
-        A line beneath: the range of the numbers, or why there is nothing to show.
+        Line below the bar: the range of the values, or why there is nothing to show.
     """
 
     title: str
@@ -85,14 +85,14 @@ class Legend:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """A figure with the numbers of a scalar quantity and their colours.
+    """A figure with the values of a scalar quantity and their colours.
 
     Attributes
     ----------
     figure : Figure
-        With a mesh.
+        A figure with a mesh.
     numbers : (V,)
-        From ``viewer.rig.scalars.compute``.
+        Result of ``viewer.rig.scalars.compute``.
     look : ScalarLook
         Colours for this figure.
     """
@@ -114,7 +114,7 @@ def legend_of(
     having : sequence of Shown
         The drawn figures that have the quantity; the first one gives title and unit.
     skinning : Skinning
-        Their skinning.
+        Skinning of the figures.
     figures : sequence of Figure
         All figures of the scene, including those not drawn; at least one.
     """
@@ -134,7 +134,9 @@ def _empty(name: str, skinning: Skinning, figures: Sequence[Figure]) -> Legend:
     missing = [missing_part(name, figure) for figure in figures]
     hidden = [figure for figure, lacks in zip(figures, missing, strict=True) if not lacks]
     if hidden:
-        return Legend(quantity_title(name, hidden[0], skinning), note="not known of what is shown")
+        return Legend(
+            quantity_title(name, hidden[0], skinning), note="not available for the visible figures"
+        )
     if missing[0] == "a selected joint":
         return Legend(find_quantity(name).title, note="no joint is selected")
     return Legend(menu_title(split_name(name)[0], skinning), note=f"no figure has {missing[0]}")
@@ -191,7 +193,7 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
 
 
 def _counts(title: str, shown: Sequence[Shown]) -> Legend:
-    """Return the legend of a count: a block per number, from the lowest present."""
+    """Return the legend of a count: one block per number, starting at the lowest present."""
     first = min(int(one.numbers.min()) for one in shown)
     colors = shown[0].look.colors[first:]
     step = -(-len(colors) // _MOST_COUNTS)
@@ -204,7 +206,7 @@ def _counts(title: str, shown: Sequence[Shown]) -> Legend:
 
 
 def _entries(name: str, shown: Sequence[Shown]) -> tuple[Entry, ...]:
-    """Return the visible items, largest areas first; equal ones of several figures are merged."""
+    """Return the visible items, largest area first; equal items of several figures are merged."""
     areas: dict[Entry, float] = {}
     for one in shown:
         names = categories(name, one.figure)
@@ -221,7 +223,7 @@ _areas: Memo[Figure, Floats] = Memo()
 
 
 def _vertex_areas(figure: Figure) -> Floats:
-    """Return a third of the area of the triangles around each vertex at rest: (V,)."""
+    """Return the barycentric area of each vertex at rest, a third of its triangles' area: (V,)."""
     mesh = figure.require_mesh()
 
     def make() -> Floats:
@@ -233,6 +235,6 @@ def _vertex_areas(figure: Figure) -> Floats:
 
 
 def _text(number: float, signed: bool = False) -> str:
-    """Return a number with three digits."""
+    """Return a number with three significant digits."""
     text = short_number(number)
     return f"+{text}" if signed and number > 0.0 else text

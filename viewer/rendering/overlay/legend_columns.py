@@ -15,11 +15,11 @@ class LegendColumns:
     Attributes
     ----------
     counts : tuple of int
-        Number of items in each column, from left to right; the first items fill the first column.
+        Number of items per column, from left to right; the items fill the columns in order.
     widths : tuple of float
-        Of each column.
+        Width of each column.
     left_out : int
-        Items without room: a line "and N more" follows the last column's items.
+        Number of omitted items, which a line "and N more" below the last column mentions.
     """
 
     counts: tuple[int, ...]
@@ -34,7 +34,7 @@ class LegendColumns:
 
 
 def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendColumns:
-    """Split items into as few columns as possible; those without room are counted.
+    """Split items into as few columns as possible; omitted items are counted.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendCo
     Returns
     -------
     LegendColumns
-        Columns of about equal length if all items fit, else full ones.
+        Columns of about equal length if all items fit, otherwise full ones.
 
     >>> legend_columns([10.0] * 5, 4, 30.0).counts
     (3, 2)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rendering.overlay.legend import Legend
 from viewer.rendering.overlay.legend_columns import legend_columns
 from viewer.rig.arrays import Bytes
@@ -20,28 +20,28 @@ __all__ = ["legend_pixels"]
 
 _SIZES = 9, 40  # height of letters, pixels: smallest and largest
 _LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 56.0
-_SMALLER = 0.6  # of the letters' height, down to which names of many things may shrink
-_MOST = 0.9  # of the picture's width and height, for all
-# Of the picture's width, for several columns: figures stand in the middle, so letters shrink
-# before columns of names become wider than the first.
+_SMALLER = 0.6  # factor to which the text height of many items may shrink
+_MOST = 0.9  # maximum fraction of the picture's width and height
+# Fractions of the picture's width for several columns. Figures are in the middle, so the text
+# shrinks before the columns use more than the first fraction.
 _WIDE, _WIDER = 0.3, 0.45
-_LONGEST = 40  # letters of a name
-_BAR = 14.0  # width, in heights of letters
+_LONGEST = 40  # characters of a name
+_BAR = 14.0  # width, in text heights
 _PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 190), (12, 12, 14)
 
 
 def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
     """Return a legend's pixels, sized for a picture.
 
-    Many named items are set in several columns, then in smaller letters, then in more columns;
-    those that still do not fit are counted.
+    Many named items are set in several columns, then in smaller text, then in wider columns; those
+    that still do not fit are counted.
 
     Parameters
     ----------
     legend : Legend
         The legend.
     size : (int, int)
-        Width and height of the picture that it goes into, pixels.
+        Width and height of the picture that contains the legend, pixels.
 
     Returns
     -------
@@ -52,8 +52,8 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
     letters = round(min(max(wanted, _SIZES[0]), _SIZES[1]))
     least = max(round(_SMALLER * letters), _SIZES[0])
     tries = [(height, _WIDE) for height in range(letters, least - 1, -1)] + [(least, _WIDER)]
-    for height, share in tries:
-        drawing = _Drawing(legend, height, size, share)
+    for height, fraction in tries:
+        drawing = _Drawing(legend, height, size, fraction)
         if not drawing.columns.left_out:
             break
     return drawing.pixels()
@@ -62,7 +62,9 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
 class _Drawing:
     """Layout of a legend from top to bottom: lines of text, a bar or columns of swatches."""
 
-    def __init__(self, legend: Legend, letters: int, size: tuple[int, int], share: float) -> None:
+    def __init__(
+        self, legend: Legend, letters: int, size: tuple[int, int], fraction: float
+    ) -> None:
         from PIL import Image, ImageDraw, ImageFont
 
         self.legend, self.letters, self.size = legend, letters, size
@@ -77,7 +79,7 @@ class _Drawing:
         rest = self.line * (2 if legend.note else 1) + self.bar_height + 2 * self.gap
         rows = max((int(_MOST * size[1]) - rest) // self.line, 1)
         widths = [self._width(text) + 2 * letters for text in self.texts]
-        self.columns = legend_columns(widths, rows, share * size[0] - 2 * self.gap)
+        self.columns = legend_columns(widths, rows, fraction * size[0] - 2 * self.gap)
 
     def pixels(self) -> Bytes | None:
         """Return the pixels if they fit into nine tenths of the picture."""

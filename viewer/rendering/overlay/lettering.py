@@ -10,19 +10,19 @@ from viewer.rig.arrays import Bytes, Ints
 
 __all__ = ["Lettering", "shelves"]
 
-_RIM = 2  # pixels around letters
+_RIM = 2  # width of the outline, pixels
 _WIDEST = 2048  # pixels; longer texts are truncated
 _MOST = 4000  # cached texts
 _DARK = 205  # opacity of the rim, of 255
 
 
 class Lettering:
-    """Rasteriser of texts in one font size.
+    """Rasteriser of text in one font size.
 
     Parameters
     ----------
     letters : int
-        Height of the letters, pixels.
+        Height of the text, pixels.
     """
 
     def __init__(self, letters: int) -> None:
@@ -34,7 +34,7 @@ class Lettering:
         self._pixels: dict[str, Bytes] = {}
 
     def sizes(self, words: Sequence[str]) -> Ints:
-        """Return width and height of texts with their outlines: (N, 2), pixels."""
+        """Return the width and height of texts with their outlines: (N, 2), pixels."""
         if len(self._widths) > _MOST:
             self._widths.clear()
         for word in words:
@@ -49,7 +49,7 @@ class Lettering:
         return round(1.25 * self.letters) + 2 * _RIM
 
     def pixels(self, word: str) -> Bytes:
-        """Return white text with a dark rim: (H, W, 2) uint8, grey times opacity, opacity."""
+        """Return white text with a dark outline: (H, W, 2) uint8, premultiplied grey and alpha."""
         from PIL import Image, ImageDraw
 
         if word not in self._pixels:

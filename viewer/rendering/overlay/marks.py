@@ -1,4 +1,4 @@
-"""Marks of places: points and lines of constant size on the screen."""
+"""Marks at positions in the scene: points and lines of constant size on the screen."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["MARK_COLOR", "Marks", "mark_annotation"]
 
 MARK_COLOR = (1.0, 0.16, 0.56)
-"""Colour of marks, sRGB: it occurs neither in the colour maps nor in the lights."""
+"""Colour of marks, sRGB, distinct from the colour maps and the lights."""
 
 _LINE = 1.0  # radius of lines, pixels
 _MANNER = Manner(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0.05))
@@ -28,7 +28,7 @@ class Marks:
     points : (N, 3)
         Scene space.
     radii : (N,)
-        Of the points, pixels.
+        Radii of the points, pixels.
     lines : (M, 2, 3)
         Both ends of each, scene space.
     """

@@ -52,8 +52,8 @@ class Manner:
     hidden : float
         Opacity of hidden parts, 0 to 1.
     lift : float
-        Fraction of the distance to the eye by which segments are moved forward, so that those on
-        a surface are visible.
+        Fraction of the distance to the eye by which segments are moved forward, so that segments
+        on a surface are visible.
     border : float
         Width of the border around each, pixels.
     border_color : (r, g, b)
@@ -84,7 +84,7 @@ def dots(points: Floats, colors: Floats, diameter: float) -> Segments:
 
 
 def joined(parts: Sequence[Segments]) -> Segments:
-    """Return all segments of several parts, the first part's first; at least one part."""
+    """Return the segments of one or more parts, concatenated in order."""
     return Segments(
         np.concatenate([part.starts for part in parts]),
         np.concatenate([part.ends for part in parts]),
@@ -94,14 +94,14 @@ def joined(parts: Sequence[Segments]) -> Segments:
 
 
 class SegmentPass:
-    """Draws segments.
+    """Pass that draws segments.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -126,7 +126,7 @@ class SegmentPass:
         """
         if not len(segments.widths):
             return
-        # Relative to their middle, so that float32 counts from there.
+        # Relative to their centre, to keep precision in float32.
         center = 0.5 * (segments.starts.min(axis=0) + segments.starts.max(axis=0))
         places = segments.starts - center, segments.ends - center
         self._rows.write(np.hstack([*places, segments.colors, segments.widths[:, None]]))
@@ -139,7 +139,7 @@ class SegmentPass:
             "u_border_color": manner.border_color,
         }
         set_uniforms(self._program, values)
-        with without_depth_writes(self.context):  # segments over one another all count
+        with without_depth_writes(self.context):  # overlapping segments must not hide each other
             for opacity in opacities(self.context, None if manner.on_top else manner.hidden):
                 set_uniforms(self._program, {"u_opacity": opacity})
                 self._rows.draw()

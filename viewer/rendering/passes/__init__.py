@@ -1,1 +1,1 @@
-"""Passes: each draws one kind of thing into the bound framebuffer."""
+"""Render passes, each of which draws one kind of object into the bound framebuffer."""

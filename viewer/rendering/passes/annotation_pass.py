@@ -1,4 +1,4 @@
-"""Draws annotations: marks of findings, joints seen through the skin, a vertex explained."""
+"""Pass that draws annotations: marks of findings, X-ray joints, explanations of vertices."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["AnnotationPass"]
 
 
 class AnnotationPass:
-    """Draws annotations over what is bound.
+    """Draws annotations over the bound framebuffer's contents.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the programs.
+        Provides the shader programs.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -38,7 +38,7 @@ class AnnotationPass:
         Parameters
         ----------
         annotation : Annotation
-            What is drawn.
+            The annotation to draw.
         view : View
             The camera's matrices.
         size : (int, int)
@@ -47,19 +47,19 @@ class AnnotationPass:
         Raises
         ------
         RenderError
-            If the driver has no room for it.
+            If there is not enough graphics memory.
         """
         self.segments.draw(annotation.segments, view, size, annotation.manner)
 
     def write(
         self, annotations: Sequence[Annotation], view: View, size: tuple[int, int]
     ) -> list[tuple[int, int]]:
-        """Write the words of several annotations, so that none covers another.
+        """Draw the labels of several annotations without overlap.
 
         Parameters
         ----------
         annotations : sequence of Annotation
-            All that are in the picture.
+            All annotations of the picture.
         view : View
             The camera's matrices.
         size : (int, int)
@@ -68,13 +68,13 @@ class AnnotationPass:
         Returns
         -------
         list of (int, int)
-            For each of them how many of the words that belong to this picture are not drawn because
-            there is no room beside their points, and of how many.
+            For each annotation, the number of labels omitted for lack of room next to their points,
+            and the number of labels within the picture.
 
         Raises
         ------
         RenderError
-            If the driver has no room for it.
+            If there is not enough graphics memory.
         """
         having = [row for row, one in enumerate(annotations) if one.labels is not None]
         labels = [one.labels for one in annotations if one.labels is not None]

@@ -1,4 +1,4 @@
-"""Draws a surface that is not part of the scene over it: translucent, or only its edges."""
+"""Pass that draws a ghost over the scene: an extra surface, translucent or as edges only."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from viewer.rig.figure import Figure
 __all__ = ["GHOST_COLOR", "STYLES", "Ghost", "GhostPass"]
 
 GHOST_COLOR = (0.10, 0.42, 0.85)
-"""Linear."""
+"""Default colour of ghosts, linear."""
 
-_NEARER = (-2.0, -4.0)  # OpenGL's factor and units of depth
+_NEARER = (-2.0, -4.0)  # polygon offset: factor and units
 
 STYLES = ("solid", "translucent", "wireframe")
 
@@ -35,9 +35,9 @@ class Ghost:
     Attributes
     ----------
     figure : Figure
-        With a mesh, which is drawn as it is.
+        A figure with a mesh, which is drawn unposed.
     placement : (4, 4)
-        Figure space to scene.
+        Matrix from figure space to scene space.
     style : str
         One of ``STYLES``.
     color : (r, g, b)
@@ -51,14 +51,14 @@ class Ghost:
 
 
 class GhostPass:
-    """Draws ghosts; their mesh is uploaded when another one is drawn than before.
+    """Draws ghosts; the mesh is uploaded when a different ghost is drawn.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the programs.
+        Provides the shader programs.
     mesh_pass : MeshPass
         Draws the surface.
     """
@@ -70,21 +70,21 @@ class GhostPass:
         self._posed: PosedMesh | None = None
 
     def draw(self, ghost: Ghost, view: View, options: DisplayOptions) -> None:
-        """Draw a ghost over what has been drawn.
+        """Draw a ghost over everything drawn so far.
 
         Parameters
         ----------
         ghost : Ghost
-            What, where and how.
+            The ghost.
         view : View
             The camera's matrices.
         options : DisplayOptions
-            Of the scene: lights count, textures and colours of numbers do not.
+            Display options of the scene; its lights apply, textures and scalar quantities do not.
 
         Raises
         ------
         RenderError
-            If the driver has no room for it.
+            If there is not enough graphics memory.
         """
         posed = self._uploaded(ghost.figure)
         xray = ghost.style == "translucent"
@@ -97,7 +97,7 @@ class GhostPass:
             self.context.depth_func = "<"
             return
         draw = partial(self._mesh_pass.draw, posed, ghost.placement, view, look, ghost.color)
-        # A ghost that lies exactly on a surface is seen, and does not flicker.
+        # Prevents z-fighting with a coincident surface of the scene.
         self.context.polygon_offset = _NEARER
         draw_layer(self.context, look, draw)
         self.context.polygon_offset = 0.0, 0.0
@@ -105,7 +105,7 @@ class GhostPass:
     def _uploaded(self, figure: Figure) -> PosedMesh:
         if self._posed is None or figure is not self._figure:
             self.release()
-            notes: list[str] = []  # a mesh alone asks for nothing that could be missing
+            notes: list[str] = []  # stays empty: a bare mesh has no textures to reduce
             with self._owner.guard():
                 buffers = self._owner.keep(MeshBuffers(self.context, figure, notes))
                 posed = self._owner.keep(PosedMesh(self.context, self.programs, buffers))
@@ -114,7 +114,7 @@ class GhostPass:
         return self._posed
 
     def release(self) -> None:
-        """Free what was uploaded."""
+        """Free all buffers."""
         if self._posed is not None:
             self._mesh_pass.forget(self._posed)
         self._owner.release()

@@ -1,4 +1,4 @@
-"""Draws the background and the ground grid."""
+"""Pass that draws the background and the ground grid."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["GroundPass", "grid_step", "parse_color"]
 _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
 _LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
-_EXTENT = 6.0  # half the grid's side, in sizes of the figure
+_EXTENT = 6.0  # half the side length of the grid, in figure sizes
 
 
 def grid_step(box: Floats) -> float:
@@ -56,14 +56,14 @@ def parse_color(text: str) -> tuple[float, float, float]:
 
 
 class GroundPass:
-    """Draws what is behind and beneath the figures.
+    """Draws the background and the ground grid.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the programs.
+        Provides the shader programs.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -73,7 +73,7 @@ class GroundPass:
         self._background: moderngl.VertexArray | None = None
 
     def draw_background(self, background: str) -> None:
-        """Fill the picture; "transparent" leaves it as it was cleared."""
+        """Fill the picture; "transparent" leaves it cleared."""
         if background == "transparent":
             return
         program = self.programs.drawing("background")
@@ -94,15 +94,15 @@ class GroundPass:
         view : View
             The camera's matrices.
         box : (2, 3)
-            What stands on the ground, scene space: gives height, step and extent.
+            Bounds of the objects on the ground, scene space; they define height, step and extent.
         background : str
-            Lines are light on a dark one.
+            Background of the picture; lines are light on a dark one.
         """
         program = self.programs.drawing("ground")
         step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)
         axes = ground_axes(view.camera.up)
         center = box.mean(axis=0)
-        # The square's middle lies on a crossing of lines, so float32 never sees large numbers.
+        # The square is centred on a line crossing near the box, so that float32 keeps precision.
         cells = np.round(axes[:2] @ center / step)
         height = (axes[2] @ box.T).min()
         placement = np.eye(4)
@@ -112,14 +112,14 @@ class GroundPass:
         set_model(program, view, placement, np.zeros(3))
         program["u_extent"], program["u_fade"] = extent, extent
         program["u_step"] = step
-        # Every tenth line is the scene's own: count from its origin.
+        # Every tenth line is stronger, counted from the scene's origin.
         program["u_origin"] = tuple(np.fmod(-cells, 10.0))
         dark = background.startswith("#") and sum(parse_color(background)) < 1.2
         program["u_line_color"] = _LINE_ON_DARK if dark else _LINE_COLOR
         if self._ground is None:
             content = [(self._corners, "2f4", "in_corner")]
             self._ground = self.context.vertex_array(program, content)
-        with without_depth_writes(self.context):  # the translucent grid hides nothing
+        with without_depth_writes(self.context):  # the translucent grid must not hide later draws
             self._ground.render(moderngl.TRIANGLE_STRIP)
 
     def release(self) -> None:

@@ -1,4 +1,4 @@
-"""Draws actors that share a figure as instances of its mesh."""
+"""Instanced drawing of actors that share a figure."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 __all__ = ["FEWEST", "draw_instances", "instance_groups"]
 
 FEWEST = 8
-"""Actors from which on they are drawn as instances; see ``instance_groups``."""
+"""Minimum number of actors to draw as instances; see ``instance_groups``."""
 
 
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
-    """Return which actors are drawn together: those of one figure and one shape.
+    """Return groups of actors to draw as instances: those with the same figure and shape.
 
-    Few actors keep their posed buffers, which a camera that moves does not skin anew, and so do all
-    where those are drawn several times or as they were bound, or where every vertex has a number.
+    Posed buffers are used instead for small groups, since a moving camera needs no skinning then,
+    and if meshes are drawn several times, in binding space or with a scalar quantity.
 
     Parameters
     ----------
     actors : sequence of Actor
-        Whose meshes are drawn.
+        Actors whose meshes are drawn.
     options : DisplayOptions
-        What is shown.
+        Display options.
 
     Returns
     -------
@@ -62,11 +62,11 @@ def draw_instances(
     Parameters
     ----------
     programs : Programs
-        Gives the shading programs.
+        Provides the shading programs.
     instances : InstanceBuffers
-        Already updated.
+        Updated buffers.
     actors : sequence of Actor
-        The same, in the same order.
+        The same actors in the same order.
     view : View
         The camera's matrices.
     options : DisplayOptions

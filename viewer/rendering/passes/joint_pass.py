@@ -1,4 +1,4 @@
-"""Draws a skeleton: one box per joint, or octahedra, sticks or axes, as instances."""
+"""Pass that draws skeletons: boxes, octahedra, sticks or axes, as instances."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
-_CUBE_SIZE = 0.015  # of a skeleton without boxes
+_CUBE_SIZE = 0.015  # of the skeleton's size, for a skeleton without boxes
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
 
@@ -63,7 +63,7 @@ class SkeletonBuffers:
         return self._bones[style]
 
     def is_current(self, pose: Pose, options: DisplayOptions) -> bool:
-        """Return whether the joints' matrices are those of a pose."""
+        """Return whether the uploaded joint matrices belong to a pose."""
         return self._key == (pose.skinning_key, self.style(options) == "boxes")
 
     def update(self, pose: Pose, options: DisplayOptions) -> None:
@@ -79,7 +79,7 @@ class SkeletonBuffers:
         if self.is_current(pose, options):
             return
         skeleton = shaped(self.figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # shaping keeps it
+        assert skeleton is not None  # applying a shape keeps the skeleton
         are_boxes = self.style(options) == "boxes"
         # Bones need the matrices of all joints, as they reach from one to another.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)
@@ -101,7 +101,7 @@ class JointPass:
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -123,9 +123,9 @@ class JointPass:
         Parameters
         ----------
         skeleton : SkeletonBuffers
-            Already updated.
+            Updated buffers.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         options : DisplayOptions
@@ -235,7 +235,7 @@ def _draw_instances(program: moderngl.Program, boxes: BoxBuffers) -> None:
 
 
 def _joint_boxes(skeleton: Skeleton) -> Floats:
-    """Return the joints' boxes, small cubes if no file gave any: (J, 2, 3)."""
+    """Return the joints' boxes, small cubes if the skeleton has none: (J, 2, 3)."""
     if skeleton.boxes is not None:
         return skeleton.boxes
     points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]

@@ -1,4 +1,4 @@
-"""Draws a figure's keypoints as small cubes, through the surface."""
+"""Pass that draws a figure's keypoints as small cubes, visible through the surface."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.skinning import Skinning
 
 __all__ = ["KeypointBuffers", "KeypointPass"]
 
-_CUBE_SIZE = 0.006  # of the figure's size, half a side
+_CUBE_SIZE = 0.006  # half the side length, relative to the figure's size
 
 
 class KeypointBuffers:
@@ -28,15 +28,15 @@ class KeypointBuffers:
     Parameters
     ----------
     context : moderngl.Context
-        Gives the buffers.
+        The context in use.
     figure : Figure
-        With keypoints and a mesh.
+        A figure with keypoints and a mesh.
     cube : moderngl.Buffer
-        Shared by all.
+        Vertices of a cube, shared by all boxes.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
-        assert figure.keypoints is not None  # the caller looked
+        assert figure.keypoints is not None  # checked by the caller
         self.figure = figure
         half = _CUBE_SIZE * box_size(bounding_box(figure.require_mesh().positions))
         cubes = np.tile([[-half] * 3, [half] * 3], (len(figure.keypoints.names), 1, 1))
@@ -44,7 +44,7 @@ class KeypointBuffers:
         self._key: tuple[object, ...] | None = None
 
     def update(self, pose: Pose, skinning: Skinning) -> None:
-        """Follow the pose."""
+        """Move the cubes to the keypoints of a pose, if it changed."""
         key = (repr(skinning), pose_key(pose))
         if key != self._key:
             self.boxes.move(translation_matrix(posed_keypoints(self.figure, pose, skinning)))
@@ -56,12 +56,12 @@ class KeypointBuffers:
 
 
 class KeypointPass:
-    """Draws keypoints with the program of the joints.
+    """Draws keypoints with the shader program of the joints.
 
     Parameters
     ----------
     joints : JointPass
-        Gives program and cube.
+        Provides the program and the cube.
     """
 
     def __init__(self, joints: JointPass) -> None:
@@ -75,9 +75,9 @@ class KeypointPass:
         Parameters
         ----------
         points : KeypointBuffers
-            Already updated.
+            Updated buffers.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         options : DisplayOptions

@@ -1,4 +1,4 @@
-"""Draws labels over a picture from one texture of rasterised text."""
+"""Pass that draws labels over a picture from one texture of rasterised text."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["LabelPass"]
 
-_WIDTH, _TALLEST = 2048, 4096  # pixels of the texture; every driver with OpenGL 3.3 takes it
-_MOST = 1000  # words that are kept in the texture though they are not drawn right now
+_WIDTH, _TALLEST = 2048, 4096  # pixels of the texture; every OpenGL 3.3 driver supports this size
+_MOST = 1000  # texts up to which unused ones are kept in the texture
 
 
 class LabelPass:
-    """Draws words.
+    """Draws labels.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -42,44 +42,44 @@ class LabelPass:
 
     def draw(
         self,
-        words: Sequence[str],
+        texts: Sequence[str],
         corners: Ints,
         colors: Floats,
         lettering: Lettering,
         size: tuple[int, int],
     ) -> None:
-        """Draw words over everything that is bound.
+        """Draw texts over the bound framebuffer's contents.
 
         Parameters
         ----------
-        words : sequence of N str
-            What they say; those for which the texture has no room are left out.
+        texts : sequence of N str
+            The texts; those that do not fit into the texture are omitted.
         corners : (N, 2)
-            Left upper corners, pixels from the picture's left and upper edge.
+            Top left corners, pixels from the picture's left and upper edge.
         colors : (N, 3)
-            Of the letters, sRGB, 0 to 1.
+            Colours of the text, sRGB, 0 to 1.
         lettering : Lettering
-            The letters.
+            The font.
         size : (int, int)
             Width and height of the picture, pixels.
         """
-        if not words:
+        if not texts:
             return
-        if self._letters != lettering.letters or not self._places.keys() >= set(words):
-            self._fill(words, lettering)
-        assert self._texture is not None  # it was filled
-        shown = np.array([word in self._places for word in words])
-        sources = np.array([self._places.get(word, (0, 0)) for word in words])
-        self._rows.write(np.hstack([corners, sources, lettering.sizes(words), colors])[shown])
+        if self._letters != lettering.letters or not self._places.keys() >= set(texts):
+            self._fill(texts, lettering)
+        assert self._texture is not None  # created by _fill
+        shown = np.array([text in self._places for text in texts])
+        sources = np.array([self._places.get(text, (0, 0)) for text in texts])
+        self._rows.write(np.hstack([corners, sources, lettering.sizes(texts), colors])[shown])
         self._program["u_picture"] = size
         self._program["u_texture"] = 0
         self._texture.use(0)
         with without_depth_test(self.context):
             self._rows.draw()
 
-    def _fill(self, words: Sequence[str], lettering: Lettering) -> None:
-        """Draw a new texture: of the words that are new, and of those it had if they are few."""
-        wanted = dict.fromkeys(words)
+    def _fill(self, texts: Sequence[str], lettering: Lettering) -> None:
+        """Create a new texture of the given texts, and of the previous ones if they are few."""
+        wanted = dict.fromkeys(texts)
         if self._letters == lettering.letters and len(self._places) < _MOST:
             wanted |= dict.fromkeys(self._places)
         sizes = lettering.sizes(list(wanted))
@@ -87,8 +87,8 @@ class LabelPass:
         self._places = dict(zip(wanted, map(tuple, corners.tolist()), strict=False))
         height = int(corners[-1, 1] + sizes[0, 1]) if len(corners) else 1
         pixels = np.zeros((height, _WIDTH, 2), dtype=np.uint8)
-        for word, (x, y) in self._places.items():
-            drawn = lettering.pixels(word)
+        for text, (x, y) in self._places.items():
+            drawn = lettering.pixels(text)
             pixels[y : y + drawn.shape[0], x : x + drawn.shape[1]] = drawn
         self._free_texture()
         texture = self.context.texture((_WIDTH, height), 2, pixels.tobytes())

@@ -1,4 +1,4 @@
-"""Passes that many scenes do not need, imported and created on first use."""
+"""Optional passes, imported and created on first use."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ __all__ = ["LatePasses"]
 
 
 class LatePasses:
-    """Makes each of its passes once.
+    """Passes that many scenes do not need, each created once on demand.
 
     Parameters
     ----------
     context : moderngl.Context
         OpenGL 3.3 or newer.
     programs : Programs
-        All passes share them.
+        Shader programs shared by all passes.
     mesh_pass, joint_pass : MeshPass, JointPass
-        What some of these passes draw with.
+        Passes that some of these passes use for drawing.
     buffers : ActorBuffers
-        What was uploaded.
+        Uploaded buffers.
     """
 
     def __init__(
@@ -53,14 +53,14 @@ class LatePasses:
 
     @cached_property
     def keypoint_pass(self) -> KeypointPass:
-        """Draws keypoints that figures themselves have."""
+        """Pass for the keypoints of figures."""
         from viewer.rendering.passes.keypoint_pass import KeypointPass
 
         return KeypointPass(self._joint_pass)
 
     @cached_property
     def point_pass(self) -> PointPass:
-        """Draws captured points."""
+        """Pass for captured points."""
         from viewer.rendering.passes.point_pass import PointPass
 
         points = PointPass(self._context, self._programs)
@@ -69,14 +69,14 @@ class LatePasses:
 
     @cached_property
     def motion_path_pass(self) -> MotionPathPass:
-        """Draws paths of joints."""
+        """Pass for motion paths."""
         from viewer.rendering.passes.motion_path_pass import MotionPathPass
 
         return MotionPathPass(self._context, self._programs)
 
     @cached_property
     def pick_pass(self) -> PickPass:
-        """Finds what is seen at a pixel."""
+        """Pass that finds the object at a pixel."""
         from viewer.rendering.picking import Passes, PickPass
 
         passes = Passes(self._programs, self._mesh_pass, self.point_pass, self._buffers)
@@ -86,7 +86,7 @@ class LatePasses:
 
     @cached_property
     def legend_pass(self) -> LegendPass:
-        """Draws legends into pictures."""
+        """Pass for legends of scalar quantities."""
         from viewer.rendering.passes.legend_pass import LegendPass
 
         legends = LegendPass(self._context, self._programs)
@@ -95,7 +95,7 @@ class LatePasses:
 
     @cached_property
     def annotation_pass(self) -> AnnotationPass:
-        """Draws marks, what is seen of joints beside their boxes, and annotations."""
+        """Pass for marks, joint marks and annotations."""
         from viewer.rendering.passes.annotation_pass import AnnotationPass
 
         annotations = AnnotationPass(self._context, self._programs)
@@ -104,7 +104,7 @@ class LatePasses:
 
     @cached_property
     def ghost_pass(self) -> GhostPass:
-        """Draws what is shown over the scene."""
+        """Pass for ghosts over the scene."""
         from viewer.rendering.passes.ghost_pass import GhostPass
 
         ghosts = GhostPass(self._context, self._programs, self._mesh_pass)
@@ -112,6 +112,6 @@ class LatePasses:
         return ghosts
 
     def release(self) -> None:
-        """Free those that were made."""
+        """Free all passes that were created."""
         for item in self._made:
             item.release()

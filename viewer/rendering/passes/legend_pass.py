@@ -1,4 +1,4 @@
-"""Draws the legend of a scalar quantity into the corner of a picture."""
+"""Pass that draws the legend of a scalar quantity into the corner of a picture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class LegendPass:
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -33,14 +33,14 @@ class LegendPass:
         self._drawn: tuple[Legend, tuple[int, int]] | None = None
 
     def draw(self, legend: Legend, size: tuple[int, int]) -> bool:
-        """Draw a legend into the upper left corner of what is bound.
+        """Draw a legend into the upper left corner of the bound framebuffer.
 
         Parameters
         ----------
         legend : Legend
-            Drawn as a texture once, and kept as long as it is the same.
+            The legend; its texture is cached until a different one is drawn.
         size : (int, int)
-            Of the picture, pixels.
+            Width and height of the picture, pixels.
 
         Returns
         -------
@@ -67,7 +67,7 @@ class LegendPass:
         self._free()
         pixels = legend_pixels(legend, size)
         if pixels is not None:
-            # Colours are multiplied by alpha, as all that is drawn; textures begin at the bottom.
+            # Blending expects premultiplied alpha, and the first row of a texture is at the bottom.
             multiplied = pixels.astype(np.float64)
             multiplied[..., :3] *= multiplied[..., 3:] / 255.0
             data = np.ascontiguousarray(np.rint(multiplied[::-1]).astype(np.uint8))

@@ -1,4 +1,4 @@
-"""Draws posed meshes: surface, edges and vertex normals, independent of skinning."""
+"""Pass that draws posed meshes: surface, edges and vertex normals, without skinning them."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from viewer.rig.mesh import bounding_box, box_size
 __all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface"]
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
-"""Of a surface without texture, linear."""
+"""Default colour of a surface without texture, linear."""
 
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # of the figure's size
 _USUAL = DisplayOptions().shading
-_TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # those before are the skinning shader's
+_TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # lower units belong to the skinning shader
 
 
 class MeshPass:
@@ -39,7 +39,7 @@ class MeshPass:
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the shading programs.
+        Provides the shading programs.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -59,15 +59,15 @@ class MeshPass:
         Parameters
         ----------
         mesh : PosedMesh
-            Already updated.
+            Updated buffers.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         options : DisplayOptions
             Shading and lights.
         color : (r, g, b), optional
-            Of what has no texture, linear; ``SKIN_COLOR`` if omitted.
+            Colour of untextured surfaces, linear; ``SKIN_COLOR`` if omitted.
         """
         look = mesh.scalars.look if options.shading == "scalar" else None
         corners = "corners" if look is not None else ""
@@ -97,7 +97,7 @@ class MeshPass:
     def draw_edges(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> None:
-        """Draw every triangle's edges over its surface."""
+        """Draw the edges of all triangles over the surface."""
         program = self.programs.drawing("edge", fragment="line")
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_EDGE_COLOR)
@@ -107,7 +107,7 @@ class MeshPass:
         self.context.wireframe = False
 
     def draw_normals(self, mesh: PosedMesh, placement: Floats, view: View, size: float) -> None:
-        """Draw a line along every vertex's normal; ``size`` is the figure's."""
+        """Draw a line along every vertex normal; ``size`` is that of the figure."""
         program = self.programs.drawing("line")
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR)
@@ -119,7 +119,7 @@ class MeshPass:
     def array(
         self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
     ) -> moderngl.VertexArray:
-        """Return the mesh's vertex array for a program, with the attributes it kept."""
+        """Return the mesh's vertex array for a program, with the attributes that it uses."""
 
         def content() -> list[Any]:
             found: list[Any] = [(mesh.posed, "3f4 12x", "in_position")]
@@ -140,7 +140,7 @@ class MeshPass:
         return self._arrays.get(mesh, lambda: VertexArrays(self.context))
 
     def forget(self, mesh: PosedMesh) -> None:
-        """Free what was made for a mesh that is about to be released."""
+        """Free the vertex arrays of a mesh that is about to be released."""
         self._arrays.drop(mesh)
 
     def release(self) -> None:
@@ -149,7 +149,7 @@ class MeshPass:
 
 
 def _shading(mesh: PosedMesh, options: DisplayOptions) -> str:
-    """Return how a mesh is shaded: as usual if it lacks the numbers that others show."""
+    """Return the shading of a mesh: the default one if it lacks the scalar quantity."""
     if options.shading == "scalar" and mesh.scalars.look is None:
         return _USUAL
     return options.shading

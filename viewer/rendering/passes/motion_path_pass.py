@@ -1,4 +1,4 @@
-"""Draws motion paths of joints as lines."""
+"""Pass that draws motion paths of joints as lines."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ from viewer.rig.scene import Actor, Motion
 __all__ = ["Moment", "MotionPathBuffers", "MotionPathPass", "path_colors"]
 
 _WIDTH = 2.5  # pixels
-_HIDDEN = 0.3  # opacity of what lies behind something
+_HIDDEN = 0.3  # opacity of hidden parts
 _GOLDEN = 0.618033988749895
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What part of the paths is drawn: ``reach`` seconds around ``now``; all of them if 0."""
+    """Drawn part of motion paths: ``reach`` seconds before and after ``now``; all if 0."""
 
     now: float
     reach: float
 
 
 def path_colors(count: int) -> Floats:
-    """Return a strong colour for each of some paths: (N, 3), sRGB."""
+    """Return a saturated colour for each path: (N, 3), sRGB."""
     hues = 0.1 + _GOLDEN * np.arange(count)
     return np.array([colorsys.hsv_to_rgb(hue % 1.0, 0.85, 0.95) for hue in hues]).reshape(-1, 3)
 
 
 class MotionPathBuffers:
-    """Segments of one actor's paths; computed again only if what they follow from changed.
+    """Segments of one actor's paths, recomputed only if their inputs changed.
 
     Parameters
     ----------
     context : moderngl.Context
-        Gives the buffers.
+        The context in use.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -61,11 +61,11 @@ class MotionPathBuffers:
         self._key: tuple[object, ...] | None = None
 
     def update(self, actor: Actor, joints: tuple[int, ...], min_confidence: float) -> None:
-        """Follow clip, joints, and what the clip leaves to the pose."""
+        """Recompute the paths if clip, joints or the part of the pose outside the clip changed."""
         key = (id(actor.clip), joints, min_confidence, actor.offset, *_still(actor))
         if key == self._key or actor.clip is None:
             return
-        self._clip = actor.clip  # kept, so that its id stays its own
+        self._clip = actor.clip  # keeps the clip alive, so that its id is not reused
         path = motion_path(
             actor.figure, actor.clip, joints, base=actor.pose, min_confidence=min_confidence
         )
@@ -96,7 +96,7 @@ class MotionPathBuffers:
 
 
 def _still(actor: Actor) -> tuple[object, ...]:
-    """Return what of a pose the clip does not move, and paths depend on."""
+    """Return the parts of a pose that the paths depend on but the clip does not animate."""
     pose, clip = actor.pose, actor.clip
     if pose is None or clip is None or isinstance(clip, PointClip):
         return ()
@@ -117,14 +117,14 @@ def _place(actor: Actor) -> tuple[bytes, float]:
 
 
 class MotionPathPass:
-    """Draws paths.
+    """Draws motion paths.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -138,20 +138,20 @@ class MotionPathPass:
         size: tuple[int, int],
         at: Moment,
     ) -> None:
-        """Draw one actor's paths; what lies behind something is drawn faintly.
+        """Draw one actor's paths, with hidden parts faint.
 
         Parameters
         ----------
         paths : MotionPathBuffers
-            Already updated.
+            Updated buffers.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         size : (int, int)
             Width and height of the picture, pixels.
         at : Moment
-            What part of them.
+            The drawn part of the paths.
         """
         if not paths.count:
             return
@@ -165,7 +165,7 @@ class MotionPathPass:
         }
         set_uniforms(program, values)
         array = paths.array(program)
-        with without_depth_writes(self.context):  # lines over one another all count
+        with without_depth_writes(self.context):  # overlapping lines must not hide each other
             for opacity in opacities(self.context, _HIDDEN):
                 set_uniforms(program, {"u_opacity": opacity})
                 array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)

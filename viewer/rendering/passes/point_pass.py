@@ -1,7 +1,7 @@
-"""Draws captured keypoints as small spheres, and the limbs between them, coloured by side.
+"""Pass that draws captured keypoints as spheres, with limbs between them, coloured by side.
 
-A limb is never left out for its length, as some viewers do beyond two metres: files do not say
-their unit, and a limb that is far too long shows a keypoint that is far off.
+Limbs are drawn whatever their length. Some viewers omit limbs longer than two metres, but files do
+not state their unit, and an implausibly long limb reveals an outlier.
 """
 
 from __future__ import annotations
@@ -29,33 +29,33 @@ __all__ = ["LEFT", "MIDDLE", "RIGHT", "PointBuffers", "PointPass", "point_radii"
 RIGHT: Color = (0.75, 0.06, 0.05)
 LEFT: Color = (0.05, 0.20, 0.75)
 MIDDLE: Color = (0.42, 0.42, 0.42)
-"""Colours by side, linear; an actor's own colour takes the place of the middle's."""
+"""Colours by side, linear; the actor's colour, if set, replaces MIDDLE."""
 
-_LARGEST = 0.012  # radius of a point, of the size of all of them: 2 cm on a person
-_SMALLEST = 0.0015  # points that coincide are seen too
-_SPACING = 0.3  # radius, of the distance to the nearest other point: fingers stay apart
-_LIMB = 0.5  # radius of a limb, of its thinner end's
-_SAMPLES = 32  # frames of a clip by which points are measured
-_CERTAIN = 0.999  # confidence from which on a point hides what is behind it
-_SIDES, _RINGS = 12, 3  # of a capsule: around, and from its equator to a pole
+_LARGEST = 0.012  # radius relative to the size of all points: 2 cm on a person
+_SMALLEST = 0.0015  # the same, minimum: coincident points stay visible
+_SPACING = 0.3  # maximum radius relative to the distance of the nearest point, for fingers
+_LIMB = 0.5  # radius of a limb relative to its thinner end
+_SAMPLES = 32  # frames of a clip that determine the radii
+_CERTAIN = 0.999  # confidence from which a point is drawn opaque
+_SIDES, _RINGS = 12, 3  # subdivisions of a capsule: around, and from equator to pole
 _FLOATS = 11  # numbers of an instance
 
 
 def point_radii(points: Floats) -> Floats:
-    """Return how large each point is drawn, by how far apart the points are.
+    """Return the drawn radius of each point, derived from the distances between points.
 
-    Files do not say their unit, so size is a share of the size of all points, and less where
-    points are close to one another: hands and faces among a body's.
+    Files do not state their unit, so radii are relative to the size of the point set, and smaller
+    where points are close together, as on hands and faces.
 
     Parameters
     ----------
     points : (F, K, 4)
-        x, y, z and confidence in some frames.
+        x, y, z and confidence in a sample of frames.
 
     Returns
     -------
     (K,)
-        Figure units, medians over the frames that see the points; 0 if no frame sees any.
+        Figure units, medians over the frames with visible points; 0 if there are none.
     """
     sizes, gaps = [], []
     for frame in points:
@@ -79,7 +79,7 @@ def point_radii(points: Floats) -> Floats:
 
 
 def _radii_of(actor: Actor, points: Floats) -> Floats:
-    """Measure an actor's clip once; without one, what it shows now."""
+    """Return radii from an actor's clip, or from its current points if there is no clip."""
     clip = actor.clip
     if not isinstance(clip, PointClip) or not len(clip.points):
         return point_radii(points[None])
@@ -93,14 +93,14 @@ class PointBuffers:
     Parameters
     ----------
     context : moderngl.Context
-        Gives the buffers.
+        The context in use.
     layout : PointLayout
-        Of the figure.
+        Keypoints and limbs of the figure.
 
     Attributes
     ----------
     elements : (N,) int32
-        What each instance is: a keypoint, or from their number on a limb.
+        Index of each instance: a keypoint, or a limb plus the number of keypoints.
     """
 
     def __init__(self, context: moderngl.Context, layout: PointLayout) -> None:
@@ -116,27 +116,27 @@ class PointBuffers:
         self._measured: tuple[object, Floats] | None = None
 
     def update(self, actor: Actor, placement: Floats, view: View, min_confidence: float) -> None:
-        """Follow the actor's points, and sort what is translucent from back to front.
+        """Upload the actor's current points, with translucent capsules sorted from back to front.
 
         Parameters
         ----------
         actor : Actor
-            With points.
+            An actor with points.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         min_confidence : float
-            Less certain points, and limbs that end at one, are left out.
+            Points below this confidence, and limbs that end at one, are omitted.
         """
         points = actor.points
-        assert points is not None  # the caller looked
+        assert points is not None  # checked by the caller
         shown = (points[:, 3] > 0.0) & (points[:, 3] >= min_confidence)
         self.center = bounding_box(points[shown, :3]).mean(axis=0) if shown.any() else np.zeros(3)
         ends, opacity = self._capsules(points, shown)
         toward = (view.matrix @ placement)[2, :3]
         depth = (points[ends, :3].mean(axis=1) - self.center) @ toward
-        # What hides the rest comes first; of the others, the farthest.
+        # Opaque capsules first, then translucent ones from back to front.
         order = np.lexsort((depth, np.where(opacity < _CERTAIN, 1, 0)))
         certain = opacity[order] >= _CERTAIN
         order[certain] = np.sort(order[certain])
@@ -147,13 +147,13 @@ class PointBuffers:
             self._key = key
 
     def _capsules(self, points: Floats, shown: Bools) -> tuple[NDArray[np.int64], Floats]:
-        """Return both ends and the opacity of everything that is drawn: (N, 2), (N,)."""
+        """Return the end points and the opacity of all drawn capsules: (N, 2), (N,)."""
         limbs = self.layout.limbs
         single = np.flatnonzero(shown)
         kept = np.flatnonzero(shown[limbs].all(axis=1))
         ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept]])
         self._numbers = np.concatenate([single, len(self.layout.names) + kept]).astype(np.int32)
-        # A limb is as certain as its less certain end.
+        # A limb has the confidence of its less certain end.
         return ends, np.clip(points[ends, 3].min(axis=1), 0.0, 1.0)
 
     def _write(
@@ -164,7 +164,7 @@ class PointBuffers:
         radii = self._measured[1][ends].min(axis=1)
         radii[ends[:, 0] != ends[:, 1]] *= _LIMB
         sides = self.layout.sides[ends]
-        # A limb from the middle to a side belongs to the side, one across to neither.
+        # A limb from the middle to a side has the side's colour; one between the sides has neither.
         side = np.sign(sides.sum(axis=1)) + 1
         palette = np.array([RIGHT, actor.color or MIDDLE, LEFT])
         places = (points[ends, :3] - self.center).reshape(-1, 6)
@@ -194,12 +194,12 @@ class PointPass:
     context : moderngl.Context
         The context in use.
     programs : Programs
-        Gives the program.
+        Provides the shader program.
 
     Attributes
     ----------
     capsule : (moderngl.Buffer, moderngl.Buffer)
-        Vertices and indices, shared by all.
+        Vertices and indices, shared by all instances.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
@@ -220,15 +220,15 @@ class PointPass:
         Parameters
         ----------
         points : PointBuffers
-            Already updated.
+            Updated buffers.
         placement : (4, 4)
-            Figure space to scene.
+            Matrix from figure space to scene space.
         view : View
             The camera's matrices.
         options : DisplayOptions
-            Lights; the opacity of a skeleton over a skin.
+            Lights, and the opacity of a skeleton over the skin.
         overlays : bool
-            Whether what lies behind something, as a fitted body, is drawn translucently.
+            Whether parts hidden by other objects, such as a fitted body, are drawn translucently.
         """
         if not len(points.elements):
             return
@@ -237,9 +237,9 @@ class PointPass:
         set_lights(program, view, options.lights)
         set_uniforms(program, {"u_flat": False, "u_textured": False, "u_opacity": 1.0})
         array, count = points.array(program, self.capsule), len(points.elements)
-        # What is translucent shows its front alone; a mirroring placement turns triangles round.
-        is_mirrored = bool(np.linalg.det(placement[:3, :3]) < 0.0)
-        self.context.front_face = "cw" if is_mirrored else "ccw"
+        # Cull back faces, so that translucent capsules show one layer; a reflection flips winding.
+        is_reflected = bool(np.linalg.det(placement[:3, :3]) < 0.0)
+        self.context.front_face = "cw" if is_reflected else "ccw"
         self.context.enable(moderngl.CULL_FACE)
         if overlays:
             given = options.skeleton_opacity
@@ -263,9 +263,9 @@ class PointPass:
 
 
 def _capsule() -> tuple[Floats, Ints]:
-    """Return two halves of a sphere and the tube between them: (N, 4) and (T, 3).
+    """Return two hemispheres and the tube between them: vertices (N, 4) and triangles (T, 3).
 
-    The last column is 0 for what stays at the start, 1 for what goes to the end.
+    The last column is 0 for vertices at the start of the capsule and 1 for those at its end.
     """
     rows = []
     for end in (0.0, 1.0):

@@ -1,4 +1,4 @@
-"""Translucent surfaces, drawn as a single layer regardless of overlap."""
+"""Translucent surfaces, drawn as a single layer where they overlap."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ def surface_opacity(options: DisplayOptions) -> float:
 def draw_layer(
     context: moderngl.Context, options: DisplayOptions, draw: Callable[[], object]
 ) -> None:
-    """Draw surfaces; of translucent ones only the nearest layer.
+    """Draw surfaces, only the nearest layer if they are translucent.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     options : DisplayOptions
-        Whether the surfaces are translucent.
+        Display options that determine the opacity of surfaces.
     draw : callable
-        Draws them; called a second time if they are.
+        Draws the surfaces; called twice if they are translucent.
     """
     if surface_opacity(options) == 1.0:
         draw()
@@ -43,7 +43,7 @@ def draw_layer(
 
 
 def draw_nearest(context: moderngl.Context, draw: Callable[[], object]) -> None:
-    """Draw something translucent twice: its depths, then its nearest layer."""
+    """Draw the nearest layer of something translucent: first its depth, then its colours."""
     with without_colors(context):
         draw()
     context.depth_func = "<="

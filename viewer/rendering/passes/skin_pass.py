@@ -1,7 +1,7 @@
-"""The skinning vertex shader, run once per changed pose, by transform feedback.
+"""Skinning by a vertex shader with transform feedback, run once per changed pose.
 
-Its output, the posed buffer, is drawn by every other pass as a static mesh, and read back by the
-tests: shading, wireframe, normals and picking cost no second skinning.
+All other passes draw its output, the posed buffer, as a static mesh, so shading, wireframe, normals
+and picking need no second skinning. Tests read the buffer back.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ class PosedMesh:
     context : moderngl.Context
         The context in use; some framebuffer must be bound when ``update`` runs.
     programs : Programs
-        Gives the skinning program.
+        Provides the skinning program.
     mesh : MeshBuffers
-        Shared with all actors of the figure.
+        Mesh shared by all actors of the figure.
     way : str
-        How pose correctives are summed, see ``rest_buffers``.
+        Method of summing pose correctives, see ``rest_buffers``.
 
     Attributes
     ----------
     posed : moderngl.Buffer
         A row of position (relative to ``center``) and unit normal for every split vertex.
     center : (3,)
-        Add it to the positions for figure space; it is part of the model matrix.
+        Origin of the positions in figure space; part of the model matrix.
     scalars : ScalarBuffer
-        The numbers of a scalar quantity, computed when one is shown.
+        Values of a scalar quantity, computed when one is shown.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class PosedMesh:
         pose : Pose or None
             None leaves the mesh in its binding space.
         skinning : Skinning or str
-            How, or a key of ``viewer.rig.skinning.METHODS`` alone.
+            Skinning settings, or just a key of ``viewer.rig.skinning.METHODS``.
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
@@ -108,7 +108,7 @@ class PosedMesh:
         self.n_updates += 1
 
     def upload(self, pose: Pose, how: Skinning) -> None:
-        """Send what a pose needs and skin nothing: the processor's part of ``update``."""
+        """Upload the data of a pose without skinning: the CPU part of ``update``."""
         figure = shaped(self.mesh.figure, pose.shape_weights)
         self._rest.update(figure, pose, how)
         self._write_palette(figure, pose, how, self.mesh.skin(how))
@@ -140,14 +140,14 @@ class PosedMesh:
     def _write_palette(
         self, figure: Figure, pose: Pose, how: Skinning, buffers: SkinBuffers
     ) -> None:
-        """Upload T(-center') M T(center): the shader sees small numbers on both sides."""
+        """Upload T(-center') M T(center), so that the shader's inputs and outputs are small."""
         skeleton, skin = figure.skeleton, figure.skin
-        assert skeleton is not None and skin is not None  # the caller looked
+        assert skeleton is not None and skin is not None  # checked by the caller
         palette = posed_skeleton(skeleton, pose).palette(skin).copy()
         self._is_affine = not is_rigid(palette)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
-        if buffers.joint_shares.any():
-            self.center = buffers.joint_shares @ palette[:, :3, 3]
+        if buffers.joint_fractions.any():
+            self.center = buffers.joint_fractions @ palette[:, :3, 3]
         palette[:, :3, 3] -= self.center
         method = METHODS[how.method]
         if method.uses_matrices:
@@ -159,7 +159,7 @@ class PosedMesh:
             write_rigid(self._rigid, *split_palette(palette, centers))
 
     def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
-        # Rigid joints, by far the most common, get a program that does not pay for the others.
+        # Rigid joints, by far the most common, get a cheaper program without scale and shear.
         affine = attached and self._is_affine
         program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
         key = (id(skin), attached and id(self._rest.positions))
@@ -168,19 +168,19 @@ class PosedMesh:
         )
 
     def read(self) -> tuple[Floats, Floats]:
-        """Return what was drawn last: positions in figure space and normals, (V, 3) each.
+        """Return the current posed positions in figure space and normals, (V, 3) each.
 
-        Of the split vertices only one copy each; the place of the pose is not applied.
+        One row per vertex of the figure; the placement of the pose is not applied.
         """
         rows = np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6).astype(np.float64)
         rows = rows[self.mesh.copies]
         return rows[:, :3] + self.center, rows[:, 3:]
 
     def release(self) -> None:
-        """Free what belongs to this actor alone."""
+        """Free the buffers of this actor."""
         self._owner.release()
 
 
 def skinning_words(how: Skinning) -> tuple[object, ...]:
-    """Return a key that identifies the way of skinning."""
+    """Return a key that identifies skinning settings."""
     return (how.method, how.blend_factor, how.max_influences, how.normalize, how.correctives)

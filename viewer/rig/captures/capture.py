@@ -20,7 +20,7 @@ class CapturePart:
     Attributes
     ----------
     stop : int
-        Frames before this one, counted from the capture's first, have been read.
+        End frame of this part (exclusive), counted from the capture's first frame.
     bodies : mapping of person to BodyMotion
         Only the rows of this part; their ``timing`` covers the whole capture, -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
@@ -49,7 +49,7 @@ class Capture:
         Number of the first frame in the files.
     parts : callable
         Returns an iterator over the parts in time order; the first is short so that something
-        can be shown early. Every call reads again.
+        can be shown early. Every call reads the files again.
     up : "y", "z", "-y", "-z" or ""
         The axis that points up in the world; empty to guess from the first bodies.
     views : tuple of CameraView

@@ -16,9 +16,9 @@ __all__ = ["fitted_body", "keypoint_distances"]
 
 
 def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
-    """Return the body of the same person as some captured keypoints, None if there is none.
+    """Return the body of the person to whom captured keypoints belong; None without one.
 
-    Untracked people have none: which body is theirs is unknown.
+    Untracked people have none, because nothing associates their keypoints with a body.
     """
     for actor in actors:
         same = actor.person == points.person and is_tracked(actor.person)
@@ -35,7 +35,7 @@ def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
     Parameters
     ----------
     points : Actor
-        Captured keypoints, as currently posed.
+        Captured keypoints at the current time.
     body : Actor
         A posed figure with the SMPL family's joint names.
 

@@ -6,10 +6,10 @@ __all__ = ["is_tracked", "person_label", "person_name"]
 
 
 def is_tracked(person: int | None) -> bool:
-    """Return whether a number is that of a track, which follows one person from frame to frame.
+    """Return whether a number identifies a track, which follows one person from frame to frame.
 
-    Capture systems give detections without a track the number -1. Those of one frame are numbered
-    -1, -2, -3 … here, and the same number in the next frame may be a different person.
+    Capture systems give detections without a track the number -1. Here they are numbered -1, -2, -3
+    … within each frame; in the next frame the same number may belong to a different person.
     """
     return person is not None and person >= 0
 

@@ -77,8 +77,8 @@ class PointClip:
 def sample_points(clip: PointClip, time: float, interpolate: bool = False) -> Floats | None:
     """Return the points at one time, None where they are absent.
 
-    A point moves linearly between two frames that see it. If only one of them sees it, it
-    stays there until the other is due.
+    A point is interpolated linearly between two frames in which it is seen. Otherwise it keeps the
+    position and the confidence of the earlier frame until the next one.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Comparison of two figures or motions: the size and place of their differences."""
+"""Comparison of two figures or motions: magnitude and location of their differences."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from viewer.errors import counted
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats
 from viewer.rig.comparison.difference import Difference, Measure, Tally
 from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
@@ -23,7 +23,8 @@ from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["Difference", "Measure", "compare", "rotation_distance"]
 
-_MOST_SEARCHES = 32  # steps with a closest-point search, each of which takes about a second
+# A closest-point search takes about a second, so only this many steps get one.
+_MOST_SEARCHES = 32
 
 
 def compare(
@@ -37,8 +38,8 @@ def compare(
     """Compare two actors, regardless of their placements in a scene.
 
     Joints are matched by name. Vertices are compared by index if the triangles are the same, else
-    by the closest point on the other's surface, in both directions. Both actors are posed, and
-    left in the step in which the meshes are farthest apart.
+    by the closest point on the other's surface, in both directions. The actors are left in the pose
+    in which their meshes are farthest apart.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ class _Comparison:
         self.first, self.second, self.skinning, self.steps = first, second, skinning, steps
         self.mismatches, self.notes = list(steps.mismatches), list(steps.notes)
         self.tallies: list[Tally] = []
-        self.numbers: dict[str, int] = {}  # of steps, by name
+        self.numbers: dict[str, int] = {}  # step numbers, by name of the step
         self._pair_skeletons()
         self._pair_meshes()
         self._pair_points()
@@ -167,7 +168,7 @@ class _Comparison:
         )
 
     def _pose_at_worst(self) -> None:
-        """Pose both as in the step in which the meshes, or the joints, are farthest apart."""
+        """Pose both actors at the step in which the meshes, or the joints, are farthest apart."""
         lengths = [tally for tally in self.tallies if tally.kind == "length" and tally.step]
         if not lengths:
             return

@@ -1,4 +1,4 @@
-"""Results of a comparison: measures with maximum, mean and place."""
+"""Results of a comparison: measures with maximum, mean and location."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Measure:
     maximum, mean : float
         Over all items and steps that were compared.
     step, item : str
-        Place of the maximum: a frame or test pose, a joint or vertex. The step is empty for
+        Location of the maximum: a frame or test pose, and a joint or vertex. The step is empty for
         weights, which do not depend on the pose.
     items : tuple of str
         Names of the entries of ``item_maxima``; empty for vertices, which have indices.
@@ -56,9 +56,9 @@ class Difference:
     Attributes
     ----------
     measures : tuple of Measure
-        One for everything that both have.
+        One for each property that both figures have.
     mismatches : tuple of str
-        Joints, frames and the like that only one has. No tolerance applies to them.
+        Items that only one figure has, such as joints or frames; no tolerance applies to them.
     notes : tuple of str
         Remarks on the method of comparison.
     size : float
@@ -79,7 +79,7 @@ class Difference:
         Parameters
         ----------
         tolerance : float
-            Lengths count as fractions of the size, angles in radians, weights as they are.
+            Compared with lengths as fractions of the size, angles in radians, and weights.
         """
         # Written as "not within" rather than "more than", so that NaN exceeds any tolerance.
         within = all(measure.relative(self.size) <= tolerance for measure in self.measures)

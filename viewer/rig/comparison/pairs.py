@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.errors import counted
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.skeleton import Skeleton, joint_labels
 
@@ -51,7 +51,7 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
         With a mismatch for joints without a partner, and for partners with different parents; a
         note if their order differs, as skins and clips refer to joints by index.
     """
-    pairs = pair_names(_called(first), _called(second), "joint")
+    pairs = pair_names(_unique_labels(first), _unique_labels(second), "joint")
     parents = [
         np.append(np.arange(len(pairs.first)), -1)[_places(found, skeleton.n_joints)[above]]
         for found, skeleton in ((pairs.first, first), (pairs.second, second))
@@ -68,8 +68,8 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     )
 
 
-def _called(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return unique labels of the joints for messages; nameless joints have their index."""
+def _unique_labels(skeleton: Skeleton) -> tuple[str, ...]:
+    """Return unique labels of the joints for messages; unnamed joints are labelled by index."""
     return tuple(
         label if name else f"joint {joint} (no name)"
         for joint, (name, label) in enumerate(
@@ -84,7 +84,7 @@ def _order_notes(pairs: Pairs, second: Skeleton) -> list[str]:
     if not len(other):
         return []
     place = int(other[0])
-    here, there = pairs.names[place], _called(second)[int(pairs.second[order[place]])]
+    here, there = pairs.names[place], _unique_labels(second)[int(pairs.second[order[place]])]
     return [
         f"joints are in a different order, which matters to .skin and .anim files: where the first "
         f"has {here}, the second has {there}"
@@ -92,7 +92,7 @@ def _order_notes(pairs: Pairs, second: Skeleton) -> list[str]:
 
 
 def _places(found: Ints, count: int) -> Ints:
-    """Return each joint's position in a list, -1 if absent; the extra last entry stands for -1."""
+    """Return each joint's position in a list, -1 if absent; an extra last entry maps -1 to -1."""
     places = np.full(count + 1, -1, dtype=np.int32)
     places[found] = np.arange(len(found))
     return places

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.errors import RigError, counted
+from viewer.errors import RigError
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion.clip import Clip
@@ -21,7 +22,7 @@ FrameRange = tuple[int | None, int | None]
 """First frame and end frame (exclusive), in the numbering of the first motion."""
 
 _FREE = 0.7  # radians to either side in test poses, for rotations without limits
-_SHIFT = 0.05  # of the skeleton's reach to either side, for translations without limits
+_SHIFT = 0.05  # fraction of the skeleton's extent to either side, for translations without limits
 _SAME_TIME = 1e-6  # seconds
 
 
@@ -60,9 +61,9 @@ class Steps:
         return len(self.times) or 1 + len(self.dofs)
 
     def pose(self, number: int, first: Actor, second: Actor) -> str:
-        """Pose both actors as in one step, in any order, and return the name of the step."""
+        """Pose both actors for one step and return its name; steps may come in any order."""
         if len(self.times):
-            # Each from its own start, as captures may start at any frame.
+            # Each motion is timed from its own start, as captures may start at any frame.
             for actor in (first, second):
                 time = float(self.times[number]) + actor.require_clip().start + actor.offset
                 pose_actor(actor, time)
@@ -159,12 +160,12 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
             f"different limits of {counted(len(other), 'DOF')}, such as {pairs.names[dof]}: "
             f"{low[0]:.6g} to {low[1]:.6g} and {high[0]:.6g} to {high[1]:.6g}"
         )
-    dofs = _drawn(first, pairs.first, limits, n_poses)
+    dofs = _random_dofs(first, pairs.first, limits, n_poses)
     none = np.zeros(0)
     return Steps(none, dofs, pairs.first, pairs.second, 0, tuple(mismatches), pairs.notes)
 
 
-def _drawn(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats:
+def _random_dofs(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats:
     """Draw random DOF values within both limits; those of the first win if they are disjoint."""
     is_rotation = skeleton.dof_kinds[rows] >= 3
     # Relative to the skeleton's own extent, as its unit may be unknown.
@@ -172,7 +173,7 @@ def _drawn(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats
     free = np.where(is_rotation, _FREE, reach)
     low = np.maximum(limits[:, :, 0].max(axis=0), -free)
     high = np.minimum(limits[:, :, 1].min(axis=0), free)
-    # Limits that lie entirely outside the default range are taken at their closer end.
+    # If the limits lie entirely outside the default range, the range shrinks to their closer end.
     low, high = np.minimum(low, limits[:, :, 1].min(axis=0)), np.maximum(high, low)
     fractions = np.random.default_rng(0).random((count, len(rows)))
     return np.clip(low + fractions * (high - low), limits[0, :, 0], limits[0, :, 1])

@@ -29,7 +29,7 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     Returns
     -------
     (V,)
-        0 for equal rows, in whatever order or parts they list the weights.
+        0 for equal rows, regardless of the order of influences and of duplicate joints.
     """
     # Joints of the second without a partner get indices that the first does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints

@@ -23,13 +23,14 @@ __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
 _PAIRS = 1 << 19  # pairs of point and piece per batch; some 150 bytes each
 _LONG = 3.0  # pieces are split above this many times the median radius
-_NEAREST = 8  # pieces in the first query; if there may be more, a second finds all in the bound
+# Pieces in the first query; if more may lie within the bound, a second query finds all of them.
+_NEAREST = 8
 _POINTS = 1 << 16  # points per batch
 _FLAT = 1e-20  # sin^2 of the angle below which a triangle counts as a segment
 # Bounds are rounded up by this factor, so that rounding never excludes a triangle.
 _SLACK = 1.0 + 1e-9
 _ROUNDED = 1e-12  # rounding of a difference of squared distances, relative to the larger one
-_FEW = 10_000  # points; with fewer, starting threads takes longer than it saves
+_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,19 +134,19 @@ class Surface:
         self._keep_nearer(self._all, points, np.arange(len(points)), pieces, best, nearest)
         nearest = np.nextafter(nearest, np.inf)
         for level in self._levels:
-            self._look(level, points, best, nearest)
+            self._examine(level, points, best, nearest)
         return best
 
-    def _look(self, level: _Level, points: Floats, best: Ints, nearest: Floats) -> None:
+    def _examine(self, level: _Level, points: Floats, best: Ints, nearest: Floats) -> None:
         """Examine all pieces of a level that may be closer than the closest so far."""
         count = min(_NEAREST, len(level.triangles))
         workers = _workers(len(points))
         reach = float(nearest.max(initial=0.0) + level.radius) * _SLACK
-        # ``range`` as k keeps the second axis where only one piece is asked for.
+        # A ``range`` for k keeps the second axis even if only one piece is requested.
         distances, pieces = level.tree.query(
             points, k=range(1, count + 1), distance_upper_bound=reach, workers=workers
         )
-        # Beyond the reach the tree returns the index one past the last piece.
+        # For neighbours beyond the reach the tree returns the number of pieces as index.
         near = (pieces < len(level.triangles)) & (
             distances - _SLACK * level.radii[pieces % len(level.triangles)] < nearest[:, None]
         )

@@ -80,7 +80,7 @@ def slerp(start: Floats, end: Floats, fraction: Floats | float) -> Floats:
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     cosine = np.einsum("...a,...a->...", start, end)
     end = np.where(cosine[..., None] < 0.0, -end, end)
-    # The chord keeps the digits of small angles, which the cosine loses.
+    # For small angles the chord is accurate, whereas the arc cosine loses half the digits.
     half_chord = 0.5 * np.linalg.norm(end - start, axis=-1)
     angle = 2.0 * np.arcsin(np.minimum(half_chord, 1.0))
     sine = np.sin(angle)

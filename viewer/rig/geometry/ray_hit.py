@@ -10,7 +10,7 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["RayHit", "first_hit", "surface_point"]
 
-_AT_ONCE = 1 << 18  # triangles; some 300 bytes each
+_AT_ONCE = 1 << 18  # triangles per batch, about 300 bytes each
 _EDGE = 1e-9  # barycentric tolerance: no ray slips through between two triangles
 
 
@@ -25,7 +25,7 @@ class RayHit:
     barycentric : (3,)
         Weights of its corners, adding up to 1.
     distance : float
-        Distance from the ray's origin, in lengths of its direction.
+        Distance from the ray's origin, in multiples of the length of its direction.
     """
 
     triangle: int
@@ -67,10 +67,10 @@ def first_hit(
 def _nearest(
     positions: Floats, triangles: Ints, origin: Floats, direction: Floats
 ) -> RayHit | None:
-    """Intersect a ray with all of some triangles and return the nearest hit."""
+    """Return the nearest hit of a ray among some triangles; None without one."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     first, second, away = b - a, c - a, origin - a
-    # The vectors P and Q of the paper.
+    # The paper's vectors P and Q.
     p, q = np.cross(direction, second), np.cross(away, first)
     determinant = np.einsum("na,na->n", first, p)
     # Triangles parallel to the ray are not hit.
@@ -84,6 +84,7 @@ def _nearest(
     nearest = int(t.argmin()) if len(t) else -1
     if nearest < 0 or not np.isfinite(t[nearest]):
         return None
+    # The tolerance admits hits just outside an edge: clip their negative weights.
     weights = np.clip([1.0 - u[nearest] - v[nearest], u[nearest], v[nearest]], 0.0, 1.0)
     return RayHit(nearest, weights / weights.sum(), float(t[nearest]))
 

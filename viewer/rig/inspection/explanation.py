@@ -1,4 +1,4 @@
-"""All intermediate values of the skinning of one vertex, to be checked by hand."""
+"""Intermediate values of the skinning of one vertex, for verification by hand."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["DualTerms", "Explanation", "explain"]
 
-_TINY = 1e-12  # weights or quaternions that cancel each other define no rotation
+_TINY = 1e-12  # a smaller sum of weights or quaternions defines no rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,8 +31,8 @@ class DualTerms:
 
     Attributes
     ----------
-    shares : (K,)
-        Weights divided by their sum.
+    fractions : (K,)
+        Weights divided by their sum, w_i / sum_j w_j.
     duals : (K, 8)
         Each influence's unit dual quaternion (x, y, z, w), real part, then dual part.
     signs : (K,)
@@ -40,16 +40,16 @@ class DualTerms:
     stretches : (K, 3, 4)
         The non-rigid part of each matrix, applied before the rigid motion.
     blended : (8,)
-        sum_i share_i sign_i dual_i.
+        sum_i fraction_i sign_i dual_i.
     length : float
         Length of the real part of ``blended``, by which both parts are divided.
     stretched : (3,)
-        The rest position after sum_i share_i stretch_i.
+        The rest position after sum_i fraction_i stretch_i.
     position : (3,)
         ``stretched`` moved by the blended dual quaternion; the rest position if influences cancel.
     """
 
-    shares: Floats
+    fractions: Floats
     duals: Floats
     signs: Floats
     stretches: Floats
@@ -193,16 +193,16 @@ def _dual_terms(row: Skin, palette: Floats, rest: Floats) -> DualTerms:
     )
     total = float(row.weights.sum())
     is_moved = abs(total) > _TINY
-    shares = row.weights / (total if is_moved else 1.0)
+    fractions = row.weights / (total if is_moved else 1.0)
     signs = np.where(duals[:, :4] @ duals[0, :4] < 0.0, -1.0, 1.0) if len(duals) else np.ones(0)
-    blended = (shares * signs) @ duals
+    blended = (fractions * signs) @ duals
     length = float(np.linalg.norm(blended[:4]))
-    stretch = np.einsum("k,kab->ab", shares, stretches)
+    stretch = np.einsum("k,kab->ab", fractions, stretches)
     if not is_moved or length <= _TINY:
-        return DualTerms(shares, duals, signs, stretches, blended, length, rest, rest)
+        return DualTerms(fractions, duals, signs, stretches, blended, length, rest, rest)
     stretched = stretch[:, :3] @ rest + stretch[:, 3]
     position = _moved(blended / length, stretched)
-    return DualTerms(shares, duals, signs, stretches, blended, length, stretched, position)
+    return DualTerms(fractions, duals, signs, stretches, blended, length, stretched, position)
 
 
 def _moved(dual: Floats, point: Floats) -> Floats:

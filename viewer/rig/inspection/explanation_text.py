@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.errors import printable
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.explanation import DualTerms, Explanation
 from viewer.rig.number_text import number_text
@@ -12,8 +12,8 @@ from viewer.rig.skinning import METHODS
 
 __all__ = ["explanation_text"]
 
-_LONGEST = 40  # letters of a joint's name
-_RIGID = 1e-9  # a stretch closer to the identity is rounding
+_LONGEST = 40  # characters of a joint's name
+_RIGID = 1e-9  # a stretch this close to the identity is rounding error
 
 
 def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
@@ -89,7 +89,7 @@ class _Text:
         for index, values in enumerate(dual.duals):
             number = index + 1
             flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
-            weight = f"{dual.shares[index]:.{self.digits}f}"
+            weight = f"{dual.fractions[index]:.{self.digits}f}"
             self.lines.append(f"q{number}: relative weight {weight}{flip}")
             self._quaternions("   ", values)
         self.lines.append("q = sum of relative weight times q, with these signs")

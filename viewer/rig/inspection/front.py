@@ -34,8 +34,11 @@ _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
 _N_TIMES = 9  # samples of a motion
 _SURE = 0.5  # smaller components of a vote along an axis are inconclusive
 _WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
-"""Weight of each kind of evidence. Names state left and right; the others are heuristics that have
-to agree to outvote them, and a walk may go backwards."""
+"""Weight of each kind of evidence.
+
+Joint names state left and right explicitly; the other kinds are heuristics and outvote names
+only if they agree. Travel counts least, as a walk may go backwards.
+"""
 
 
 def usual_front(up: str) -> Front:
@@ -57,7 +60,7 @@ def guess_front(scene: Scene) -> Front:
 
     Each actor votes by its posed joints: left and right, toes, face, head and tail, and the
     direction of its motion; by the shape of its feet if it has neither joints nor captured
-    points. Actors that face different directions cancel each other.
+    points. Votes of actors that face opposite directions cancel out.
 
     Parameters
     ----------
@@ -72,7 +75,7 @@ def guess_front(scene: Scene) -> Front:
 
 
 def _nearest(vote: Floats, up: str) -> Front:
-    """Return the axis closest to a vote; the usual one if none is close."""
+    """Return the axis closest to a vote; the default one if none is close."""
     fronts = front_axes(up)
     signs = [1.0 if front[0] == "+" else -1.0 for front in fronts]
     axes = ["xyz".index(front[1]) for front in fronts]

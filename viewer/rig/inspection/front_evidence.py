@@ -16,11 +16,13 @@ from viewer.rig.retargeting.joint_names import sided_words
 
 __all__ = ["from_ends", "from_face", "from_sides", "from_soles", "from_toes", "from_travel"]
 
-_LEAST = 0.01  # of the figure's size; shorter offsets have no reliable direction
-_CLEAR = 0.2  # of the figure's size; a head that far from the centre is in front of the body
+_LEAST = 0.01  # fraction of the figure's size; shorter offsets have no reliable direction
+# Fraction of the figure's size; a head this far from the centre is in front of the body.
+_CLEAR = 0.2
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
-_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # of the height: the soles, and the ankles above them
-_MIRRORED = 0.98  # fraction of vertices near another's mirror image in a symmetric mesh
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and ankles above them
+# Fraction of the vertices of a symmetric mesh whose mirror image is near another vertex.
+_MIRRORED = 0.98
 _LOOKED_AT = 2000  # vertices in the symmetry test
 
 
@@ -138,6 +140,7 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
         return np.zeros(3)
     way = positions[soles].mean(axis=0) - positions[ankles].mean(axis=0)
     way[planes[0]] = 0.0
+    # Soles that extend ahead of the ankles by 2 % of the height or more are full evidence.
     way = _horizontal(way, up) / (2.0 * _LEAST * tall)
     return way / max(float(np.linalg.norm(way)), 1.0)
 
@@ -149,6 +152,8 @@ def _is_symmetric(positions: Floats, axis: int) -> bool:
     middle = bounding_box(positions).mean(axis=0)[axis]
     mirrored[:, axis] = 2.0 * middle - mirrored[:, axis]
     low = positions.min(axis=0)
+    # Vertices no farther apart than a cell lie in the same or in adjacent cells, so 27 look-ups
+    # find them without a search tree.
     known = np.unique(_cells((positions - low) / size))
     found = np.zeros(len(mirrored), dtype=bool)
     for step in np.ndindex(3, 3, 3):
@@ -177,7 +182,7 @@ def _by_word(
 
 
 def _agreement(ways: Floats, size: float) -> Floats:
-    """Return the mean of the unit vectors of all vectors that are long enough."""
+    """Normalise the vectors that are long enough and return their mean."""
     lengths = np.linalg.norm(ways, axis=1)
     clear = lengths > _LEAST * size
     if not clear.any():

@@ -34,7 +34,7 @@ class Measures:
 
 
 def measure(figure: Figure) -> Measures:
-    """Measure the rest mesh of a figure that has been shaped.
+    """Measure the rest mesh of a figure whose blend shapes have been applied.
 
     Parameters
     ----------

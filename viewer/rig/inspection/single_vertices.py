@@ -21,7 +21,7 @@ __all__ = ["check_vertices", "deform_vertices", "rest_vertices"]
 def deform_vertices(
     figure: Figure, pose: Pose | None, skinning: Skinning, vertices: Ints
 ) -> tuple[Floats, Floats]:
-    """Skin some vertices only, with the results of ``viewer.rig.skinning.deform``.
+    """Skin some vertices only, with the same result as ``viewer.rig.skinning.deform``.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def deform_vertices(
     if pose is not None:
         figure = shaped(figure, pose.shape_weights)
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
-    assert mesh is not None  # it has such vertices
+    assert mesh is not None  # checked by check_vertices
     if skeleton is None or skin is None:
         moved, normals = mesh.positions[vertices], unit(mesh.normals[vertices])
         return moved if pose is None else apply_transform(placement_matrix(pose), moved), normals

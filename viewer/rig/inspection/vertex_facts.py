@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.single_vertices import check_vertices, deform_vertices
@@ -18,8 +19,8 @@ from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["VertexFacts", "facts_text", "nearest_corner", "vertex_facts"]
 
-_LONGEST = 40  # letters of a name
-_MOST = 8  # influences that are listed one by one
+_LONGEST = 40  # characters of a name
+_MOST = 8  # influences that are listed individually
 
 
 @dataclass(frozen=True, slots=True, eq=False)

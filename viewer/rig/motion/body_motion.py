@@ -34,7 +34,7 @@ class BodyMotion:
     joint_names : tuple of K str
         Joints that ``vectors`` rotate, the root first.
     vectors : (N, K, 3)
-        Rotation vectors within the parent, radians.
+        Rotation vectors relative to the parent joint, radians.
     translations : (N, 3)
         Of the body, metres.
     about_origin : bool
@@ -132,16 +132,18 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
         notes.append(Diagnostic("F007.joints-left-out", values=values))
     weights, more = _weights(motion, figure)
     rotations = rotation_vector_to_quaternion(vectors)
-    translations, turns = motion.translations, None
+    translations, origin_rotations = motion.translations, None
     if motion.world_rotations is not None:
-        turns = rotation_vector_to_quaternion(motion.world_rotations)
-        rotations[:, 0] = multiply(turns, rotations[:, 0])
+        origin_rotations = rotation_vector_to_quaternion(motion.world_rotations)
+        rotations[:, 0] = multiply(origin_rotations, rotations[:, 0])
     elif motion.about_origin:
-        turns = rotations[:, 0]
-    if turns is not None:
+        origin_rotations = rotations[:, 0]
+    if origin_rotations is not None:
+        # t = T - J0 + R J0: skinning rotates about the rest root J0, the file about the origin.
         root = root_positions(figure, weights)
-        turned = np.einsum("nab,nb->na", quaternion_to_matrix(turns), root + 0.0 * translations)
-        translations = translations - root + turned
+        matrices = quaternion_to_matrix(origin_rotations)
+        rotated_roots = np.einsum("nab,nb->na", matrices, root + 0.0 * translations)
+        translations = translations - root + rotated_roots
     clip = SampledClip(
         motion.name,
         motion.timing,
@@ -172,10 +174,10 @@ def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diag
         if coefficients[:, used:].any():
             values = {"most": used, "figure": figure.name}
             notes.append(Diagnostic("F007.hand-components-left-out", values=values))
-        turned = coefficients[:, :used] @ hand.components[:used]
+        fingers = coefficients[:, :used] @ hand.components[:used]
         if not motion.flat_hands:
-            turned = turned + hand.mean
-        vectors[:, hand.joints] = turned.reshape(len(turned), -1, 3)
+            fingers = fingers + hand.mean
+        vectors[:, hand.joints] = fingers.reshape(len(fingers), -1, 3)
     return notes
 
 

@@ -8,7 +8,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from viewer.errors import RigError, counted
+from viewer.errors import RigError
+from viewer.phrases import counted
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
@@ -32,13 +33,13 @@ EXTRAPOLATIONS: tuple[Extrapolation, ...] = get_args(Extrapolation)
 """Behaviour of a curve before its first and after its last key."""
 
 SHORTEST = 1e-9
-"""Seconds: keys at most this far apart count as simultaneous; no slope is measured there."""
+"""Keys at most this many seconds apart count as simultaneous: no slope is computed between them."""
 
 TangentRule = Literal["flat", "linear", "smooth"]
 TANGENT_RULES: tuple[TangentRule, ...] = get_args(TangentRule)
 
 Tangent = TangentRule | float
-"""A rule, or the slope itself in value per second."""
+"""A tangent rule, or a slope in value per second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +74,7 @@ class Channel:
             raise RigError(f"tangents: expected {count} pairs, found {len(self.tangents)}")
         if (np.diff(self.times) < 0).any():
             raise RigError("times: expected non-decreasing seconds")
-        # Thousands of keys use a few distinct pairs.
+        # Thousands of keys share a few distinct pairs, so each pair is validated once.
         pairs = {pair: (_tangent(pair[0]), _tangent(pair[1])) for pair in set(self.tangents)}
         object.__setattr__(self, "tangents", tuple(pairs[pair] for pair in self.tangents))
         wrong = next((mode for mode in self.extrapolation if mode not in EXTRAPOLATIONS), None)
@@ -85,7 +86,7 @@ class Channel:
 
 
 def _tangent(given: Tangent) -> Tangent:
-    """Return a rule unchanged, a slope as a Python float, which files write in full."""
+    """Return a rule unchanged, and a slope as a Python float, which is written with all digits."""
     if given in TANGENT_RULES:
         return given
     if isinstance(given, str) or not math.isfinite(given):
@@ -180,14 +181,14 @@ def misfit(clip: Clip, skeleton: Skeleton) -> str:
     if not is_course_rig(skeleton):
         return (
             "is not a course rig, whose clips move the root along x, y, z and rotate each joint "
-            f"about x, y, z: {_strange_joint(skeleton)}"
+            f"about x, y, z: {_first_misfit(skeleton)}"
         )
     if len(clip.channels) != skeleton.n_dofs:
         return f"needs {skeleton.n_dofs} (3 + 3 x {skeleton.n_joints} joints)"
     return ""
 
 
-def _strange_joint(skeleton: Skeleton) -> str:
+def _first_misfit(skeleton: Skeleton) -> str:
     """Return a description of the first joint whose DOFs are not those of a course rig."""
     for joint in range(skeleton.n_joints):
         kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]

@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
-_UNCHANGED = 1e-9  # radians or lengths: a DOF this close to its curve counts as on it
+_UNCHANGED = 1e-9  # radians or lengths: a DOF this close to its curve counts as unchanged
 
 
 def add_key(
@@ -53,9 +53,9 @@ def add_key(
 ) -> tuple[Channel, int]:
     """Return a channel with one more key, and its index.
 
-    Without value and tangents, a key between others preserves the curve exactly: it gets the
-    slope of the curve there, and neighbours whose rules would see it keep their slopes as numbers.
-    An existing key at this time is changed instead.
+    Without value and tangents, a key between others preserves the curve exactly: it gets the slope
+    of the curve there, and neighbours whose rules depend on adjacent keys keep their slopes as
+    numbers. An existing key at this time is changed instead.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def move_keys(
     Parameters
     ----------
     channel : Channel
-        Containing these keys.
+        Contains these keys.
     keys : iterable of int
         Indices, which do not change.
     dt : float
@@ -146,7 +146,7 @@ def move_keys(
     dt = min(dt, float(room[later].min(initial=np.inf)))
     dt = max(dt, -float(room[~later].min(initial=np.inf)))
     times = np.where(moved, channel.times + dt, channel.times)
-    # Rounding must not push a key past its neighbour by the last bit.
+    # Rounding must not push a key past its neighbour.
     back = np.minimum.accumulate(times[::-1])[::-1]
     times = back if dt > 0.0 else np.maximum.accumulate(times)
     values = np.where(moved, channel.values + dv, channel.values)
@@ -240,7 +240,7 @@ def set_range(clip: Clip, start: float, end: float) -> Clip:
 
 
 def empty_clip(skeleton: Skeleton, name: str, start: float = 0.0, end: float = 1.0) -> Clip:
-    """Return a clip with a channel without keys for every DOF, which evaluates to 0."""
+    """Return a clip with a channel without keys for every DOF; such channels evaluate to 0."""
     return Clip(name, tuple(map(_no_keys, range(skeleton.n_dofs))), start, end)
 
 
@@ -267,7 +267,7 @@ def key_pose(
     time : float
         Seconds.
     only_changed : bool
-        Skip DOFs that the clip, clamped to their limits, already has at that time.
+        Skip DOFs whose value equals that of the clip, clamped to the limits, at that time.
     """
     targets, values = evaluate_all(clip, np.array([time]))
     now = np.zeros(skeleton.n_dofs)

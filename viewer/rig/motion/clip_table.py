@@ -66,7 +66,7 @@ def _values(table: _Table, times: Floats) -> Floats:
     at_first, at_last = table.values[:, 0], table.values[every, table.last]
     is_flat = last - first <= SHORTEST
     inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, last - first))
-    # The ends are returned unchanged: of several keys at one time, the outer one counts.
+    # End values are returned unchanged; of several keys at one time, the outermost counts.
     values = np.where(inside >= last, at_last, _hermite(table, inside))
     values = np.where((inside <= first) & (times < first), at_first, values) + shift
     return np.where(is_flat, at_last, values)
@@ -99,10 +99,10 @@ def _inside(
     every = np.arange(len(table.targets))
     inside = np.clip(times, first, last)
     shift = np.zeros(inside.shape)
-    # The remainder is exact for any distant time and any short period.
-    turns, rest = np.divmod(times - first, period)
+    # The remainder is exact even for distant times and short periods.
+    cycles, rest = np.divmod(times - first, period)
     folded = np.minimum(first + rest, last)
-    mirrored = np.where(turns % 2 != 0, first + last - folded, folded)
+    mirrored = np.where(cycles % 2 != 0, first + last - folded, folded)
     rise = table.values[every, table.last] - table.values[:, 0]
     ends = ((times < first, 0, first, table.edges[:, 0, 0]),
             (times > last, 1, last, table.edges[every, table.last, 1]))  # fmt: skip
@@ -112,7 +112,7 @@ def _inside(
             return outside & (table.modes[:, side] == _MODES[mode])
 
         shift = np.where(where("linear"), slope * (times - end), shift)
-        shift = np.where(where("cycle_offset"), turns * rise, shift)
+        shift = np.where(where("cycle_offset"), cycles * rise, shift)
         inside = np.where(where("cycle") | where("cycle_offset"), folded, inside)
         inside = np.where(where("bounce"), mirrored, inside)
     return inside, shift

@@ -57,7 +57,7 @@ class Frames:
     present : (F,) bool
         Rows where it is False are undefined in the other arrays.
     rotations : (F, J, 4)
-        Each joint's complete rotation within its parent: unit quaternions (x, y, z, w).
+        Each joint's complete rotation relative to its parent: unit quaternions (x, y, z, w).
     translations : (F, J, 3)
         Offsets from the joints' rest translations, DOFs included.
     shape_weights : (F, S) or (1, S)
@@ -272,10 +272,11 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     """
     skeleton = figure.require_skeleton()
     count = frames.n_frames
+    # Joints first, as forward_kinematics multiplies the matrices of all frames of a joint at once.
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
-    turns = quaternion_to_matrix(frames.rotations) * skeleton.rest_scales[:, None, :]
-    local[..., :3, :3] = np.swapaxes(turns, 0, 1)
+    linear = quaternion_to_matrix(frames.rotations) * skeleton.rest_scales[:, None, :]
+    local[..., :3, :3] = np.swapaxes(linear, 0, 1)
     offsets = rest_translations_of(figure, frames.shape_weights) + frames.translations
     local[..., :3, 3] = np.swapaxes(offsets, 0, 1)
     world = np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)

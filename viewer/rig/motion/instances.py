@@ -67,14 +67,14 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
             clip = None
         if isinstance(clip, Clip) and skeleton is not None:
             _pose_by_curves(clip, skeleton, poses, times)
-        elif isinstance(clip, SampledClip) and skeleton is not None and _takes_any(skeleton):
+        elif isinstance(clip, SampledClip) and skeleton is not None and _is_unrestricted(skeleton):
             _pose_by_frames(group, clip, skeleton, times, interpolate)
         else:
             for actor in group:
                 pose_actor(actor, time, interpolate)
 
 
-def _takes_any(skeleton: Skeleton) -> bool:
+def _is_unrestricted(skeleton: Skeleton) -> bool:
     """Return whether the DOFs of every joint can represent any rotation."""
     return bool((rotation_rows(skeleton) >= 0).all())
 
@@ -107,7 +107,7 @@ def _pose_by_frames(
 
 
 def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
-    """Return each joint's rotation within its parent, R(quaternion) R(DOFs).
+    """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs).
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
         Joint-to-figure matrices.
     """
     rotations = local_rotations(skeleton, poses) if rotations is None else rotations
-    # Joints come first: kinematics takes one matrix per joint or a row of them.
+    # The joint axis comes first, as forward_kinematics multiplies whole rows of matrices per joint.
     local = np.zeros((skeleton.n_joints, len(poses), 4, 4))
     local[..., 3, 3] = 1.0
     scales = np.stack([pose.scales for pose in poses])

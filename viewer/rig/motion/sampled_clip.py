@@ -26,7 +26,7 @@ class SampledClip:
     timing : Timing
         Frame rate, and the row of each frame.
     rotations : (N, J, 4)
-        Each joint's complete rotation within its parent: unit quaternions (x, y, z, w).
+        Each joint's complete rotation relative to its parent: unit quaternions (x, y, z, w).
     translations : (N, J, 3) or None
         Offsets from the joints' rest translations.
     figure_translations : (N, 3) or None

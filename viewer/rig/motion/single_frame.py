@@ -109,9 +109,9 @@ def pose_frames(
     Parameters
     ----------
     figure : Figure
-        With a skeleton or, as a whole, without.
+        With or without a skeleton.
     pose : Pose or None
-        Its pose; None keeps a figure without a skeleton in place.
+        Its pose; None for a figure without a skeleton.
     is_present : bool
         Whether the actor is present in the frame.
     time : float
@@ -119,16 +119,16 @@ def pose_frames(
     """
     skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
     place, scale = np.zeros((1, 3)), np.ones(1)
-    turned, moved = np.zeros((1, 0, 4)), np.zeros((1, 0, 3))
+    rotated, moved = np.zeros((1, 0, 4)), np.zeros((1, 0, 3))
     if pose is not None:
         weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing ones count as 0
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         if (pose.scales != skeleton.rest_scales).any():
-            # Frames have no joint scales; those of the skeleton apply.
+            # Frames cannot store joint scales, so the pose's become those of the skeleton.
             skeleton = replace(skeleton, rest_scales=pose.scales)
             figure = replace(figure, skeleton=skeleton)
         moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]
-        turned = matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
+        rotated = matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
     present, times = np.array([is_present]), np.array([time])
-    return figure, Frames(times, present, turned, moved, weights, place, scale)
+    return figure, Frames(times, present, rotated, moved, weights, place, scale)

@@ -15,9 +15,9 @@ SLOWEST, FASTEST = 1e-6, 1e6
 """Frames per second: outside these limits, times of long motions lose precision."""
 
 RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames a second"
-"""The same as text, for messages."""
+"""The limits as text, for messages."""
 
-_ON_FRAME = 1e-6  # of a frame: times closer than this to a frame count as that frame
+_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
 
 
 def is_rate(rate: float) -> bool:
@@ -100,6 +100,7 @@ class Timing:
             return nothing, nothing, np.zeros(len(times))
         place = (times - self.start) * self.frame_rate
         nearest = np.round(place)
+        # Snapping undoes rounding in time * rate: exactly on a frame, its stored data is returned.
         place = np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
         outside = (place < 0.0) | (place > self.n_frames - 1)
         place = np.clip(place, 0.0, self.n_frames - 1)
@@ -109,7 +110,8 @@ class Timing:
         if interpolate:
             return self._bridged(place)
         before, after = self.rows[frame], self.rows[following]
-        # A frame lasts until the next one is due; one after a gap does not start early.
+        # The frame before a gap is held until the gap begins; the one after it does not start
+        # early.
         fraction = np.where(after < 0, 0.0, fraction)
         after = np.where(after < 0, before, after)
         absent = (before < 0) | (outside & (not self.holds))

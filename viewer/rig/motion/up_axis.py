@@ -15,7 +15,7 @@ from viewer.rig.scene import Actor
 __all__ = ["CUSTOM", "guess_up"]
 
 CUSTOM = "z"
-"""Up axis if no body shows it: EasyMocap's usual calibration board lies on the floor."""
+"""Default up axis without evidence: EasyMocap's calibration board usually lies on the floor."""
 
 _ENOUGH = 64  # frames per person; more would not change the result
 _LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))

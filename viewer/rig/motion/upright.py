@@ -80,15 +80,15 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
     The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
     """
     skeleton = shaped(figure, pose.shape_weights).require_skeleton()
-    turned = pose.copy()
+    upright = pose.copy()
     roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)
     within = pose.figure_scale * local_matrices(skeleton, pose)[roots, :3, 3]
     wanted = (within + pose.figure_translation) * _OVER
-    turned.figure_translation = wanted[0] - within[0]
+    upright.figure_translation = wanted[0] - within[0]
     if pose.figure_scale:
-        shifts = (wanted - turned.figure_translation - within) / pose.figure_scale
-        turned.translations[roots] += shifts
+        shifts = (wanted - upright.figure_translation - within) / pose.figure_scale
+        upright.translations[roots] += shifts
     rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
     # The limits apply to the figure's own world, which is upside down.
-    set_joint_rotations(skeleton, turned, roots, rotations, clamp=False)
-    return turned
+    set_joint_rotations(skeleton, upright, roots, rotations, clamp=False)
+    return upright

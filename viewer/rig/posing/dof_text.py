@@ -11,7 +11,7 @@ from viewer.rig.skeleton import Skeleton, dof_label
 __all__ = ["beyond_text", "dof_value_text"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
-_MOST_DIGITS = 9  # decimals: float64 radians differ by no less
+_MOST_DIGITS = 9  # decimals; more would show rounding errors of float64
 
 
 def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:

@@ -25,11 +25,11 @@ from viewer.rig.skeleton import Skeleton, joint_label
 __all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
-_CLOSE = 1e-7  # of the chain's length: a smaller error counts as none
-_STILL = 1e-10  # radians: a smaller step changes nothing
-_LARGEST_STEP = 0.5  # radians: beyond it the linearisation is poor
-_BEND = 0.02  # radians by which a stretched chain is bent to get it off a singular pose
-_LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # of the chain's length
+_CLOSE = 1e-7  # fraction of the chain's length; a smaller error counts as 0
+_STILL = 1e-10  # radians; smaller steps end the search
+_LARGEST_STEP = 0.5  # radians; beyond it the linearisation is poor
+_BEND = 0.02  # radians; bends a straight chain out of a singular pose
+_LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # relative to the chain's length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +68,8 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
     (N,) int32
         N <= length, the nearest first.
     """
-    turns = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
-    able = set(skeleton.dof_joints[turns].tolist())
+    rotates = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
+    able = set(skeleton.dof_joints[rotates].tolist())
     chain: list[int] = []
     above = int(skeleton.parents[joint])
     while above >= 0 and len(chain) < length:
@@ -177,8 +177,8 @@ def reach(
     chain = chain_above(skeleton, joint, length)
     if not len(chain):
         raise RigError(f"no joint above {joint_label(skeleton, joint)} can rotate")
-    turns = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
-    rows = np.flatnonzero(turns & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
+    rotates = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
+    rows = np.flatnonzero(rotates & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
     return _Solver(skeleton, pose.copy(), joint, np.asarray(target, float), rows).solve(rounds)
 
 
@@ -242,6 +242,7 @@ class _Solver:
         free: Bools = np.ones(len(start), dtype=bool)
         damp = (self.damping * self.size) ** 2 * np.eye(3)
         for _ in range(len(start)):
+            # DOFs stopped at a limit move by a known amount; the free ones solve for the rest.
             part = jacobian[:, free]
             left = error - jacobian[:, ~free] @ step[~free]
             step[free] = part.T @ np.linalg.solve(part @ part.T + damp, left)

@@ -1,6 +1,6 @@
 """Fit of a joint's DOFs to a given rotation, within their limits.
 
-A joint's rotation within its parent is R(quaternion) E_n ... E_1, each E about a coordinate axis.
+A joint's rotation relative to its parent is R(quaternion) E_n ... E_1, each E about one axis.
 Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan angles); the
 one within the limits that is closer to the present values is taken. Otherwise each DOF is set in
 turn to its optimum with the others fixed, repeatedly: with M the product of the factors around E_k
@@ -25,8 +25,8 @@ __all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _SWEEPS = 200
-_STILL = 1e-10  # radians: a sweep with smaller changes is the last
-_ROUNDING = 1e-9  # radians: a value this far beyond its limit counts as on it
+_STILL = 1e-10  # radians; a sweep with smaller changes is the last
+_ROUNDING = 1e-9  # radians; a value this far beyond its limit counts as within it
 _TURN = 2.0 * math.pi
 
 
@@ -91,7 +91,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     joint : int
         The joint to rotate.
     rotation : (3, 3)
-        Wanted within its parent: R(quaternion) R(DOFs) of ``joint_rotations``.
+        Target rotation relative to its parent: R(quaternion) R(DOFs) of ``joint_rotations``.
 
     Returns
     -------
@@ -138,6 +138,8 @@ class _Solver:
 
     def error(self, values: Floats) -> float:
         """Return the angle between the rotation of some values and the goal, from 0 to pi."""
+        # R - R^T has the sine of the angle, the trace its cosine; atan2 of both is accurate at 0
+        # and pi.
         left = self.wanted.T @ self._product(values, range(len(values)))
         sine = np.linalg.norm([left[2, 1] - left[1, 2], left[0, 2] - left[2, 0],
                                left[1, 0] - left[0, 1]])  # fmt: skip
@@ -164,8 +166,9 @@ class _Solver:
         """Add multiples of 2 pi: nearest to the present values, or within limits if possible."""
         near = values - _TURN * np.round((values - self.present) / _TURN)
         inside = near - _TURN * np.round((near - np.clip(near, self.low, self.high)) / _TURN)
-        for turns in (-_TURN, _TURN):
-            moved = near + turns
+        # A range that crosses -pi or pi may contain the value one full rotation away.
+        for shift in (-_TURN, _TURN):
+            moved = near + shift
             inside = np.where((moved >= self.low) & (moved <= self.high), moved, inside)
         is_inside = (near >= self.low - _ROUNDING) & (near <= self.high + _ROUNDING)
         return np.where(is_inside, near, inside)
@@ -193,6 +196,7 @@ class _Solver:
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
         if math.hypot(cosine, sine) < 1e-12:
             return now  # all angles are equally good
+        # c cos t + s sin t is largest at t = atan2(s, c), and decreases on both sides of it.
         top = math.atan2(sine, cosine)
         top -= _TURN * round((top - now) / _TURN)
         low, high = float(self.low[place]), float(self.high[place])

@@ -288,7 +288,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     if names is None:
         values = {"expected": own, "figure": figure.name, "found": len(vector)}
         raise RigError(Diagnostic("F002.pose-vector", values=values))
-    # Joints that the vector's model lacks go to rest.
+    # Joints that the vector's model lacks return to rest.
     joints = np.arange(skeleton.n_joints, dtype=np.int32)
     wanted = np.zeros((skeleton.n_joints, 3))
     rows = vector.reshape(-1, 3)
@@ -364,7 +364,7 @@ def _apply_hand(
     assert skeleton is not None
     side = _HAND_PARTS[name]
     if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
-        hand = figure.hands[0]  # MANO is a single hand, whichever its side
+        hand = figure.hands[0]  # MANO models one hand, left or right
     first = f"{side}_index1" if side else "index1"
     if hand is None and len(values) == 45 and first in skeleton.names:
         start = skeleton.names.index(first)

@@ -1,4 +1,4 @@
-"""Conversion between a pose and a model's own pose vector, by a table of joint positions in it."""
+"""Conversion between poses and a model's own pose vectors, by the offset of each joint."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ def rotation_rows(skeleton: Skeleton) -> Ints:
         -1 for all three of a joint that does not have exactly these three rotations.
     """
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
-    turns = np.flatnonzero(skeleton.dof_kinds >= 3)
-    counts = np.bincount(skeleton.dof_joints[turns], minlength=skeleton.n_joints)
-    rows[skeleton.dof_joints[turns], skeleton.dof_kinds[turns] - 3] = turns
+    rotations = np.flatnonzero(skeleton.dof_kinds >= 3)
+    counts = np.bincount(skeleton.dof_joints[rotations], minlength=skeleton.n_joints)
+    rows[skeleton.dof_joints[rotations], skeleton.dof_kinds[rotations] - 3] = rotations
     is_ball = (counts == 3) & (rows >= 0).all(axis=1) & (np.diff(rows, axis=1) > 0).all(axis=1)
     rows[~is_ball] = -1
     return rows
@@ -82,10 +82,10 @@ def rotation_rows(skeleton: Skeleton) -> Ints:
 def set_joint_rotations(
     skeleton: Skeleton, pose: Pose, joints: Ints, rotations: Floats, clamp: bool = True
 ) -> None:
-    """Set the rotations of joints within their parents, in place.
+    """Set the rotations of joints relative to their parents, in place.
 
-    A ball joint's DOFs take the rotation as angles about x, y, z; other joints keep their DOFs
-    as close to 0 as the limits allow and take the rest as a quaternion.
+    A ball joint's DOFs take the rotation as angles about x, y, z; other joints keep their DOFs as
+    close to 0 as the limits allow and store the remaining rotation as a quaternion.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def set_joint_rotations(
     joints : (N,)
         Joints to rotate.
     rotations : (N, 3, 3)
-        Rotation of each within its parent.
+        Rotation of each relative to its parent.
     clamp : bool
         Whether DOFs are clamped to their limits.
     """
@@ -112,7 +112,7 @@ def set_joint_rotations(
     if clamp:
         pose.dofs[:] = clamp_dofs(skeleton, pose.dofs)
     if len(others):
-        # Limits may keep DOFs away from 0: the quaternion takes the rest.
+        # If limits keep the DOFs away from 0, the quaternion compensates for them.
         pose.rotations[others] = 0.0, 0.0, 0.0, 1.0
         held = joint_rotations(skeleton, pose)[others]
         left = rotations[~is_ball] @ np.swapaxes(held, -1, -2)
@@ -127,7 +127,7 @@ def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
     layout : PoseLayout
         Specifies which joints use Euler angles.
     rotations : (J, 3, 3)
-        Of each joint within its parent.
+        Of each joint relative to its parent.
 
     Returns
     -------

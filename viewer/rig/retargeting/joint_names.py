@@ -37,7 +37,8 @@ _WORDS = {
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
 _AMBIGUOUS = {"foot", "shoulder", "hand"}  # different joints in different conventions
-_PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}  # before a side or a word
+# Removed in front of a side or a word.
+_PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
 _SIDED = {"hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist", "hand", "eye"}
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
@@ -50,8 +51,8 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # of the joints: a first word that more of them have carries no information
-_MOST = 2000  # joints: a skeleton with more is not a body
+_SHARED = 0.6  # fraction of the joints; a first word that more of them share is a prefix
+_MOST = 2000  # joints; a skeleton with more is not a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")

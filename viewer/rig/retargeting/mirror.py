@@ -15,7 +15,8 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose"]
 
-_NEAR = 0.02  # of the figure's size: maximum distance of a joint from its partner's mirror image
+# Maximum distance of a joint from its partner's mirror image, as a fraction of the figure's size.
+_NEAR = 0.02
 
 
 def mirror_axis(figure: Figure) -> int:
@@ -113,8 +114,9 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     zero = rest_pose(skeleton)
     zero.dofs[:] = 0.0
     rest = _world_rotations(skeleton.parents, joint_rotations(skeleton, zero))
-    turned = _world_rotations(skeleton.parents, joint_rotations(skeleton, pose))
-    deltas = turned @ np.swapaxes(rest, 1, 2)
+    posed = _world_rotations(skeleton.parents, joint_rotations(skeleton, pose))
+    # F D F with F = diag(flip) is a proper rotation again: the two reflections cancel out.
+    deltas = posed @ np.swapaxes(rest, 1, 2)
     wanted = (flip[:, None] * deltas[partners] * flip) @ rest
     local = wanted.copy()
     below = np.flatnonzero(skeleton.parents >= 0)

@@ -21,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError, printable
+from viewer.errors import RigError
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -39,7 +40,7 @@ __all__ = [
     "rotate_joints",
 ]
 
-_INEXACT = 1e-4  # radians: a rotation with a smaller error counts as reached
+_INEXACT = 1e-4  # radians; a rotation with a smaller error counts as reached
 _REST_DIGITS = 5  # decimals to which equal rest rotations agree
 
 
@@ -85,13 +86,13 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
         Of that figure.
     """
     skeleton = figure.require_skeleton()
-    turns = _figure_rotations(skeleton, pose) @ np.swapaxes(
+    relative = _figure_rotations(skeleton, pose) @ np.swapaxes(
         _figure_rotations(skeleton, _with_zero_dofs(skeleton)), 1, 2
     )
     return JointRotations(
         figure.name,
         skeleton.names,
-        matrix_to_quaternion(turns),
+        matrix_to_quaternion(relative),
         pose.translations.copy(),
         figure.up,
         dof_layout(figure),
@@ -100,7 +101,7 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
 
 
 def dof_layout(figure: Figure) -> str:
-    """Return a digest that two figures share if and only if poses' DOFs mean the same to both.
+    """Return a digest of the meaning of a figure's DOFs: equal digests allow exchanging DOF values.
 
     Blend shapes are ignored: their number does not change any joint's rotation.
 
@@ -138,7 +139,7 @@ def has_layout_of(source: JointRotations, figure: Figure) -> bool:
 
 
 def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
-    """Restore the source's base rotations and translations, those beneath the DOFs, in place.
+    """Restore the base rotations and translations, to which the DOFs are added, in place.
 
     They differ from the rest pose where a motion rotates a joint about axes that its DOFs lack.
     The stored world rotations are ignored: they are out of date once the DOFs are edited.

@@ -19,10 +19,13 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["RestPose", "alignment", "is_same_rest", "rest_of"]
 
-_SAME = np.cos(np.radians(20.0))  # bones within this angle belong to the same rest pose
-_NATURAL = np.cos(np.radians(25.0))  # of a torso or foot: within this angle its own bend is kept
-_UPRIGHT = np.cos(np.radians(25.0))  # of a body from the up axis: within it, it stands upright
-_SHORT = 1e-6  # of the skeleton's size: shorter bones have no direction
+# Cosine of the maximum angle between the bones of equal rest poses.
+_SAME = np.cos(np.radians(20.0))
+# Cosine of the maximum difference at which a torso or foot keeps its own bend.
+_NATURAL = np.cos(np.radians(25.0))
+# Cosine of the maximum angle of an upright body from the up axis.
+_UPRIGHT = np.cos(np.radians(25.0))
+_SHORT = 1e-6  # fraction of the skeleton's size; shorter bones have no reliable direction
 _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
 _SPINE = ("spine", "neck", "head")
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
@@ -156,6 +159,7 @@ def _at_joint(
         # Least squares over all directions (Kabsch); the reference decides what they leave open.
         sums = np.einsum("ka,kb->ab", theirs, mine) + _SHORT * reference
         return nearest_rotations(sums)[0]
+    # Fingers start from the hand's rotation; limbs from the body's, so that twist does not add up.
     start = reference if part.startswith(_FINGERS) else stands
     return _arc(start @ mine[0], theirs[0]) @ start
 
@@ -238,6 +242,7 @@ def _frame(side: Floats, main: Floats) -> Floats | None:
     length = np.linalg.norm(across)
     if not length > _SHORT * np.linalg.norm(side) * np.linalg.norm(main):
         return None
+    # Gram-Schmidt that keeps the main axis and adjusts the side.
     third, second = across / length, main / np.linalg.norm(main)
     return np.stack([np.cross(second, third), second, third], axis=1)
 

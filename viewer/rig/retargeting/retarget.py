@@ -31,8 +31,8 @@ from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["retarget", "scaled_motion"]
 
-_ROUNDING = 1e-9  # a scale this close to 1 counts as 1
-_STILL = 1e-6  # of the skeleton's size: position channels that move less are ignored
+_ROUNDING = 1e-9  # a ratio this close to 1 counts as 1
+_STILL = 1e-6  # fraction of the skeleton's size; position channels that move less are ignored
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _ARMS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -194,7 +194,7 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
 
 
 def _scale(job: _Job) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and what was measured."""
+    """Return the ratio of the target's lengths to the source's, and what was compared."""
     partners, names = job.matches.partners, job.matches.names
     source, target = job.rests
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
@@ -244,17 +244,18 @@ def _shifts(
             wanted = scale * places[:, job.matches.partners[root]] @ job.to_target.T
             shifts[:, root] = wanted - job.target.rest_translations[root]
         return shifts, []
+    # Only the root translates, by what the joints between root and anchor do not contribute.
     anchor = _anchor(job)
     path = _path(job.target.parents, anchor)
     linear = np.eye(3)
     reached = np.zeros((len(worlds), 3))
     for joint in path:
         reached = reached + linear @ job.target.rest_translations[joint]
-        turned = quaternion_to_matrix(rotations[:, joint])
-        linear = linear @ turned * job.target.rest_scales[joint]
+        rotation = quaternion_to_matrix(rotations[:, joint])
+        linear = linear @ rotation * job.target.rest_scales[joint]
     wanted = scale * places[:, job.matches.partners[anchor]] @ job.to_target.T
     shifts[:, path[0]] = wanted - reached
-    return shifts, _lost(job)
+    return shifts, _dropped_translations(job)
 
 
 def _source_places(job: _Job, worlds: Floats) -> Floats:
@@ -265,8 +266,8 @@ def _source_places(job: _Job, worlds: Floats) -> Floats:
         places += clip.translations
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
-            turns = quaternion_to_matrix(worlds[:, parent])
-            places[:, joint] = np.einsum("nab,nb->na", turns, places[:, joint])
+            parent_rotations = quaternion_to_matrix(worlds[:, parent])
+            places[:, joint] = np.einsum("nab,nb->na", parent_rotations, places[:, joint])
             places[:, joint] += places[:, parent]
     if clip.figure_scales is not None:
         places *= clip.figure_scales[:, None, None]
@@ -289,7 +290,7 @@ def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:
             shifts[:, joint] = scale * moves @ axes.T
 
 
-def _lost(job: _Job) -> list[Diagnostic]:
+def _dropped_translations(job: _Job) -> list[Diagnostic]:
     """Return messages about source joints whose translations the target does not take."""
     moves = job.clip.translations
     if moves is None:

@@ -47,7 +47,7 @@ __all__ = [
     "telling_quantity",
 ]
 
-_NOISE = 1e-9  # of the figure's size for lengths, else of 1
+_NOISE = 1e-9  # relative to the figure's size for lengths, else absolute
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +70,12 @@ class Quantity:
     moves : bool
         Whether the values depend on the pose.
     about : str
-        ``"joint"`` or ``"field"`` if the quantity belongs to one, which its name may give; else
+        ``"joint"`` or ``"field"`` if the quantity refers to one, which its name may specify; else
         empty.
     isolines : bool
         Whether isolines are drawn by default.
     least : float
-        Lower bound of the automatic range's maximum.
+        Minimum of the automatic range's upper end.
     robust : bool
         Whether the automatic range excludes the largest hundredth of the non-zero values, so that
         one degenerate triangle does not use up the whole colour map.
@@ -215,7 +215,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
         Asked(figure, pose, skinning, index, about)
     )
     if quantity.moves:
-        # Without this, rounding would span the colour map where there is no effect at all.
+        # Without this, rounding errors would span the whole colour map if the pose has no effect.
         size = box_size(bounding_box(mesh.positions)) if quantity.unit == "length" else 1.0
         values[np.abs(values) < _NOISE * size] = 0.0
     return values
@@ -236,7 +236,7 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
 
 
 def menu_title(key: str, skinning: Skinning) -> str:
-    """Return the label of a quantity in menus, with its number of influences if it depends on it.
+    """Return the label of a quantity in menus, with the number of influences it depends on, if any.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def missing_part(name: str, figure: Figure) -> str:
 
 
 def _missing(needs: str, figure: Figure) -> str:
-    """Return the part of that name if a figure lacks it, else an empty text."""
+    """Return the name of a part if a figure lacks it, else an empty string."""
     has = {
         "weights": figure.skin is not None,
         "a skin": figure.is_attached,

@@ -12,5 +12,5 @@ __all__ = ["parts"]
 
 def parts(asked: Asked) -> Floats:
     """Return the body part of each vertex: (V,), integral indices into the parts' names."""
-    assert asked.figure.body_parts is not None  # the quantity needs them
+    assert asked.figure.body_parts is not None  # required by the quantity
     return asked.figure.body_parts.of_vertex.astype(np.float64)

@@ -20,7 +20,7 @@ from viewer.rig.skinning import deform
 
 __all__ = ["area", "stretch", "stretch_mean"]
 
-_NO_LENGTH = 1e-9  # of the figure's size: shorter edges have no ratio
+_NO_LENGTH = 1e-9  # fraction of the figure's size; shorter edges have no meaningful ratio
 _PERCENT = 100.0
 
 _edges: Memo[Figure, Ints] = Memo()
@@ -85,7 +85,7 @@ def _edge_changes(asked: Asked) -> tuple[Ints, Floats]:
 
 def _rest_and_posed(asked: Asked) -> tuple[Floats, Floats]:
     """Return the vertices in binding space, and as posed in a figure of scale 1."""
-    assert asked.pose is not None  # the quantity depends on it
+    assert asked.pose is not None  # required by the quantity
     rest = shaped(asked.figure, asked.pose.shape_weights).require_mesh()
     pose = replace(asked.pose, figure_scale=1.0)
     return rest.positions, deform(asked.figure, pose, asked.skinning)[0]

@@ -19,7 +19,7 @@ from viewer.rig.skin import (
 
 __all__ = ["dominant", "entropy", "influences", "sums", "weight"]
 
-_ROUNDING = 1e-14  # of sums of weights near 1, a few units in the last place
+_ROUNDING = 1e-14  # rounding error of sums of weights near 1, a few units in the last place
 
 
 def weight(asked: Asked) -> Floats:
@@ -70,4 +70,4 @@ def entropy(asked: Asked) -> Floats:
     counts = sizes > 0.0
     fractions = sizes[counts] / totals[vertices[counts]]
     found = np.bincount(vertices[counts], -fractions * np.log2(fractions), skin.n_vertices)
-    return np.maximum(found, 0.0)  # 0, not -0
+    return np.maximum(found, 0.0)  # turns -0 into 0

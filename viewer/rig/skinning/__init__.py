@@ -1,4 +1,4 @@
-"""Skinning methods: how joint matrices move vertices. One module and one GLSL chunk each."""
+"""Skinning methods, each with a module here and a GLSL chunk."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ class Method:
     uses_quaternions : bool
         Whether it blends dual quaternions: its shader reads ``u_rigid``.
     ends : tuple of str
-        The two methods between which ``Skinning.blend_factor`` interpolates; empty for methods of
-        their own.
+        The two methods between which ``Skinning.blend_factor`` interpolates; empty for independent
+        methods.
     result : str
-        Label of the result in the explanation of a vertex; empty if the last sum already is the
+        Label of the result in the explanation of a vertex; empty if the last sum is already the
         result. ``{blend_factor}`` is replaced by the number.
     """
 
@@ -253,7 +253,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
         Joint space to figure space.
     """
     skeleton = shaped(figure, pose.shape_weights).skeleton
-    assert skeleton is not None  # shaping keeps it
+    assert skeleton is not None  # shaping preserves it
     return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
 

@@ -15,8 +15,10 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.skin import Skin, has_influence
 
-_VERTICES = 512  # per block: smaller blocks cost calls, larger ones zeros (bench_deform)
-_MOST = 1 << 24  # cached weights, 128 MB; only a file in random vertex order needs more
+# Vertices per block: smaller blocks need more calls, larger ones contain more zeros (bench_deform).
+_VERTICES = 512
+# Weights cached per skin, 128 MB; only files with a random vertex order need more.
+_MOST = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)

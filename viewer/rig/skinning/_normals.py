@@ -6,7 +6,8 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-_FLAT = 1e-5  # smaller determinants of matrices scaled to entries up to 1 have an unreliable sign
+# Smaller determinants, of matrices scaled to entries up to 1, have an unreliable sign.
+_FLAT = 1e-5
 
 
 def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:

@@ -23,9 +23,9 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["deform", "linear_maps", "split_palette"]
 
-_CHUNK = 1 << 16  # vertices at a time, which bounds the memory for large meshes
-_RIGID = 1e-12  # a stretch closer to the identity is rounding
-_TINY = 1e-12  # influences that cancel each other define no rotation
+_CHUNK = 1 << 16  # vertices per chunk, which bounds the memory for large meshes
+_RIGID = 1e-12  # a stretch this close to the identity is rounding error
+_TINY = 1e-12  # a shorter blended quaternion defines no rotation
 
 
 def deform(
@@ -33,7 +33,7 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Stretch linearly, then move by the normalised weighted sum of unit dual quaternions.
 
-    The method requires weights relative to their sum. Quaternions are negated where necessary to
+    Weights are divided by their sum. Quaternions are negated where necessary to
     lie in the hemisphere of the strongest influence (eq. 14 and its text: antipodality). Normals
     are transformed by the inverse transpose of the blended stretch, then by the blended rotation.
 

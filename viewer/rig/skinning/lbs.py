@@ -15,7 +15,7 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["blended_matrices", "deform", "move"]
 
-_CHUNK = 1 << 14  # matrices at a time: they fit the processor's cache and bound the memory
+_CHUNK = 1 << 14  # matrices per chunk, which fit the processor's cache and bound the memory
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 
@@ -46,7 +46,7 @@ def deform(
         Unit length.
     """
     moved, rotated = move(positions, skin, palette, normals)
-    assert rotated is not None  # normals were given
+    assert rotated is not None  # as normals were passed in
     return moved, unit(rotated)
 
 

@@ -1,0 +1,70 @@
+"""Changes that the history notices, and what undo brings back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import viewer
+from viewer.app.core.history import History
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.motion.clip import Clip
+
+ARRAYS = (
+    "dofs",
+    "translations",
+    "rotations",
+    "scales",
+    "shape_weights",
+    "figure_translation",
+)
+
+
+@pytest.fixture
+def watched():
+    """A history, its scene of one figure with shape weights, and the display."""
+    scene, options, history = viewer.load(), DisplayOptions(), History()
+    scene.actors[0].pose.shape_weights = np.zeros(2)
+    history.start(scene, options)
+    return history, scene, options
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_an_edited_array_element_is_a_step(watched, name):
+    history, scene, options = watched
+    array = getattr(scene.actors[0].pose, name)
+    old = array.copy()
+    # The smallest change there is.
+    array.flat[-1] = np.nextafter(array.flat[-1], 9.0)
+    new = array.copy()
+    assert history.observe(scene, options, busy=False)
+    assert not history.observe(scene, options, busy=False)
+    history.undo(scene, options, lambda time: None)
+    np.testing.assert_array_equal(getattr(scene.actors[0].pose, name), old)
+    history.redo(scene, options, lambda time: None)
+    np.testing.assert_array_equal(getattr(scene.actors[0].pose, name), new)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("offset", 0.5), ("visible", False), ("color", (1.0, 0.0, 0.0)), ("clip", None)],
+)
+def test_an_edited_setting_of_an_actor_is_a_step(watched, name, value):
+    history, scene, options = watched
+    scene.actors[0].clip = Clip("c", (), 0.0, 1.0) if name == "clip" else None
+    history.start(scene, options)
+    setattr(scene.actors[0], name, value)
+    assert history.observe(scene, options, busy=False)
+
+
+def test_an_edited_placement_is_a_step(watched):
+    history, scene, options = watched
+    scene.actors[0].placement[0, 3] = np.nextafter(0.0, 1.0)
+    assert history.observe(scene, options, busy=False)
+
+
+def test_poses_set_by_the_clock_are_no_step(watched):
+    history, scene, options = watched
+    scene.actors[0].pose.dofs[0] += 0.25
+    history.follow(1.0)
+    assert not history.observe(scene, options, busy=False)

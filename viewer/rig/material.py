@@ -1,0 +1,189 @@
+"""Materials: the surface appearance of triangles, in the metallic-roughness model of glTF 2.0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Bytes, Floats, frozen
+
+__all__ = ["ALPHA_MODES", "TEXTURES", "WRAPS", "Material", "Texture"]
+
+ALPHA_MODES = ("opaque", "mask", "blend")
+"""Alpha ignored; below the cutoff cut out; mixed with what is behind."""
+
+WRAPS = ("clamp", "repeat", "mirror")
+"""Texture coordinates outside 0 to 1: the edge, the picture again, or mirrored every other time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Texture:
+    """A picture, and how it is placed and sampled.
+
+    Attributes
+    ----------
+    name : str
+        File name of the picture, relative to the figure's folder.
+    image : (H, W, 4) uint8 or None
+        Pixels with alpha, first row at v = 1; sRGB in textures of colours, linear in others;
+        None if it could not be read.
+    channel : int
+        Column of ``image`` that textures of one number are read from.
+    uv_set : int
+        0 for ``Mesh.uvs``, 1 for ``Mesh.second_uvs``.
+    transform : (2, 3)
+        From texture coordinates to those of the picture, v = 0 at its bottom row.
+    wrap : (str, str)
+        Entry of ``WRAPS`` along u and v.
+    is_smooth : bool
+        Whether pixels are interpolated.
+    """
+
+    name: str
+    image: Bytes | None = None
+    channel: int = 0
+    uv_set: int = 0
+    transform: Floats | None = None
+    wrap: tuple[str, str] = ("clamp", "clamp")
+    is_smooth: bool = True
+
+    def __post_init__(self) -> None:
+        def put(name: str, values: object) -> None:
+            object.__setattr__(self, name, values)
+
+        if self.image is not None:
+            put("image", frozen("image", self.image, (None, None, 4), np.uint8))
+        placed = np.eye(2, 3) if self.transform is None else self.transform
+        put("transform", frozen("transform", placed, (2, 3)))
+        _check_choice("channel", self.channel, range(4))
+        _check_choice("uv_set", self.uv_set, range(2))
+        for side in self.wrap:
+            _check_choice("wrap", side, WRAPS)
+
+    @property
+    def matrix(self) -> Floats:
+        """``transform``, never None: (2, 3)."""
+        assert self.transform is not None  # set by __post_init__
+        return self.transform
+
+    @property
+    def is_placed_plainly(self) -> bool:
+        """Whether the picture covers texture coordinates from 0 to 1."""
+        return np.array_equal(self.matrix, np.eye(2, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """The surface appearance of some triangles.
+
+    Factors multiply their textures, as in glTF 2.0, section 3.9.
+
+    Attributes
+    ----------
+    name : str
+        As in the file; triangles refer to materials by index.
+    base_texture : Texture or None
+        Colour and opacity, sRGB.
+    base_color : (r, g, b, a) or None
+        Linear, 0 to 1; None for a material without a colour of its own: white under a texture,
+        else the figure's.
+    metallic, roughness : float
+        0 to 1; roughness is perceptual, the square root of the GGX width.
+    metallic_texture, roughness_texture : Texture or None
+        One number each, often two channels of one picture.
+    normal_texture : Texture or None
+        Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1.
+    normal_scale : float
+        Factor on their red and green parts.
+    occlusion_texture : Texture or None
+        Fraction of the surrounding light that arrives: one number.
+    occlusion_strength : float
+        0 to 1.
+    emissive : (r, g, b)
+        Light that the surface gives off, linear, may exceed 1.
+    emissive_texture : Texture or None
+        Its colour, sRGB.
+    alpha_mode : str
+        Entry of ``ALPHA_MODES``.
+    alpha_cutoff : float
+        Least opacity that is drawn with the mode ``"mask"``.
+    double_sided : bool
+        Whether back faces are drawn: the counter-clockwise side is the front.
+    unlit : bool
+        Whether the base colour is shown as it is.
+    is_physical : bool
+        Whether the file describes the surface by metallic and roughness, or as unlit.
+    """
+
+    name: str = ""
+    base_texture: Texture | None = None
+    base_color: tuple[float, float, float, float] | None = None
+    metallic: float = 0.0
+    roughness: float = 0.6
+    metallic_texture: Texture | None = None
+    roughness_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    normal_scale: float = 1.0
+    occlusion_texture: Texture | None = None
+    occlusion_strength: float = 1.0
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emissive_texture: Texture | None = None
+    alpha_mode: str = "opaque"
+    alpha_cutoff: float = 0.5
+    double_sided: bool = True
+    unlit: bool = False
+    is_physical: bool = False
+
+    def __post_init__(self) -> None:
+        _check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)
+        for name in ("metallic", "roughness", "occlusion_strength"):
+            _check_numbers(name, (getattr(self, name),), 1.0)
+        _check_numbers("alpha_cutoff", (self.alpha_cutoff,))
+        _check_numbers("emissive", self.emissive, count=3)
+        if self.base_color is not None:
+            _check_numbers("base_color", self.base_color, 1.0, count=4)
+        if not np.isfinite(self.normal_scale):
+            raise RigError(f"normal_scale: expected a finite number, found {self.normal_scale}")
+
+    @property
+    def textures(self) -> dict[str, Texture]:
+        """Textures of the material, by the name of their field."""
+        named = {name: getattr(self, name) for name in TEXTURES}
+        return {name: texture for name, texture in named.items() if texture is not None}
+
+    @property
+    def texture(self) -> str | None:
+        """File name of the base colour's picture, if there is one."""
+        return None if self.base_texture is None else self.base_texture.name
+
+    @property
+    def image(self) -> Bytes | None:
+        """Pixels of the base colour, if there are any."""
+        return None if self.base_texture is None else self.base_texture.image
+
+
+TEXTURES = (
+    *("base_texture", "metallic_texture", "roughness_texture"),
+    *("normal_texture", "occlusion_texture", "emissive_texture"),
+)
+"""Fields of a material that hold textures."""
+
+
+def _check_choice(name: str, value: object, choices: range | tuple[str, ...]) -> None:
+    """Raise RigError unless a value is one of the choices."""
+    if value not in choices:
+        raise RigError(f"{name}: expected one of {', '.join(map(str, choices))}, found {value}")
+
+
+def _check_numbers(
+    name: str, values: tuple[float, ...], most: float = float("inf"), count: int = 1
+) -> None:
+    """Raise RigError unless ``count`` numbers are finite, at least 0, and at most ``most``."""
+    if len(values) != count:
+        raise RigError(f"{name}: expected {count} numbers, found {len(values)}")
+    for value in values:
+        if not (0.0 <= value <= most and np.isfinite(value)):
+            limits = "at least 0" if most == float("inf") else f"0 to {most:g}"
+            raise RigError(f"{name}: expected {limits}, found {value}")
