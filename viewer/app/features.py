@@ -14,7 +14,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 
-__all__ = ["KEYS", "MOUSE", "PANELS", "Panel", "Shortcut", "panel_module"]
+__all__ = ["KEYS", "MOUSE", "PANELS", "Panel", "Shortcut", "key_of", "panel_module"]
 
 _CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
 _K = imgui.Key
@@ -121,9 +121,18 @@ KEYS = (
     Shortcut((_SHIFT | _K.j,), "Shift+J", "joint axes", _OPTION, ("joint_axes", "Joint axes")),
     Shortcut((_K.v,), "V", "weights of the selected joint", "weights.actions.toggle_weights"),
     Shortcut((_K.f,), "F", "fit the view", "view.camera_actions.fit_view"),
+    Shortcut(
+        (_K.period, _K.keypad_decimal),
+        ".",
+        "fit the selected joint or actor",
+        "view.camera_actions.fit_selection",
+    ),
     Shortcut((_K._1, _K.keypad1), "1", "front view", _LOOK, ("front",)),
     Shortcut((_K._3, _K.keypad3), "3", "side view", _LOOK, ("left",)),
     Shortcut((_K._7, _K.keypad7), "7", "top view", _LOOK, ("top",)),
+    Shortcut((_CTRL | _K._1, _CTRL | _K.keypad1), "Ctrl+1", "back view", _LOOK, ("back",)),
+    Shortcut((_CTRL | _K._3, _CTRL | _K.keypad3), "Ctrl+3", "other side", _LOOK, ("right",)),
+    Shortcut((_CTRL | _K._7, _CTRL | _K.keypad7), "Ctrl+7", "view from below", _LOOK, ("bottom",)),
     Shortcut(
         (_K._5, _K.keypad5),
         "5",
@@ -174,9 +183,16 @@ MOUSE = (
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),
     ("Alt drag of the time line", "go between whole frames"),
+    ("Axis gizmo", "a click looks along an axis, a drag orbits"),
     ("Drop files", "open them"),
 )
 """Actions of the mouse, listed with the keys."""
+
+
+def key_of(action: str, *arguments: object) -> str:
+    """Return the name of the key that runs an action; empty if none does."""
+    found = (key.label for key in KEYS if (key.action, key.arguments) == (action, arguments))
+    return next(found, "")
 
 
 def panel_module(name: str) -> ModuleType:

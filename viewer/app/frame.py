@@ -32,6 +32,8 @@ from viewer.app.posing.shape_guard import drop_unreadable_shapes
 from viewer.app.recording.record_dialog import draw_record_dialog
 from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
+from viewer.app.view.axis_gizmo import draw_axis_gizmo
+from viewer.app.view.flight import advance_flight
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
@@ -113,6 +115,7 @@ class Frame:
         files.wants_open = []
         handle_keys(state)
         handle_mouse(state)
+        advance_flight(state, imgui.get_io().delta_time)
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
@@ -200,6 +203,7 @@ class Frame:
             draw_rig_tools(state)
             if state.panels_visible:
                 draw_hints(state)
+                draw_axis_gizmo(state)
 
     def _draw_target(self, size: tuple[int, int]) -> None:
         """Draw the scene; if the driver fails, show a message and keep the window open."""

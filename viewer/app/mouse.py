@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import choose_joint, use_handles
 from viewer.app.rigging.tools import holds_mouse
+from viewer.app.view.axis_gizmo import holds_gizmo
 from viewer.app.view.state import Picking
 from viewer.app.weights.state import Weights, wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
@@ -37,7 +38,7 @@ def handle_mouse(state: AppState) -> None:
     picking = state.of(Picking)
     io = imgui.get_io()
     x, y, width, height = state.view_rect
-    if use_handles(state) or holds_mouse(state):
+    if use_handles(state) or holds_mouse(state) or holds_gizmo(state):
         return
     if io.want_capture_mouse or width < 1 or height < 1:
         return

@@ -30,6 +30,7 @@ from viewer.app.files.recent import (  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
+from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
@@ -225,7 +226,7 @@ class _Window:
         self._is_dirty = False
         state = self.state
         # What a thread does is looked at now and then: frames would take its time away.
-        steps = isinstance(state.job, FrameJob)
+        steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
         if is_settling or state.clock.playing or steps:
             glfw.poll_events()
         else:
@@ -233,7 +234,7 @@ class _Window:
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Messages that time out, the bar of a file being read, a text cursor that blinks.
             self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
-        self._is_dirty |= state.clock.playing or state.job is not None
+        self._is_dirty |= state.clock.playing or state.job is not None or steps
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:

@@ -24,7 +24,6 @@ from viewer.rendering.options import BONES, OPACITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
 from viewer.rendering.passes.bone_style import skeleton_opacity
 from viewer.rendering.passes.ground_pass import grid_step, parse_color
-from viewer.rendering.shown import shows_skeleton
 from viewer.rig.annotations import BodyParts
 
 __all__ = ["draw"]
@@ -47,9 +46,8 @@ def draw(state: AppState) -> None:
                 show(state, key)
             note_item(state, text)
             explain("", missing[key])
-    if any(shows_skeleton(actor, options) for actor in state.scene.actors):
-        options.bones = choice(state, "Bones", options.bones, BONES)
-        explain("style of the skeleton; automatic: the boxes of its file, otherwise octahedra")
+        if key == "skeleton":
+            _draw_bones(state, missing[key])
     if options.show == "both":
         _draw_opacity(state)
     imgui.separator()
@@ -74,6 +72,17 @@ def draw(state: AppState) -> None:
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_bones(state: AppState, why: str) -> None:
+    """Draw the style of skeletons beside the button that shows them."""
+    imgui.same_line(imgui.get_content_region_avail().x * 0.5)
+    with disabled(why):
+        imgui.set_next_item_width(-1.0)
+        state.options.bones = choice(state, "##bones", state.options.bones, BONES)
+        note_item(state, "Bones")
+        text = "style of the skeleton; automatic: the boxes of its file, otherwise octahedra"
+        explain(text, why)
 
 
 def _draw_opacity(state: AppState) -> None:
