@@ -144,6 +144,8 @@ class DisplayOptions:
     joint_names, joint_axes : bool
         Label the joints, omitting labels that would overlap; draw the axes of the joint spaces
         (x red, y green, z blue).
+    outline : bool
+        Outline the selected joint, or else the selected actor, in pictures.
     """
 
     show: str = "skin"
@@ -173,3 +175,4 @@ class DisplayOptions:
     xray: bool = False
     joint_names: bool = False
     joint_axes: bool = False
+    outline: bool = False

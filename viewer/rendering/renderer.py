@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.overlay.marks import Marks
     from viewer.rendering.passes.ghost_pass import Ghost
+    from viewer.rendering.passes.outline_pass import Outlined
     from viewer.rendering.picking import Pick
 
 __all__ = ["Renderer"]
@@ -69,6 +70,8 @@ class Renderer:
         Annotations, drawn over everything except legends.
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
+    outlines : sequence of Outlined
+        Parts of the scene to outline; if empty, the selection with ``DisplayOptions.outline``.
     names_left_out : (int, int)
         Number of joint names omitted from the last picture for lack of room, and number of
         joints within it.
@@ -88,6 +91,7 @@ class Renderer:
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
+        self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
         self.late = LatePasses(
             context, self.programs, self.mesh_pass, self.joint_pass, self.buffers
@@ -160,6 +164,7 @@ class Renderer:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
         self._draw_marks(scene, view, options, target.size, selected)
+        self._draw_outlines(scene, view, options, target, selected)
         if options.legend and options.shading == "scalar" and has_meshes:
             self._draw_legend(target.size)
 
@@ -293,6 +298,22 @@ class Renderer:
         if drawn or over:
             left_out = self.late.annotation_pass.write([*drawn, *over], view, size)
             self.names_left_out = left_out[0] if drawn else (0, 0)
+
+    def _draw_outlines(
+        self,
+        scene: Scene,
+        view: View,
+        options: DisplayOptions,
+        target: Target,
+        selected: tuple[int, int],
+    ) -> None:
+        outlined = self.outlines
+        if options.outline and not outlined:
+            from viewer.rendering.passes.outline_pass import Outlined
+
+            outlined = [Outlined(*selected)]
+        if outlined:
+            self.late.outline_pass.draw(outlined, scene, view, options, target)
 
     def _marked(self) -> list[Annotation]:
         """Return the marks as annotations."""

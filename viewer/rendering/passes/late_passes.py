@@ -18,8 +18,11 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.keypoint_pass import KeypointPass
     from viewer.rendering.passes.legend_pass import LegendPass
     from viewer.rendering.passes.motion_path_pass import MotionPathPass
+    from viewer.rendering.passes.outline_pass import OutlinePass
     from viewer.rendering.passes.point_pass import PointPass
     from viewer.rendering.picking import PickPass
+
+    _Made = PointPass | PickPass | LegendPass | AnnotationPass | GhostPass | OutlinePass
 
 __all__ = ["LatePasses"]
 
@@ -49,7 +52,7 @@ class LatePasses:
     ) -> None:
         self._context, self._programs, self._buffers = context, programs, buffers
         self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
-        self._made: list[PointPass | PickPass | LegendPass | AnnotationPass | GhostPass] = []
+        self._made: list[_Made] = []
 
     @cached_property
     def keypoint_pass(self) -> KeypointPass:
@@ -110,6 +113,16 @@ class LatePasses:
         ghosts = GhostPass(self._context, self._programs, self._mesh_pass)
         self._made.append(ghosts)
         return ghosts
+
+    @cached_property
+    def outline_pass(self) -> OutlinePass:
+        """Draws outlines of what is selected or hovered."""
+        from viewer.rendering.passes.outline_pass import OutlinePass, OutlineTools
+
+        tools = OutlineTools(self._programs, self._mesh_pass, self.point_pass, self._buffers)
+        outlines = OutlinePass(self._context, tools)
+        self._made.append(outlines)
+        return outlines
 
     def release(self) -> None:
         """Free all passes that were created."""
