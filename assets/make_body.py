@@ -1,4 +1,4 @@
-"""Make the bundled human body: writes body.npz, in SMPL's file layout, into assets/samples.
+"""Generate the bundled human body: body.npz, in SMPL's file layout, in assets/samples.
 
 Run ``python assets/make_body.py`` from any folder; it takes about two minutes and gives the same
 file every time. Needs numpy, scipy and scikit-image.
@@ -21,7 +21,7 @@ from generator_tools.diffusion import averaging
 
 
 def main() -> None:
-    """Model, weigh, shape, correct, unwrap and write the body."""
+    """Model, skin, shape, correct, unwrap and write the body."""
     vertices, triangles, partner = surface.model()
     vertices = files.rounded_places(vertices)
     weights = skin_weights(vertices, triangles, partner)

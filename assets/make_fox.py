@@ -1,4 +1,4 @@
-"""Make the sample fox: writes fox.skel, fox.skin and fox.png into assets/samples.
+"""Generate the sample fox: fox.skel, fox.skin and fox.png in assets/samples.
 
 Run ``python assets/make_fox.py`` from any folder; it takes about a minute and gives the same
 files every time. Needs numpy, scipy, scikit-image, pillow and xatlas.
@@ -21,7 +21,7 @@ from generator_tools.surface import mirror, normals
 from PIL import Image
 
 BAKED_SIZE = 1024
-TEXTURE_SIZE = 512  # four baked texels each: half the size starts the viewer 20 ms earlier
+TEXTURE_SIZE = 512  # averages four baked texels; half the size makes the viewer start 20 ms earlier
 
 
 def main() -> None:
@@ -40,7 +40,7 @@ def main() -> None:
     texture.save(image, folder / "fox.png")
 
     split, triangles, copied = mirror(half[cut], cut_triangles)
-    # Both numberings list the left half first, then the mirrored rest in the same order.
+    # Both numberings list the left half first, then the mirrored vertices in the same order.
     right = np.full(len(half), -1)
     right[source[len(half) :]] = np.arange(len(half), len(welded))
     origin = cut[copied]

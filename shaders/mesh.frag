@@ -1,5 +1,12 @@
 #version 330
-// Two-sided shading of a surface in camera space, with linear colours.
+// Two-sided shading of a surface in camera space, with linear colours. The result of a chunk is shown
+// as it is: lit chunks apply the tone curve, those that show numbers do not.
+
+#pragma include tone
+#ifdef SHADOWS
+#pragma include shadow
+#endif
+#pragma include lights
 
 in vec3 v_position;
 in vec3 v_normal;
@@ -16,13 +23,6 @@ uniform bool u_textured;
 uniform sampler2D u_texture;    // sRGB, decoded by the sampler
 
 out vec4 f_color;               // sRGB, premultiplied by alpha
-
-// Linear to sRGB, IEC 61966-2-1.
-vec3 encode(vec3 color) {
-    vec3 low = 12.92 * color;
-    vec3 high = 1.055 * pow(max(color, vec3(0.0)), vec3(1.0 / 2.4)) - 0.055;
-    return mix(high, low, lessThanEqual(color, vec3(0.0031308)));
-}
 
 vec4 base_color() {
     return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);

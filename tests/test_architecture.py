@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +13,12 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+TESTS = ROOT / "tests"
+TEST_FILES = sorted(TESTS.rglob("*.py"))
+# Folders of tests with more files than others: a file of tests per quirk of a format.
+LARGE_FOLDERS = {"formats": 75, "commands": 35}
+# Folders of tests that mirror no folder of sources.
+OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, beside itself and what every part may.
 EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
@@ -79,18 +86,30 @@ HOMES = {
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    """Return the syntax of a file, parsed once."""
+    return ast.parse(path.read_text())
+
+
+@cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """Return the nodes that say something of a whole file: imports, functions and conditions."""
+    kinds = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.If)
+    return tuple(node for node in ast.walk(tree(path)) if isinstance(node, kinds))
+
+
+@cache
 def imports(path: Path, with_types: bool = False) -> frozenset[str]:
     """Return the modules that a file imports anywhere, with or without those for type checking."""
-    tree = ast.parse(path.read_text())
     guarded = {
         id(inner)
-        for node in ast.walk(tree)
+        for node in nodes(path)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
         for inner in ast.walk(node)
         if not with_types
     }
     names: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes(path):
         if id(node) in guarded:
             continue
         if isinstance(node, ast.Import):
@@ -104,13 +123,13 @@ def part_of(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_point_one_way(path: Path) -> None:
-    allowed = ALLOWED.get(part_of(path))
-    if allowed is None:
-        return  # the command line may import everything
-    used = {name.split(".")[1] for name in imports(path) if name.startswith("viewer.")}
-    assert used <= allowed
+def test_imports_point_one_way() -> None:
+    for path in SOURCES:
+        allowed = ALLOWED.get(part_of(path))
+        if allowed is None:
+            continue  # the command line may import everything
+        used = {name.split(".")[1] for name in imports(path) if name.startswith("viewer.")}
+        assert used <= allowed, path
 
 
 def part_of_app(name: str) -> str:
@@ -135,29 +154,48 @@ def test_folders_stay_small() -> None:
     assert not {name for name, count in counts.items() if count > 30}
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_third_party_modules_have_one_home(path: Path) -> None:
-    inside = path.relative_to(PACKAGE).as_posix()
-    for name in imports(path):
-        homes = HOMES.get(name.split(".")[0])
-        assert homes is None or any(inside.startswith(home) for home in homes), name
+def test_files_of_tests_stay_short_in_folders_that_mirror_the_sources() -> None:
+    for path in TEST_FILES:
+        assert path.read_text().count("\n") <= 400, path
+    counts = Counter(path.parent.relative_to(TESTS).as_posix() for path in TEST_FILES)
+    for folder, count in counts.items():
+        assert count <= LARGE_FOLDERS.get(folder, 30), folder
+        mirrored = PACKAGE / folder
+        # What is private in the sources has its tests in a folder without the underscore.
+        private = mirrored.parent / f"_{mirrored.name}"
+        assert folder in OTHER_FOLDERS or mirrored.is_dir() or private.is_dir(), folder
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_and_functions_stay_short(path: Path) -> None:
-    text = path.read_text()
-    assert text.count("\n") <= 400
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.FunctionDef):
-            lines = node.end_lineno - node.lineno + 1
-            documented = ast.get_docstring(node, clean=False)
-            lines -= documented.count("\n") + 1 if documented else 0
-            assert lines <= 45, f"{node.name}: {lines} lines"
+def test_tests_of_a_folder_lie_in_its_mirror() -> None:
+    """A file of tests that imports nothing but one folder's modules lies in that folder's tests."""
+    for path in TEST_FILES:
+        used = set(re.findall(r"^ *(?:from|import) viewer\.(\w+)", path.read_text(), re.MULTILINE))
+        if path.name.startswith("test_") and used - EVERYWHERE == {"media"}:
+            assert path.parent == TESTS / "media", path
+
+
+def test_third_party_modules_have_one_home() -> None:
+    for path in SOURCES:
+        inside = path.relative_to(PACKAGE).as_posix()
+        for name in imports(path):
+            homes = HOMES.get(name.split(".")[0])
+            assert homes is None or any(inside.startswith(home) for home in homes), (path, name)
+
+
+def test_files_and_functions_stay_short() -> None:
+    for path in SOURCES:
+        assert path.read_text().count("\n") <= 400, path
+        for node in nodes(path):
+            if isinstance(node, ast.FunctionDef):
+                lines = node.end_lineno - node.lineno + 1
+                documented = ast.get_docstring(node, clean=False)
+                lines -= documented.count("\n") + 1 if documented else 0
+                assert lines <= 45, f"{path}: {node.name}: {lines} lines"
 
 
 def test_every_public_module_documents_itself() -> None:
     for path in SOURCES:
-        assert ast.get_docstring(ast.parse(path.read_text())), path
+        assert ast.get_docstring(tree(path)), path
 
 
 def test_shaders_state_the_version_and_prefix_their_names() -> None:
@@ -215,10 +253,9 @@ def import_graph() -> dict[str, set[str]]:
     modules = {module_name(path): path for path in SOURCES}
     graph = {}
     for name, path in modules.items():
-        tree = ast.parse(path.read_text())
         members = {
             f"{node.module}.{alias.name}"
-            for node in ast.walk(tree)
+            for node in nodes(path)
             if isinstance(node, ast.ImportFrom) and node.module
             for alias in node.names
         }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import shutil
@@ -10,39 +9,24 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from app.driver import Driver
 from app.tiny import write_rig
-from children import listening
+from driven_window import PATIENCE, ROOT, Window, _ask_to_close, _wait_for
 from imgui_bundle import imgui
-from PIL import Image, ImageGrab
+from PIL import Image
 
 import viewer
 from viewer.app.view.picks import vertex_at
-from viewer.app.window import _Rest
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import scene_points
 
 pytestmark = pytest.mark.slow
-
-ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data" / "cse169"
 SIZE = (1280, 800)
-PATIENCE = 60.0  # seconds until something that should happen counts as missing
-
-
-def _wait_for(condition, what):
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        found = condition()
-        if found is not None and found is not False:
-            return found
-        time.sleep(0.03)
-    raise AssertionError(f"not seen within {PATIENCE:g} s: {what}")
 
 
 @pytest.fixture(scope="module")
@@ -105,124 +89,6 @@ def places(figure):
     rects, view = dict(driver.state.item_rects), driver.state.view_rect
     driver.close()
     return rects, view
-
-
-class _ClientMessage(ctypes.Structure):
-    """XClientMessageEvent, padded to the size of XEvent."""
-
-    _fields_ = (
-        ("type", ctypes.c_int),
-        ("serial", ctypes.c_ulong),
-        ("send_event", ctypes.c_int),
-        ("display", ctypes.c_void_p),
-        ("window", ctypes.c_ulong),
-        ("message_type", ctypes.c_ulong),
-        ("format", ctypes.c_int),
-        ("data", ctypes.c_long * 5),
-        ("padding", ctypes.c_long * 24),
-    )
-
-
-def _ask_to_close(display, window):
-    """Send WM_DELETE_WINDOW, as a window manager does when its cross is clicked."""
-    x11 = ctypes.CDLL("libX11.so.6")
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    x11.XInternAtom.restype = ctypes.c_ulong
-    connection = ctypes.c_void_p(x11.XOpenDisplay(display.encode()))
-    protocols = x11.XInternAtom(connection, b"WM_PROTOCOLS", 0)
-    delete = x11.XInternAtom(connection, b"WM_DELETE_WINDOW", 0)
-    event = _ClientMessage(type=33, window=window, message_type=protocols, format=32)
-    event.data[0] = delete
-    x11.XSendEvent(connection, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(event))
-    x11.XCloseDisplay(connection)
-
-
-class Window:
-    """A running viewer, its window, and a hand on its mouse and keys."""
-
-    def __init__(self, display, folder, arguments):
-        self.display, self.folder = display, folder
-        self.environment = {
-            **os.environ,
-            "DISPLAY": display,
-            "XDG_STATE_HOME": str(folder / "state"),
-            "PYTHONPATH": str(ROOT),
-            "PYTHONWARNINGS": "error",
-        }
-        self.environment.pop("WAYLAND_DISPLAY", None)
-        self.process = subprocess.Popen(
-            listening("-m", "viewer", *arguments),
-            cwd=folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
-        self.id = _wait_for(self._find, "the window")
-        self.tell("windowfocus", "--sync", self.id)
-        self.wait_until_quiet()
-
-    def _find(self):
-        assert self.process.poll() is None, self.process.communicate()
-        pid = str(self.process.pid)
-        found = self.tell("search", "--onlyvisible", "--pid", pid, "--class", "viewer", check=False)
-        return found.split()[0] if found else None
-
-    def tell(self, *words, check=True):
-        done = subprocess.run(
-            ["xdotool", *map(str, words)],
-            env=self.environment, capture_output=True, text=True, timeout=PATIENCE, check=check,
-        )  # fmt: skip
-        return done.stdout.strip()
-
-    def screen(self):
-        return np.array(ImageGrab.grab(xdisplay=self.display).convert("RGB"))
-
-    def wait_until_quiet(self, still=0.25):
-        """Return the screen as soon as it shows the figure and has not changed for a while."""
-        last = [self.screen(), time.monotonic()]
-
-        def is_quiet():
-            now = self.screen()
-            if (now != last[0]).any() or now.max() == 0:
-                last[:] = now, time.monotonic()
-            return now if time.monotonic() - last[1] > still else None
-
-        return _wait_for(is_quiet, "a picture that stands still")
-
-    def wait_until_changed(self, before, region=None):
-        x, y, width, height = region or (0, 0, 1400, 900)
-        part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
-        _wait_for(lambda: (self.screen()[part] != before[part]).any(), "a change")
-        return self.wait_until_quiet()
-
-    def wait_until_shown(self, wanted, part):
-        _wait_for(lambda: (self.screen()[part] == wanted[part]).all(), "an earlier picture")
-
-    def key(self, name):
-        # Without a window manager the focus may be lost, and keys follow the pointer then.
-        self.tell("windowfocus", "--sync", self.id)
-        self.tell("key", "--clearmodifiers", name)
-
-    def drag(self, start, end):
-        self.tell("mousemove", round(start[0]), round(start[1]), "mousedown", 1)
-        for k in (0.3, 0.7, 1.0):
-            x, y = (round(a + k * (b - a)) for a, b in zip(start, end, strict=True))
-            self.tell("mousemove", x, y)
-            time.sleep(0.05)
-        self.tell("mouseup", 1)
-        self.tell("mousemove", 640, 870)  # off the window: nothing is hovered
-
-    def finish(self):
-        """Return what the program printed after it has ended well."""
-        out, err = self.process.communicate(timeout=PATIENCE)
-        assert (self.process.returncode, out, err) == (0, b"", b"")
-
-    def seconds_of_cpu(self):
-        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-    def is_asleep(self, seconds=0.8):
-        """Return whether the window draws nothing for some time."""
-        spent, since = self.seconds_of_cpu(), time.monotonic()
-        time.sleep(seconds)
-        return (self.seconds_of_cpu() - spent) / (time.monotonic() - since) < 0.05
 
 
 def test_window_does_what_hands_ask_for(window, places, figure):
@@ -335,27 +201,6 @@ def test_layout_is_remembered_between_runs(window, places):
     assert (wider[strip] != before[strip]).mean() > 0.5
     again = window()
     _wait_for(lambda: (again.screen()[strip] == wider[strip]).mean() > 0.98, "the same layout")
-
-
-def test_what_was_awaited_is_followed_by_frames_that_show_it():
-    for at in range(1, 9):  # the frame that brings it, be it the last one before the window sleeps
-        rest = _Rest()
-        for frame in range(at):
-            rest.count(happened=frame % 4 == 0, awaits=True)
-        drawn = 0
-        for _ in range(12):
-            rest.count(happened=False, awaits=False)
-            drawn += rest.left >= 0
-        # ImGui measures a window in its first frame, and shows it with its size in the second.
-        assert drawn >= 2 and rest.left < 0
-
-
-def test_rest_ends_when_nothing_happens():
-    rest, drawn = _Rest(), 0
-    for _ in range(20):
-        rest.count(happened=False, awaits=False)
-        drawn += rest.left >= 0
-    assert 0 < drawn < 5
 
 
 @pytest.fixture(scope="module")

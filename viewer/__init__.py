@@ -1,4 +1,4 @@
-"""See, check and produce skinned characters.
+"""Viewer, checker and converter of skinned characters.
 
 >>> import viewer
 >>> scene = viewer.load()                                  # the bundled figure
@@ -6,7 +6,7 @@
 >>> picture.shape
 (240, 320, 4)
 
-Importing this module imports nothing heavy: each name loads its own module on first use.
+Importing this package is cheap: each name loads its own module on first use.
 """
 
 # Not imported from ``typing``: no signal handler is installed yet, so imports here must be quick.

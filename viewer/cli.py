@@ -25,28 +25,28 @@ Without a command, FILES open in a window; without files, the bundled figure doe
 "viewer COMMAND --help" lists a command's options, "viewer help" the pages of the manual.
 
 exit codes: 0 success, 1 lint findings or diff above the tolerance, 2 bad input, 4 no usable OpenGL,
-5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal
-after everything is written changes nothing
+5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal that
+arrives after all output is written does not change the exit code
 """
 
-_DOWNWARD = ("-y", "-z")  # values of --up and --front; no option has these letters
+_DOWNWARD = ("-y", "-z")  # values of --up and --front; they are not options
 
 
 @standard_streams()
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
-    Signals end the command like the program; the caller's handlers are restored afterwards.
+    Signals end the command as they would end the program; the caller's handlers are restored.
 
     Parameters
     ----------
     arguments : sequence of str
-        Without the program's name.
+        Arguments without the program's name.
 
     Returns
     -------
     int
-        The exit code: 0, that of the ``ViewerError``, or 128 and the signal's number.
+        Exit code: 0, that of the ``ViewerError``, or 128 plus the signal's number.
     """
     try:
         with watched():
@@ -67,7 +67,7 @@ def _attempt(arguments: list[str]) -> int:
             sys.stdout.flush()
         return code
     except FormatError as problem:
-        # Path and line first, like compilers, so that editors can jump there.
+        # As in compiler output, path and line come first, so that editors can jump there.
         return _fail(printable(problem, 2000), problem.exit_code, prefix="")
     except ViewerError as problem:
         return _fail(printable(problem, 2000), problem.exit_code)
@@ -106,7 +106,7 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
-    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` for options."""
+    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` as options."""
     joined: list[str] = []
     for argument in arguments:
         is_number = len(argument) > 1 and argument[0] == "-" and argument[1] in "0123456789."
@@ -121,7 +121,7 @@ def _protect_numbers(arguments: list[str]) -> list[str]:
 def _overview() -> argparse.ArgumentParser:
     parser = Parser(
         prog="viewer",
-        description="See, check and produce skinned characters.",
+        description="View, check and convert skinned characters.",
         epilog=_EPILOG,
         usage="viewer [COMMAND] [FILES ...] [options]",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -129,7 +129,7 @@ def _overview() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="store_true", help="print the version")
     group = parser.add_argument_group("commands")
     for name, text in COMMANDS.items():
-        # Listed like options, so that argparse aligns them.
+        # Commands are added like arguments, so that argparse aligns them.
         group.add_argument(name, nargs="?", help=text, metavar=name)
     return parser
 
@@ -143,5 +143,5 @@ def _fail(message: str, code: int, prefix: str = "viewer: ") -> int:
 def _drop_output() -> None:
     """Discard the remaining output, or Python would report an error at exit."""
     if sys.stdout is not None:
-        with contextlib.suppress(io.UnsupportedOperation):  # no file, as in tests
+        with contextlib.suppress(io.UnsupportedOperation):  # not a real file, as in tests
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,12 +1,12 @@
-"""The exception hierarchy; callers catch at the level they need.
+"""Exception hierarchy; callers catch the level that they need.
 
 ::
 
     ViewerError                 exit 2   an error the user can act on; one line, no traceback
-    ├── FormatError             exit 2   a file breaks its format: path:line: expected, found
-    ├── UnsupportedFormatError  exit 2   no reader or writer knows this kind of file
-    ├── RigError                exit 2   parts that do not fit each other
-    ├── RenderError             exit 4   no usable OpenGL, or the driver refused
+    ├── FormatError             exit 2   an invalid file: path:line: expected …, found …
+    ├── UnsupportedFormatError  exit 2   no reader or writer for this kind of file
+    ├── RigError                exit 2   incompatible parts of a figure, or an unknown name
+    ├── RenderError             exit 4   no usable OpenGL, or a driver error
     └── OutputError             exit 5   a result could not be written
 """
 
@@ -31,17 +31,17 @@ _LONGEST = 1000  # characters of a message with names in it
 
 
 class ViewerError(Exception):
-    """An error the user can act on; ``str()`` is the one line to show.
+    """An error the user can act on; ``str()`` is its message in one line.
 
     Parameters
     ----------
     problem : str or Diagnostic
-        The line, or the fault whose line it is.
+        The message, or a diagnostic that provides it.
 
     Attributes
     ----------
     diagnostic : Diagnostic or None
-        The fault as data, if it concerns a file or a figure.
+        The problem as data, if it concerns a file or a figure.
     """
 
     exit_code = 2
@@ -51,17 +51,22 @@ class ViewerError(Exception):
         # Names of joints, figures and files come from files and may contain any character.
         super().__init__(self._line(problem))
 
+    @property
+    def cause(self) -> str | Diagnostic:
+        """The fault as data if it is known, else the line: a value for another diagnostic."""
+        return self.diagnostic or str(self)
+
     def _line(self, problem: str | Diagnostic) -> str:
         return str(problem)
 
 
 class FormatError(ViewerError):
-    """A file breaks its own format.
+    """A file is invalid.
 
     Parameters
     ----------
     diagnostic : Diagnostic
-        The fault, with its file, and its line if the format has lines.
+        Diagnostic with the file, and the line if the format has lines.
     """
 
     diagnostic: Diagnostic
@@ -71,36 +76,36 @@ class FormatError(ViewerError):
 
     @property
     def path(self) -> Path:
-        """The file at fault."""
+        """The invalid file."""
         return self.diagnostic.path or Path()
 
     @property
     def line(self) -> int | None:
-        """Line of the fault, from 1, if the format has lines."""
+        """Line number of the problem, from 1, if the format has lines."""
         return self.diagnostic.line
 
 
 class UnsupportedFormatError(ViewerError):
-    """No reader or writer knows this kind of file."""
+    """There is no reader or writer for this kind of file."""
 
     def _line(self, problem: str | Diagnostic) -> str:
         return printable(problem, _LONGEST)
 
 
 class RigError(ViewerError):
-    """Parts of a figure that do not fit each other, or a name that it does not have."""
+    """Parts of a figure are incompatible, or it has no part with a given name."""
 
     def _line(self, problem: str | Diagnostic) -> str:
         return printable(problem, _LONGEST)
 
 
 class RenderError(ViewerError):
-    """OpenGL is missing or too old, or refused a request."""
+    """OpenGL is missing or too old, or reported an error."""
 
     exit_code = 4
 
 
 class OutputError(ViewerError):
-    """A result could not be written; what was there before is untouched."""
+    """A result could not be written; existing files are unchanged."""
 
     exit_code = 5

@@ -1,16 +1,16 @@
 """Deferred handling of Ctrl-C, SIGTERM and SIGHUP.
 
-A handler that raises may do so anywhere in Python: inside a callback of a C library that does not
-expect it (``moderngl.Context.program`` then dereferences NULL), inside an import, inside clean-up.
-So the handler records the signal, and raises ``Interrupted`` at once only while pure Python or
-numpy code runs::
+A handler that raises may do so anywhere in Python code: inside a callback of a C library that does
+not expect it (``moderngl.Context.program`` then dereferences NULL), during an import, or during
+clean-up. So the handler records the signal, and raises ``Interrupted`` immediately only while pure
+Python or numpy code runs::
 
     with watched():            # the command: reading files, arrays; signals raise within it
         with deferred():       # OpenGL: recorded, raised at the end of the block
             draw()
         hold()                 # results are written: from now on only poll() raises
         for file in files:
-            poll()             # nothing is half done here
+            poll()             # between complete units of work
             write(file)
 
 A signal after the last ``poll`` is too late: the work is done, and the result is success. A second
@@ -38,8 +38,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Interrupted", "deferred", "hold", "poll", "raising", "watch_program", "watched"]
 
-_WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
-_SIGNALS = {getattr(signal, name): word for name, word in _WORDS.items() if hasattr(signal, name)}
+_MESSAGES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
+_SIGNALS = {
+    getattr(signal, name): word for name, word in _MESSAGES.items() if hasattr(signal, name)
+}
 _SAME = 1.0  # seconds during which further signals count as the same request
 _PAUSE = 0.02  # seconds before raising is tried again
 
@@ -248,7 +250,7 @@ def hold() -> None:
 
 
 def poll(in_any_thread: bool = False) -> None:
-    """Raise a deferred signal, at a point where no work is half done.
+    """Raise a deferred signal, at a point between complete units of work.
 
     Parameters
     ----------

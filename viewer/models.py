@@ -20,8 +20,8 @@ __all__ = [
     "save_model_folder",
 ]
 
-_DEEPEST = 4  # folders below the model folder that are searched
-# Entries examined: a home folder given by mistake must not take minutes.
+_DEEPEST = 4  # levels of subfolders that are searched
+# Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl")
 _SEX = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
@@ -158,7 +158,7 @@ def find_model(name: str, folder: Path | None) -> Path | None:
 
 
 def resolve(file: str | Path) -> Path:
-    """Return a path as it is if it exists, else the model of this name in the model folder."""
+    """Return an existing path unchanged, otherwise the model of this name in the model folder."""
     path = Path(file)
     # Path.exists() would raise for a name that is too long.
     if os.path.exists(path) or len(path.parts) != 1:  # noqa: PTH110

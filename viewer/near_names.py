@@ -59,7 +59,7 @@ def did_you_mean(text: str, names: Iterable[str], alike: float = 0.6) -> str:
 
 
 def question(names: Sequence[str]) -> str:
-    """Return the question whether one of some names was meant, "" if there are none.
+    """Return the question "did you mean …?" about some names, "" if there are none.
 
     >>> question(["--size", "--speed", "--scale"])
     'did you mean --size, --speed or --scale?'

@@ -10,7 +10,7 @@ _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 
 
 def printable(text: object, limit: int = 200) -> str:
-    r"""Return ``text`` on one line: control characters escaped, cut after ``limit`` characters.
+    r"""Return ``text`` on one line: control characters escaped, truncated to ``limit`` characters.
 
     >>> printable("two\nlines")
     'two\\nlines'
@@ -25,7 +25,7 @@ def printable(text: object, limit: int = 200) -> str:
 
 
 def quoted(word: bytes | str, limit: int = 40) -> str:
-    r"""Return a word of a file in double quotes, on one line, truncated if long.
+    r"""Return a word from a file in double quotes, on one line, truncated if it is long.
 
     >>> quoted(b"up\x00"), quoted("left")
     ('"up\\x00"', '"left"')

@@ -16,7 +16,7 @@ from viewer.phrases import printable
 __all__ = ["is_stdout", "require_stdout", "standard_streams", "summary_stream", "write_stdout"]
 
 _STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
-_MOST_LINKS = 40  # as the kernel follows
+_MOST_LINKS = 40  # limit of the Linux kernel
 
 
 def is_stdout(path: str | Path) -> bool:
@@ -37,7 +37,7 @@ def is_stdout(path: str | Path) -> bool:
 
 
 def require_stdout(path: str | Path) -> None:
-    """Refuse a path that names standard output if the stream is closed.
+    """Check a path that names standard output.
 
     Raises
     ------

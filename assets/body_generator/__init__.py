@@ -1,1 +1,1 @@
-"""Model, weigh and shape the bundled human body; one idea a module, driven by ``make_body.py``."""
+"""Generator of the bundled human body, run by ``make_body.py``."""

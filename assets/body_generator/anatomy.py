@@ -1,4 +1,4 @@
-"""How each joint bends: its range, its bones, and the flesh that bulges."""
+"""Anatomy of the joints: ranges, bones, and muscles that bulge."""
 
 from dataclasses import dataclass
 
@@ -10,9 +10,9 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Bulge:
-    """Push (metres at a right angle) the skin around a place as the joint bends either way.
+    """Displacement of the skin around a point when a joint bends, in metres at a right angle.
 
-    Grows with 1 - cos of the angle, and only when the bend about ``about`` is positive.
+    It grows with 1 - cos of the angle, and only if the bend about ``about`` is positive.
     """
 
     place: Triple
@@ -23,23 +23,23 @@ class Bulge:
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """One joint's range and the bones around it.
+    """Range of one joint, and the bones around it.
 
     Parameters
     ----------
     low, high : (3,)
         Limits of the axis-angle components in degrees, left side.
     chain : (S,)
-        Joints whose polyline is the bone that the skin keeps its distance from.
+        Joints whose polyline is the bone; the skin keeps its distance from it.
     above, below : (3,)
-        Where the flesh on either side of the joint lies from it, at rest.
+        Offsets from the joint to the flesh on either side of it, at rest.
     reach : float
         Radius in metres around the joint within which the skin is corrected.
     fold : (2,)
-        On the inner side of the bend: how much the skin keeps its distance from the bone, and how
-        firmly flesh is kept on its own side.
+        On the inner side of the bend: fraction of the distance to the bone that is preserved, and
+        strength with which flesh is kept on its own side.
     smooth : float
-        How far the bend is smoothed.
+        Amount of smoothing of the bend.
     """
 
     low: Triple
@@ -129,7 +129,7 @@ def bend_of(name: str) -> Bend | None:
 
 
 def samples(bend: Bend, count: int, seed: int) -> Floats:
-    """Return axis-angle vectors (N, 3) in radians: single axes evenly, then random mixtures."""
+    """Return axis-angle vectors (N, 3) in radians: about single axes, then random combinations."""
     low, high = np.asarray(bend.low, float), np.asarray(bend.high, float)
     rows = []
     for axis in range(3):
@@ -139,7 +139,8 @@ def samples(bend: Bend, count: int, seed: int) -> Floats:
                 row[axis] = part * limit[axis]
                 rows.append(row)
     spread = np.random.default_rng(seed).uniform(0, 1, (count, 3))
-    # A mixture of full bends about every axis is no pose: keep to a ball in units of the limits.
+    # Full bends about all axes at once are implausible: samples stay in a ball in units of the
+    # limits.
     mixed = np.where(spread < 0.5, (1 - 2 * spread) * low, (2 * spread - 1) * high)
     unit = mixed / np.maximum(np.where(mixed < 0, -low, high), 1)
     mixed /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1)

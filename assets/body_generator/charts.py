@@ -1,7 +1,8 @@
-"""Texture coordinates: the left half cut into a few charts, each flattened and packed.
+"""Texture coordinates: the left half is cut into a few charts, which are flattened and packed.
 
-A chart is spread over a disc first, which never folds (Tutte 1963), then relaxed to keep shapes
-("A Local/Global Approach to Mesh Parameterization", Liu et al. 2008). The right half shares them.
+A chart is mapped to a disc first, which never folds it (Tutte 1963), then relaxed to preserve
+shapes ("A Local/Global Approach to Mesh Parameterization", Liu et al. 2008). The right half shares
+the charts.
 """
 
 from itertools import pairwise
@@ -14,19 +15,19 @@ from scipy.sparse import csr_matrix, eye
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
 
-ROUNDS = 12  # of relaxing a chart
-MARGIN = 0.006  # of the square, around each chart
-SMOOTHING = 8  # passes over the side that decides between front and back
+ROUNDS = 12  # iterations of relaxing a chart
+MARGIN = 0.006  # margin around each chart, as a fraction of the square
+SMOOTHING = 8  # smoothing iterations of the values that decide between front and back
 NECK, SHOULDER, WRIST, CROTCH, SOLE = 1.490, 0.200, 0.700, 0.800, 0.030  # metres; ends of charts
 
-# Trunk front, back; arm below, above; hand below, above; sole; head; leg front, back:
-# the axis that runs up, and how much a chart is enlarged.
+# Trunk front, back; arm below, above; hand below, above; sole; head; leg front, back: vertical axis
+# and magnification of each chart.
 UPWARDS = (1, 1, 0, 0, 0, 0, 2, 1, 1, 1)
 ENLARGED = (1.0, 1.0, 1.0, 1.0, 1.4, 1.4, 1.2, 1.6, 1.0, 1.0)
 
 
 def _sides(vertices: Floats, triangles: np.ndarray, axis: int) -> Floats:
-    """Return how much each triangle faces along an axis, smoothed over its neighbours."""
+    """Return the component of each triangle's normal along an axis, smoothed over neighbours."""
     faces = face_normals(vertices, triangles)
     at_corners = np.zeros((len(vertices), 3))
     for _ in range(SMOOTHING):
@@ -38,7 +39,7 @@ def _sides(vertices: Floats, triangles: np.ndarray, axis: int) -> Floats:
 
 
 def _labels(vertices: Floats, triangles: np.ndarray) -> np.ndarray:
-    """Return the chart of each triangle before strays are joined to their neighbours."""
+    """Return the chart of each triangle before stray pieces are joined to their neighbours."""
     x, y, _ = vertices[triangles].mean(axis=1).T
     front = (_sides(vertices, triangles, 2) > 0).astype(int)
     top = (_sides(vertices, triangles, 1) > 0).astype(int)
@@ -49,7 +50,7 @@ def _labels(vertices: Floats, triangles: np.ndarray) -> np.ndarray:
 
 
 def _without_spikes(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Give triangles that touch another chart with two sides to that chart."""
+    """Assign triangles that have two edges in common with another chart to that chart."""
     edges = find_edges(triangles)
     pairs = edges.faces[edges.faces[:, 1] >= 0]
     charts = label.max() + 1
@@ -62,7 +63,7 @@ def _without_spikes(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _joined(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Give every piece but the largest of each chart to the chart that it touches most."""
+    """Assign all but the largest piece of each chart to the chart with the most common edges."""
     edges = find_edges(triangles)
     pairs = edges.faces[edges.faces[:, 1] >= 0]
     for _ in range(20):
@@ -98,7 +99,7 @@ def _rim(triangles: np.ndarray) -> np.ndarray:
 
 
 def _on_disc(vertices: Floats, triangles: np.ndarray, rim: np.ndarray) -> Floats:
-    """Return positions (V, 2) with the rim on a circle and the rest at neighbours' means."""
+    """Return positions (V, 2) with the rim on a circle and all others at the mean of neighbours."""
     lengths = [np.linalg.norm(vertices[a] - vertices[b]) for a, b in pairwise([*rim, rim[0]])]
     turn = 2 * np.pi * np.cumsum([0.0, *lengths[:-1]]) / np.sum(lengths)
     stiffness, _ = cotangent_stiffness(vertices, triangles)
@@ -111,7 +112,7 @@ def _on_disc(vertices: Floats, triangles: np.ndarray, rim: np.ndarray) -> Floats
 
 
 def _plane_corners(vertices: Floats, triangles: np.ndarray) -> Floats:
-    """Return each triangle's corners (T, 3, 2) laid flat without distortion."""
+    """Return each triangle's corners (T, 3, 2) in its own plane, without distortion."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     base = np.linalg.norm(b - a, axis=1)
     along = np.einsum("ti,ti->t", c - a, b - a) / base
@@ -121,7 +122,7 @@ def _plane_corners(vertices: Floats, triangles: np.ndarray) -> Floats:
 
 
 def _is_simple(flat: Floats, triangles: np.ndarray, rim: np.ndarray) -> bool:
-    """Tell whether no triangle is turned over and the rim does not cross itself."""
+    """Return whether no triangle is flipped and the rim does not intersect itself."""
     a, b, c = (flat[triangles[:, i]] for i in range(3))
     if np.any(_cross(b - a, c - a) <= 0):
         return False
@@ -138,7 +139,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _flatten(vertices: Floats, triangles: np.ndarray) -> Floats:
-    """Return a chart's positions (V, 2), as near to true shapes as rigid pieces allow."""
+    """Return a chart's positions (V, 2), in which triangles are as rigid as possible."""
     rim = _rim(triangles)
     flat = best = _on_disc(vertices, triangles, rim)
     corners = _plane_corners(vertices, triangles)
@@ -165,7 +166,7 @@ def _flatten(vertices: Floats, triangles: np.ndarray) -> Floats:
 
 
 def _upright(vertices: Floats, flat: Floats, axis: int) -> Floats:
-    """Turn a chart so that the figure's ``axis`` runs up in it, its box at the origin."""
+    """Rotate a chart so that the figure's ``axis`` points up, and move its box to the origin."""
     slope, *_ = np.linalg.lstsq(
         np.column_stack([flat, np.ones(len(flat))]), vertices[:, axis], rcond=None
     )
@@ -175,7 +176,7 @@ def _upright(vertices: Floats, flat: Floats, axis: int) -> Floats:
 
 
 def _shelves(sizes: Floats, scale: float) -> Floats | None:
-    """Place boxes (N, 2) on shelves of the unit square, or return None if they do not fit."""
+    """Pack boxes (N, 2) onto shelves of the unit square; None if they do not fit."""
     boxes = scale * sizes + 2 * MARGIN
     places, x, y, tallest = np.zeros_like(boxes), 0.0, 0.0, 0.0
     for i in np.argsort(-boxes[:, 1], kind="stable"):

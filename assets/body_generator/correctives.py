@@ -1,9 +1,9 @@
-"""Pose correctives: columns linear in R - I, fitted to better bends than linear skinning gives.
+"""Pose correctives: columns linear in R - I, fitted to improved bends.
 
 For samples of one joint's rotation the skinned surface is improved: the skin keeps its distance
-from the bones, flesh on either side of a bend meets at the plane between them instead of passing
-through, and muscles bulge. The improvement is taken back to the rest pose and fitted by ridge
-regression; what stays under a threshold is dropped, so the columns are sparse.
+from the bones, flesh on the two sides of a bend meets at the plane between them instead of
+interpenetrating, and muscles bulge. The displacements are mapped back to the rest pose and fitted
+by ridge regression; values below a threshold are dropped, so that the columns are sparse.
 """
 
 from dataclasses import dataclass
@@ -17,20 +17,20 @@ from .anatomy import Bend, Bulge, bend_of, samples
 from .joints import CENTRES, NAMES, PARENTS, PARTNERS, index
 from .pose import rotation, skin, world
 
-SAMPLES = 24  # random rotations a joint, besides those about single axes
+SAMPLES = 24  # random rotations per joint, besides those about single axes
 RIDGE = 0.05
-ROUNDS = 3  # of correcting, then smoothing
-SMOOTHING = 3  # passes over the corrections in each round
+ROUNDS = 3  # rounds of correction and smoothing
+SMOOTHING = 3  # smoothing iterations per round
 LEAST = 3e-4  # metres; smaller corrections are dropped
-MUSH_PASSES = 12  # of smoothing a bend
-RESTORE = 0.85  # of the lost distance to the bone
-DEEPEST = 0.05  # metres; no correction is longer
-STRAIGHT = 0.2  # a joint bent less than this (in lengths of two unit vectors' sum) has no fold
+MUSH_PASSES = 12  # iterations of smoothing a bend
+RESTORE = 0.85  # fraction of the lost distance to the bone that is restored
+DEEPEST = 0.05  # metres; length limit of corrections
+STRAIGHT = 0.2  # minimum length of the sum of two unit vectors at a joint that has a fold
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """The rest figure: vertices, weights, mirror partners and one pass of smoothing (V, V)."""
+    """The rest figure: vertices, weights, mirror partners and smoothing matrix (V, V)."""
 
     vertices: Floats
     weights: Floats
@@ -57,7 +57,7 @@ def _chain(bend: Bend, name: str) -> list[int]:
 
 
 def _subtree(j: int) -> np.ndarray:
-    """Tell which joints hang on a joint, itself included."""
+    """Return a mask of the joints below a joint, itself included."""
     below = np.zeros(len(NAMES), dtype=bool)
     below[j] = True
     for k, parent in enumerate(PARENTS):
@@ -74,7 +74,7 @@ def _influence(body: Body, bend: Bend, j: int) -> Floats:
 
 
 def _mushed(body: Body, moved: Floats, blended: Floats) -> Floats:
-    """Return the steps (V, 3) that smooth the bend but keep the rest figure's detail.
+    """Return displacements (V, 3) that smooth the bend but preserve the rest figure's detail.
 
     Mancewicz et al. 2014, "Delta Mush: smoothing deformations while preserving detail".
     """
@@ -86,7 +86,7 @@ def _mushed(body: Body, moved: Floats, blended: Floats) -> Floats:
 
 
 def _restored(body: Body, moved: Floats, line: Floats, rest_line: Floats) -> Floats:
-    """Return the steps (V, 3) that give the skin its distance from the bones back."""
+    """Return displacements (V, 3) that restore the skin's distance from the bones."""
     rest = np.linalg.norm(body.vertices - _closest(body.vertices, rest_line), axis=1)
     away = moved - _closest(moved, line)
     now = np.linalg.norm(away, axis=1)
@@ -95,7 +95,7 @@ def _restored(body: Body, moved: Floats, line: Floats, rest_line: Floats) -> Flo
 
 
 def _fold_side(moved: Floats, bend: Bend, j: int, turned: Floats) -> Floats:
-    """Return 0..1 (V,): how far a place lies on the inner side of the bend."""
+    """Return 0..1 (V,): how far a point lies on the inner side of the bend."""
     inner = np.asarray(bend.above, float) + turned @ np.asarray(bend.below, float)
     size = np.linalg.norm(inner)
     if size < STRAIGHT:
@@ -104,7 +104,7 @@ def _fold_side(moved: Floats, bend: Bend, j: int, turned: Floats) -> Floats:
 
 
 def _parted(body: Body, moved: Floats, bend: Bend, j: int, turned: Floats) -> Floats:
-    """Return the steps (V, 3) that keep each side of a bend on its own side."""
+    """Return displacements (V, 3) that keep the two sides of a bend apart."""
     above = np.asarray(bend.above, float)
     plane = turned @ np.asarray(bend.below, float) - above
     rest_plane = np.asarray(bend.below, float) - above
@@ -116,14 +116,14 @@ def _parted(body: Body, moved: Floats, bend: Bend, j: int, turned: Floats) -> Fl
 
 
 def _bulged(body: Body, bulge: Bulge, vector: Floats) -> Floats:
-    """Return a muscle's steps (V, 3) in the rest pose."""
+    """Return a muscle's displacements (V, 3) in the rest pose."""
     angle = max(float(vector @ np.asarray(bulge.about, float)), 0.0)
     far = np.sum(((body.vertices - bulge.place) / bulge.radii) ** 2, axis=1)
     return (1 - np.cos(angle)) * np.exp(-far)[:, None] * np.asarray(bulge.push)
 
 
 def _target(body: Body, bend: Bend, j: int, vector: Floats) -> Floats:
-    """Return the wanted displacements (V, 3) in the rest pose for one rotation."""
+    """Return the target displacements (V, 3) in the rest pose for one rotation."""
     matrices = np.tile(np.eye(3), (len(NAMES), 1, 1))
     matrices[j] = rotation(vector)
     transforms = world(matrices, CENTRES)

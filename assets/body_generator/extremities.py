@@ -1,4 +1,4 @@
-"""The left hand and foot, each modelled in a frame of its own and then placed."""
+"""The left hand and foot, each modelled in its own frame and then placed."""
 
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ from .loft import Part, ball, loft, placed, turn
 WRIST = (0.690, 1.372, -0.019)
 ANKLE = (0.108, 0.0, -0.036)
 TOE_OUT = 7.0  # degrees
-# Of each finger x, y, z of the knuckle, the two middle joints and the tip.
+# x, y, z of each finger's knuckle, two middle joints and tip.
 FINGERS = (
     ((86, 1, 29.5), (126, -3, 36.5), (151, -10, 40.5), (172, -19, 43)),
     ((91, 3, 9.5), (136, -1, 12), (164, -8, 13.5), (187, -17, 14)),
@@ -18,7 +18,7 @@ FINGERS = (
     ((79, -1, -29), (110, -7, -37), (129, -13, -41.5), (147, -20, -45)),
 )
 THICKNESS = (9.4, 9.6, 9.2, 8.1)  # radius of each finger at the knuckle
-TAPER = (0.96, 0.88, 0.76)  # of the radius at the further joints and the tip
+TAPER = (0.96, 0.88, 0.76)  # radii at the further joints and the tip, relative to the knuckle's
 MILLIMETRE = 1e-3  # metres; the fingers' tables are in millimetres
 
 

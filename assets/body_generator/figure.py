@@ -22,7 +22,7 @@ def distance(points: Floats) -> Floats:
 
 def gradient(points: Floats) -> Floats:
     """Return the gradient (N, 3) of `distance` by central differences."""
-    step = 2e-4  # metres; well under the smallest feature, well over rounding
+    step = 2e-4  # metres; well below the smallest feature, well above rounding errors
     slopes = np.empty_like(points)
     for axis in range(3):
         shift = np.zeros(3)
@@ -32,7 +32,7 @@ def gradient(points: Floats) -> Floats:
 
 
 def project(points: Floats) -> Floats:
-    """Move points onto the surface: a few damped Newton steps."""
+    """Move points onto the surface by a few damped Newton steps."""
     for _ in range(3):
         slope = gradient(points)
         square = np.maximum(np.einsum("ni,ni->n", slope, slope), 0.25)

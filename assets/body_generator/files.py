@@ -1,4 +1,4 @@
-"""Round the arrays and write them in SMPL's layout."""
+"""Rounding of the arrays, and writing in SMPL's layout."""
 
 from pathlib import Path
 
@@ -8,32 +8,32 @@ from generator_tools.shapes import Floats
 from .joints import PARENTS
 from .shape import DIRECTIONS
 
-PLACE = 1e-5  # metres; steps of the template
-SHAPE_LEVELS = 2.0**15  # steps a metre of the shape directions
-POSE_LEVELS = 2.0**13  # and of the pose directions
-FEWEST = 2  # pose directions of fewer steps are dropped
+PLACE = 1e-5  # metres; rounding step of the template
+SHAPE_LEVELS = 2.0**15  # rounding steps per metre of the shape directions
+POSE_LEVELS = 2.0**13  # rounding steps per metre of the pose directions
+FEWEST = 2  # pose directions with fewer steps are dropped
 TEXCOORD_LEVELS = 2.0**14
 
 
 def rounded_places(points: Floats) -> Floats:
-    """Round positions to whole `PLACE` steps as float32 holds them."""
+    """Round positions to multiples of `PLACE`, as stored in float32."""
     return (np.round(points / PLACE) * PLACE).astype(np.float32).astype(float)
 
 
 def rounded_shapes(directions: Floats) -> np.ndarray:
-    """Round shape directions to whole steps."""
+    """Round shape directions to multiples of their step."""
     return (np.round(directions * SHAPE_LEVELS) / SHAPE_LEVELS).astype(np.float32)
 
 
 def rounded_poses(columns: Floats) -> np.ndarray:
-    """Round pose directions to whole steps and drop the faintest."""
+    """Round pose directions to multiples of their step and drop the smallest."""
     steps = np.round(columns * POSE_LEVELS)
     steps[np.abs(steps) < FEWEST] = 0
     return (steps / POSE_LEVELS).astype(np.float16)
 
 
 def rounded_rows(matrix: Floats) -> np.ndarray:
-    """Round the regressor; its rows still sum to one."""
+    """Round the regressor so that its rows still sum to 1."""
     return (matrix / matrix.sum(axis=1, keepdims=True)).astype(np.float32)
 
 

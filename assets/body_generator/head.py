@@ -119,7 +119,7 @@ def _mouth() -> list[Part]:
             (0.0245, 1.5242, 0.0855, 0.0022),
         ]
     )
-    # The slit's middle keeps just outside the lips: inside, it would tunnel to the corners.
+    # The slit's middle stays just outside the lips: inside, it would leave a tunnel at the corners.
     slit = tube(
         [
             (0.0000, 1.5248, 0.1053, 0.0028),

@@ -3,7 +3,7 @@
 import numpy as np
 from generator_tools.shapes import Floats
 
-# name, parent, centre; a paired joint is written once, for the left side.
+# Name, parent, centre; paired joints are listed once, for the left side.
 _TABLE = (
     ("pelvis", "", (0.0, 0.950, -0.020)),
     ("hip", "pelvis", (0.0860, 0.8850, -0.0050)),
@@ -47,7 +47,7 @@ def _other(name: str) -> str:
     return f"{swapped[side]}_{rest}" if side in swapped else name
 
 
-# Each joint's partner on the other side; a middle joint's is itself.
+# Each joint's partner on the other side; a middle joint is its own partner.
 PARTNERS = np.array([NAMES.index(_other(name)) for name in NAMES])
 
 

@@ -1,4 +1,4 @@
-"""A shape given by its cross-sections, and the parts that a figure is blended from."""
+"""Shapes defined by cross-sections, and the parts that a figure is blended from."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from generator_tools.shapes import FAR, Ellipsoid, Floats, Tube, smooth_max
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-CAP = 0.012  # metres; rounding of a loft's flat ends
+CAP = 0.012  # metres; rounding radius of a loft's flat ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,15 +17,15 @@ class Loft:
     Parameters
     ----------
     axis : int
-        The coordinate along which the sections follow each other; the other two, in ascending
-        order, are a section's own.
+        The coordinate along which the sections are stacked; the other two, in ascending order, are
+        the coordinates of a section.
     places : (S,)
         Ascending positions of the sections along the axis.
     sections : callable
-        Maps positions (N,) to rows (N, 7): the middle (2), the radii towards +first, -first,
-        +second, -second (4), and the exponent: 2 is an ellipse, more is boxier.
+        Maps positions (N,) to rows (N, 7): centre (2), radii towards +first, -first, +second,
+        -second (4), and the exponent: 2 gives an ellipse, larger ones are boxier.
     reach : (2, 3)
-        Box outside of which the distance is only `FAR`.
+        Box outside which the distance is only approximate, see `FAR`.
     """
 
     axis: int
@@ -34,7 +34,7 @@ class Loft:
     reach: Floats
 
     def distance(self, points: Floats) -> Floats:
-        """Return the distance to the section at each point's place, to first order."""
+        """Return the first-order distance to the section at each point's axis coordinate."""
         result = np.full(len(points), FAR)
         near = np.all((points > self.reach[0]) & (points < self.reach[1]), axis=1)
         if not near.any():
@@ -71,14 +71,14 @@ def loft(axis: int, rows: ArrayLike) -> Loft:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A shape in a frame of its own: turned by ``rotation`` (3, 3), then moved to ``origin``."""
+    """A shape in its own frame: rotated by ``rotation`` (3, 3), then moved to ``origin``."""
 
     shape: "Shape"
     rotation: Floats
     origin: Floats
 
     def distance(self, points: Floats) -> Floats:
-        """Return the shape's distance at the points as its own frame sees them."""
+        """Return the shape's distance at the points, transformed to its frame."""
         return self.shape.distance((points - self.origin) @ self.rotation)
 
 
@@ -87,7 +87,7 @@ Shape = Tube | Ellipsoid | Loft | Placed
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A shape, the width of its blend with what stands before it, and whether it is cut out."""
+    """A shape, the width of its blend with the parts before it, and whether it is subtracted."""
 
     shape: Shape
     blend: float
@@ -97,7 +97,7 @@ class Part:
 def ball(
     x: float, y: float, z: float, radii: float | tuple[float, float, float], pitch: float = 0.0
 ) -> Ellipsoid:
-    """Return an ellipsoid at a place; one radius makes it a sphere."""
+    """Return an ellipsoid at a point; with a single radius, a sphere."""
     three = radii if isinstance(radii, tuple) else (radii,) * 3
     return Ellipsoid((x, y, z), three, pitch)
 
@@ -113,6 +113,6 @@ def turn(axis: int, degrees: float) -> Floats:
 
 
 def placed(parts: list[Part], rotation: Floats, origin: ArrayLike) -> list[Part]:
-    """Move parts that were modelled in a frame of their own."""
+    """Place parts that were modelled in their own frame."""
     at = np.asarray(origin, dtype=float)
     return [Part(Placed(part.shape, rotation, at), part.blend, part.cut) for part in parts]

@@ -1,4 +1,4 @@
-"""The forward pass of a body in SMPL's layout, without its blend shapes."""
+"""Posing of a body in SMPL's layout, without its blend shapes."""
 
 import numpy as np
 from generator_tools.shapes import Floats
@@ -7,7 +7,7 @@ from .joints import PARENTS
 
 
 def rotation(vectors: Floats) -> Floats:
-    """Turn axis-angle vectors (..., 3) into matrices (..., 3, 3)."""
+    """Convert axis-angle vectors (..., 3) to matrices (..., 3, 3)."""
     vectors = np.asarray(vectors, dtype=float)
     square = np.sum(vectors**2, axis=-1)[..., None, None]
     angle = np.sqrt(np.maximum(square, 1e-30))

@@ -8,10 +8,10 @@ from scipy.optimize import nnls
 
 from .joints import CENTRES, NAMES, PARTNERS
 
-EXACT = 1e3  # how much more a centre's error costs than uneven weights
-FOLLOW = 30.0  # and its error under a shape direction
-SMALLEST = 1e-4  # weights below are dropped
-MOST = 64  # vertices of a ring
+EXACT = 1e3  # weight of a centre's error relative to uneven weights
+FOLLOW = 30.0  # the same for its error under a shape direction
+SMALLEST = 1e-4  # smaller weights are dropped
+MOST = 64  # maximum number of vertices in a ring
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ def _chosen(vertices: Floats, j: int) -> np.ndarray:
     offset = vertices - CENTRES[j]
     unit = np.asarray(ring.normal) / np.linalg.norm(ring.normal)
     near = np.linalg.norm(offset, axis=1) < ring.radius
-    if side:  # the rings of a pair keep to their own side
+    if side:  # rings of paired joints stay on their own side
         near &= vertices[:, 0] >= 0
     away = np.abs(offset @ unit)
     chosen = np.nonzero(near & (away < ring.band))[0]
@@ -56,7 +56,7 @@ def _chosen(vertices: Floats, j: int) -> np.ndarray:
 
 
 def _solve(vertices: Floats, shapes: Floats, moved: Floats, j: int) -> tuple[np.ndarray, Floats]:
-    """Return the vertices and weights of one joint; ``moved`` (J, 3, S) is how centres follow."""
+    """Return the vertices and weights of one joint, whose centres move by ``moved`` (J, 3, S)."""
     chosen = _chosen(vertices, j)
     even = 1 / len(chosen)
     follow = FOLLOW * shapes[chosen].reshape(len(chosen), -1).T
@@ -88,11 +88,11 @@ def regress(vertices: Floats, partner: np.ndarray, shapes: Floats, moved: Floats
     ----------
     vertices : (V, 3)
     partner : (V,)
-        Each vertex' mirrored partner.
+        Mirror partner of each vertex.
     shapes : (V, 3, S)
         Shape directions.
     moved : (24, 3, S)
-        How the centres should follow them.
+        Target displacements of the centres.
     """
     matrix = np.zeros((len(NAMES), len(vertices)))
     for j, other in enumerate(PARTNERS):

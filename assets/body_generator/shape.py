@@ -1,7 +1,7 @@
-"""Shape directions: what one standard deviation of a measure does to the figure.
+"""Shape directions: the effect of one standard deviation of a measurement on the figure.
 
-A direction stretches the bones, which moves everything that hangs on them, and swells soft
-places. Stretches follow the skin weights, so they are as smooth as those.
+A direction stretches bones, which moves everything attached to them, and swells soft tissue.
+Stretches are blended by the skin weights, so they are equally smooth.
 """
 
 from dataclasses import dataclass, field
@@ -12,12 +12,12 @@ from generator_tools.shapes import Floats
 from .joints import CENTRES, NAMES, PARENTS
 
 Triple = tuple[float, float, float]
-MIDDLE = (0.0, 1.19, 0.0)  # metres; the place that a growing figure grows from
+MIDDLE = (0.0, 1.19, 0.0)  # metres; the fixed point of a growing figure
 
 
 @dataclass(frozen=True, slots=True)
 class Swell:
-    """Push (metres a deviation) the skin around a place, fading out over three radii."""
+    """Displacement of the skin around a point, metres per deviation, zero beyond three radii."""
 
     place: Triple
     radii: Triple
@@ -31,7 +31,7 @@ class Swell:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """One shape direction: relative stretches along x, y, z by joint, and swellings."""
+    """One shape direction: relative stretch along x, y, z per joint, and swellings."""
 
     name: str
     stretch: dict[str, Triple]
@@ -164,7 +164,7 @@ DIRECTIONS = (
 
 
 def _stretches(direction: Direction) -> Floats:
-    """Return the stretch (J, 3) of each joint's own frame."""
+    """Return the stretch (J, 3) in each joint's own frame."""
     rows = np.zeros((len(NAMES), 3))
     for j, name in enumerate(NAMES):
         side, _, kind = name.rpartition("_")
@@ -173,7 +173,7 @@ def _stretches(direction: Direction) -> Floats:
 
 
 def _centre_moves(stretches: Floats) -> Floats:
-    """Return how the centres (J, 3) move: the root grows from `MIDDLE`, the rest hangs on."""
+    """Return the displacements (J, 3) of the centres: the root grows from `MIDDLE`."""
     moves = np.empty_like(CENTRES)
     for j, parent in enumerate(PARENTS):
         if parent < 0:

@@ -1,4 +1,4 @@
-"""The figure's closed triangle mesh: half polygonised, remeshed, mirrored."""
+"""The figure's closed triangle mesh: one half is polygonised, remeshed and mirrored."""
 
 import numpy as np
 from generator_tools.polygonise import planes, polygonise
@@ -11,7 +11,7 @@ from .figure import distance, project
 STEPS = (0.0056, 0.0026)  # metres between grid planes, coarse and fine
 LARGEST = 0.0245  # metres; edge length on the trunk and thighs
 GROWTH = 0.20  # metres of edge length per metre from the nearest detail
-# Centre, radius and edge length of the balls that need finer triangles.
+# Centre, radius and edge length of balls with finer triangles.
 DETAILS = (
     ((0.0315, 1.5910, 0.0930), 0.0160, 0.0027),
     ((0.0100, 1.5250, 0.1000), 0.0180, 0.0033),
@@ -49,7 +49,7 @@ DETAILS = (
 
 
 def wanted_length(points: Floats) -> Floats:
-    """Return the edge length (N,) wanted at each point."""
+    """Return the target edge length (N,) at each point."""
     return graded_length(points, LARGEST, GROWTH, DETAILS)
 
 
@@ -62,13 +62,14 @@ def _grid() -> list[Floats]:
 
 
 def model() -> tuple[Floats, np.ndarray, np.ndarray]:
-    """Return vertices (V, 3), triangles (F, 3) and each vertex' mirrored partner (V,)."""
+    """Return vertices (V, 3), triangles (F, 3) and the mirror partner of each vertex (V,)."""
     half, triangles = drop_unused(*polygonise(distance, _grid()))
     half, triangles = remesh(half, triangles, wanted_length, project)
     vertices, triangles, source = mirror(half, triangles)
     partner = np.arange(len(vertices))
     partner[len(half) :] = source[len(half) :]
     partner[source[len(half) :]] = np.arange(len(half), len(vertices))
-    if len(vertices) - len(triangles) // 2 != 2:  # Euler's formula for a closed mesh
+    # Euler's formula for a closed mesh without tunnels.
+    if len(vertices) - len(triangles) // 2 != 2:
         raise ValueError("the surface has a tunnel")
     return vertices, triangles, partner

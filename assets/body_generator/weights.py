@@ -1,8 +1,8 @@
-"""Skin weights: a smooth step across each joint, handed down the skeleton, then diffused.
+"""Skin weights: a smooth step across each joint, multiplied down the hierarchy, then diffused.
 
-The share of everything that hangs on a joint is its parent's share times a step along a direction
-through the joint, so the shares are nested and sum to one by themselves. Heat diffusion over the
-surface then evens them without a jump across a gap: neither between the legs nor the fingers.
+The total weight of a joint and all joints below it is its parent's total times a step along a
+direction through the joint, so the totals are nested and the weights sum to 1. Heat diffusion over
+the surface then smooths them without crossing gaps, as between the legs or the fingers.
 """
 
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ from scipy.sparse.linalg import splu
 
 from .joints import NAMES, PARENTS, PARTNERS
 
-DIFFUSION = 0.013  # metres; how far the weights spread
-MOST = 4  # joints of one vertex
-LEVELS = 4096  # weights are whole multiples of one of these
+DIFFUSION = 0.013  # metres; distance over which the weights spread
+MOST = 4  # joints per vertex
+LEVELS = 4096  # weights are multiples of the inverse of this
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """From 0 to 1 along ``direction``, one half at ``place``, over ``half`` metres each way."""
+    """A smooth step from 0 to 1 along ``direction``: 1/2 at ``place``, ``half`` metres each way."""
 
     place: tuple[float, float, float]
     direction: tuple[float, float, float]
     half: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Return the share (N,)."""
+        """Return the values (N,) of the step."""
         unit = np.asarray(self.direction) / np.linalg.norm(self.direction)
         t = np.clip(0.5 + 0.5 * (points - self.place) @ unit / self.half, 0, 1)
         return t * t * (3 - 2 * t)
@@ -53,14 +53,14 @@ STEPS = {
 }
 BESIDE_NECK = Step((0.100, 0, 0), (-1, 0, 0), 0.045)
 BESIDE_SPINE = Step((0.075, 0, 0), (1, 0, 0), 0.060)
-CROTCH = 0.805  # metres above the floor; below it the inner thighs are the legs' alone
+CROTCH = 0.805  # metres above the floor; the inner thighs below follow the legs only
 BETWEEN = Step((0.033, 0, 0), (1, 0, 0), 0.040)
 BELOW_WAIST = Step((0, 1.12, 0), (0, -1, 0), 0.050)
-NAPE = 1.44  # metres above the floor; higher up the neck's share has no sides
+NAPE = 1.44  # metres above the floor; above it the neck's step is not limited sideways
 
 
 def _gate(name: str, points: Floats) -> Floats:
-    """Return what else a joint's step (N,) is multiplied with."""
+    """Return a further factor (N,) of a joint's step."""
     x, y, _ = points.T
     if name == "hip":
         moved = points.copy()
@@ -76,32 +76,32 @@ def _gate(name: str, points: Floats) -> Floats:
     return np.ones(len(points))
 
 
-def _shares(vertices: Floats) -> Floats:
-    """Return for each joint (V, J) how much of a vertex it and all below it move."""
-    shares = np.ones((len(vertices), len(NAMES)))
+def _totals(vertices: Floats) -> Floats:
+    """Return the total weight (V, J) of each joint and all joints below it."""
+    totals = np.ones((len(vertices), len(NAMES)))
     left = vertices * np.where(vertices[:, :1] < 0, [[-1, 1, 1]], 1)
     for j, (name, parent) in enumerate(zip(NAMES, PARENTS, strict=True)):
         if parent < 0:
             continue
         side, _, kind = name.rpartition("_")
         kind = kind if side else name
-        share = STEPS[kind](left) * _gate(kind, left)
+        step = STEPS[kind](left) * _gate(kind, left)
         if side:
             sign = 1 if side == "left" else -1
-            share = np.where(sign * vertices[:, 0] < 0, 0, share)
-        shares[:, j] = shares[:, parent] * share
-    return shares
+            step = np.where(sign * vertices[:, 0] < 0, 0, step)
+        totals[:, j] = totals[:, parent] * step
+    return totals
 
 
 def _limited(weights: Floats) -> Floats:
-    """Keep the `MOST` largest of each row, fading the rest out without a jump."""
+    """Keep the `MOST` largest of each row, fading out the others without a jump."""
     next_largest = np.sort(weights, axis=1)[:, -MOST - 1]
     weights = np.maximum(weights - next_largest[:, None], 0)
     return weights / weights.sum(axis=1, keepdims=True)
 
 
 def _rounded(weights: Floats) -> Floats:
-    """Round to whole levels that still sum to one in each row."""
+    """Round to discrete levels that still sum to 1 in each row."""
     units = np.round(weights * LEVELS)
     rows = np.arange(len(weights))
     units[rows, weights.argmax(axis=1)] += LEVELS - units.sum(axis=1)
@@ -109,12 +109,12 @@ def _rounded(weights: Floats) -> Floats:
 
 
 def skin_weights(vertices: Floats, triangles: np.ndarray, partner: np.ndarray) -> Floats:
-    """Return weights (V, 24), exactly mirrored, at most `MOST` to a vertex."""
-    shares = _shares(vertices)
-    own = shares.copy()
+    """Return weights (V, 24), exactly mirrored, at most `MOST` per vertex."""
+    totals = _totals(vertices)
+    own = totals.copy()
     for j, parent in enumerate(PARENTS):
         if parent >= 0:
-            own[:, parent] -= shares[:, j]
+            own[:, parent] -= totals[:, j]
     stiffness, areas = cotangent_stiffness(vertices, triangles)
     system = (diags(areas) + DIFFUSION**2 * stiffness).tocsc()
     weights = np.asarray(splu(system).solve(areas[:, None] * own))
@@ -122,5 +122,5 @@ def skin_weights(vertices: Floats, triangles: np.ndarray, partner: np.ndarray) -
     weights = 0.5 * (weights + weights[partner][:, PARTNERS])
     weights = _limited(weights / weights.sum(axis=1, keepdims=True))
     weights = _rounded(weights)
-    # Rounding gives a tie on the midline to one side: half of it each.
+    # Rounding resolves ties on the midline in favour of one side: average both.
     return 0.5 * (weights + weights[partner][:, PARTNERS])

@@ -1,1 +1,1 @@
-"""Model, skin and paint the sample fox; one idea a module, driven by ``make_fox.py``."""
+"""Generator of the sample fox, run by ``make_fox.py``."""

@@ -1,16 +1,16 @@
-"""Unwrap the left half; the right half shares its texels, so the midline needs no seam."""
+"""Texture atlas of the left half; the right half shares it, so the midline needs no seam."""
 
 import numpy as np
 import xatlas
 from generator_tools.shapes import Floats
 
 HEAD = np.array([0.01, 0.485, 0.300])
-HEAD_SCALE = 1.1  # extra texels per metre at the face
+HEAD_SCALE = 1.1  # additional texel density at the face
 HEAD_REACH = 0.13  # metres
 
 
 def _magnify_head(vertices: Floats) -> Floats:
-    """Swell the head, so that an atlas with even density on the result favours the face."""
+    """Enlarge the head, so that an atlas of uniform density has more texels for the face."""
     away = vertices - HEAD
     distance = np.linalg.norm(away, axis=1, keepdims=True)
     return HEAD + away * (1 + HEAD_SCALE * np.exp(-((distance / HEAD_REACH) ** 2)))

@@ -1,4 +1,4 @@
-"""The fox as a list of shapes blended one after the other; metres, +Y up, facing +Z, left is +X."""
+"""Shapes that are blended in order to a fox; metres, +Y up, facing +Z, left is +X."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ NOSE = np.array([0.0, 0.4720, 0.3720])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A shape, the region whose joints may move it, its blend width, and whether it is cut out."""
+    """A shape, the region whose joints may move it, its blend width, and if it is subtracted."""
 
     region: str
     shape: Tube | Ellipsoid
@@ -56,7 +56,7 @@ def _torso() -> list[Part]:
 
 
 def _ruff() -> list[Part]:
-    """Pointed tufts that break the outline of the neck and chest."""
+    """Return pointed tufts that break up the outline of the neck and chest."""
     rows = [
         # x, y, z of the root, then of the point; radius of the root
         ((0.024, 0.350, 0.205), (0.032, 0.268, 0.215), 0.030),
@@ -107,7 +107,7 @@ def _head() -> list[Part]:
 
 
 def _face() -> list[Part]:
-    """Return the mouth slit, the eyes and the nose, after everything they sit on."""
+    """Return the mouth slit, the eyes and the nose, which follow the shapes beneath them."""
     slit = tube(
         [
             (0, 0.4622, 0.305, 0.0018),
@@ -242,7 +242,7 @@ def distance(points: Floats) -> Floats:
 
 def gradient(points: Floats) -> Floats:
     """Return the unit gradient (N, 3) of `distance` by central differences."""
-    step = 4e-4  # metres; well under the smallest feature, well over rounding
+    step = 4e-4  # metres; well below the smallest feature, well above rounding errors
     slopes = np.empty_like(points)
     for axis in range(3):
         shift = np.zeros(3)
@@ -252,7 +252,7 @@ def gradient(points: Floats) -> Floats:
 
 
 def regions(points: Floats) -> np.ndarray:
-    """Return for each point the index in `REGIONS` of the nearest shape that is not a cut."""
+    """Return for each point the index in `REGIONS` of the nearest shape that is not subtracted."""
     folded = fold(points)
     nearest = np.full((len(REGIONS), len(points)), np.inf)
     for part in PARTS:

@@ -1,17 +1,17 @@
-"""The boxes drawn for the joints: each hugs the vertices that follow its joint most."""
+"""Boxes drawn for the joints, each around the vertices that its joint influences most."""
 
 import numpy as np
 from generator_tools.shapes import Floats
 
 from .skeleton import Joint
 
-TRIM = 6.0  # percent of the vertices left outside at each side
+TRIM = 6.0  # percentage of the vertices outside the box on each side
 # A skull box and a muzzle box read as a fox; one box around the whole head would not.
 FIXED = {
     "head": ((-0.060, 0.452, 0.205), (0.060, 0.548, 0.308)),
     "jaw": ((-0.024, 0.438, 0.300), (0.024, 0.484, 0.382)),
 }
-LEAST = 0.006  # metres; half the thickness that a box has at least
+LEAST = 0.006  # metres; half the minimum thickness of a box
 
 
 def fit_boxes(vertices: Floats, weights: Floats, table: list[Joint]) -> Floats:

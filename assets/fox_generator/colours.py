@@ -1,4 +1,4 @@
-"""The colour of the fox at any point of its surface; sRGB in 0..1."""
+"""Colour of the fox as a function of the surface point; sRGB in 0..1."""
 
 import numpy as np
 from generator_tools.shapes import Floats
@@ -19,7 +19,7 @@ TONGUE = np.array([0.72, 0.33, 0.30])
 AMBER = np.array([0.93, 0.60, 0.14])
 AMBER_DARK = np.array([0.58, 0.28, 0.05])
 
-# Where whiskers grow: y and z, either side.
+# Roots of the whiskers: y and z, on both sides.
 WHISKERS = ((0.4665, 0.338), (0.4640, 0.346), (0.4690, 0.347), (0.4655, 0.354), (0.4615, 0.337))
 
 
@@ -141,7 +141,7 @@ def _eyes(points: Floats, colour: Floats) -> Floats:
     side /= np.linalg.norm(side)
     up = np.cross(gaze, side)
     u, v, front = q @ side, q @ up, q @ gaze
-    v = v - 0.17 * u  # slanted: the outer corner is higher
+    v = v - 0.17 * u  # slant: the outer corner is higher
     ahead = rise(0.0, 0.2, front)
     rim = np.hypot(u / 1.06, v / 0.87)
     colour = _over(colour, SOOT, rise(1.06, 0.98, rim) * ahead)

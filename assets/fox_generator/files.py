@@ -1,4 +1,4 @@
-"""Write the .skel and .skin text files."""
+"""Writers of the .skel and .skin files."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from .skeleton import POSE, Joint
 
 
 def _numbers(values: Floats, decimals: int) -> str:
-    """Format numbers, shortest form, without a minus before zero."""
+    """Format numbers in their shortest form, without a minus sign for zero."""
     rounded = np.round(np.asarray(values, dtype=float), decimals) + 0.0
     return " ".join(f"{value:.{decimals}f}".rstrip("0").rstrip(".") for value in rounded)
 
@@ -42,7 +42,7 @@ def write_skel(path: Path, table: list[Joint], boxes: Floats) -> None:
 
 
 def _rounded_weights(row: Floats) -> list[tuple[int, float]]:
-    """Return (joint, weight) pairs of whole thousandths that sum to one exactly."""
+    """Return (joint, weight) pairs in thousandths that sum to exactly 1."""
     chosen = np.nonzero(row)[0]
     exact = 1000 * row[chosen]
     units = np.floor(exact).astype(int)

@@ -1,4 +1,4 @@
-"""Noise drawn out along the fur: it gives the strokes and frays the edges between colours."""
+"""Noise stretched along the fur, for strokes and for frayed edges between colours."""
 
 import numpy as np
 from generator_tools.shapes import Floats

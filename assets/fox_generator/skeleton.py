@@ -17,9 +17,9 @@ class Joint:
     name, parent
         Names; the root's parent is empty.
     pivot, end : (3,)
-        World position in the bind pose, metres, and where the joint's body segment ends.
+        World position in the bind pose, and end of the joint's body segment; metres.
     region
-        The part of the surface that the joint may move; see `body.REGIONS`.
+        Part of the surface that the joint may move; see `body.REGIONS`.
     limits : (3, 2)
         Range of the x, y and z DOF in radians; equal bounds lock the DOF.
     """
@@ -159,7 +159,7 @@ LEFT = [
     ),
 ]
 
-# The stance in the file: x, y, z in radians; joints not named here stand as modelled.
+# The pose in the file: x, y, z in radians; joints not listed keep the modelled pose.
 POSE = {
     "spine_2": (0.0, 0.05, 0.0),
     "chest": (0.0, 0.05, 0.0),
@@ -193,7 +193,7 @@ def _tail() -> list[Joint]:
 
 
 def _mirrored(joint: Joint) -> Joint:
-    """Return the right twin of a left joint: x and the y and z DOFs change sign."""
+    """Return the right counterpart of a left joint: x and the y and z DOFs change sign."""
 
     def across(point: tuple[float, float, float]) -> tuple[float, float, float]:
         return (-point[0], point[1], point[2])
@@ -211,7 +211,7 @@ def _mirrored(joint: Joint) -> Joint:
 
 
 def joints() -> list[Joint]:
-    """Return all joints depth first, the order in which a .skel file numbers them."""
+    """Return all joints depth-first, as .skel files number them."""
     everything = [*MIDDLE, *_tail(), *LEFT, *map(_mirrored, LEFT)]
     ordered = [everything[0]]
 

@@ -1,4 +1,4 @@
-"""The fox's closed triangle mesh: half polygonised, remeshed, mirrored."""
+"""The fox's closed triangle mesh: one half is polygonised, remeshed and mirrored."""
 
 import numpy as np
 from generator_tools.remesh import drop_unused, remesh
@@ -10,7 +10,7 @@ from .polygonise import polygonise_half
 
 LARGEST = 0.0174  # metres; edge length on the torso and tail
 GROWTH = 0.22  # metres of edge length per metre from the nearest detail
-# Centre, radius and edge length of the balls that need finer triangles.
+# Centre, radius and edge length of balls with finer triangles.
 DETAILS = (
     ((0.0345, 0.5015, 0.3000), 0.014, 0.0038),
     ((0.0, 0.466, 0.365), 0.022, 0.0038),
@@ -30,7 +30,7 @@ DETAILS = (
 
 
 def wanted_length(points: Floats) -> Floats:
-    """Return the edge length (N,) wanted at each point."""
+    """Return the target edge length (N,) at each point."""
     return graded_length(points, LARGEST, GROWTH, DETAILS)
 
 
@@ -39,7 +39,7 @@ def _to_surface(points: Floats) -> Floats:
 
 
 def model_half() -> tuple[Floats, np.ndarray]:
-    """Return vertices and triangles of the left half, its rim exactly on x = 0."""
+    """Return vertices and triangles of the left half, with its rim exactly on x = 0."""
     vertices, triangles = polygonise_half()
     vertices, triangles = drop_unused(vertices, triangles)
     return remesh(vertices, triangles, wanted_length, _to_surface)

@@ -1,4 +1,4 @@
-"""Bake the painted colours into the atlas."""
+"""Baking of the painted colours into the atlas."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ COLOURS = 256  # palette size
 
 
 def crease_shade(vertices: Floats, normals: Floats) -> Floats:
-    """Return 0..1 per vertex: how open the surroundings along the normal are."""
+    """Return 0..1 per vertex: openness of the surroundings along the normal (ambient occlusion)."""
     shade = np.ones(len(vertices))
     for reach, strength in ((0.008, 9.0), (0.02, 5.0), (0.045, 3.2)):
         blocked = reach - distance(vertices + reach * normals)
@@ -26,7 +26,7 @@ def crease_shade(vertices: Floats, normals: Floats) -> Floats:
 
 
 def _cover(uv: Floats, size: int) -> tuple[np.ndarray, np.ndarray, Floats]:
-    """Return the texels (row, column) whose middle lies in the triangle, and their weights."""
+    """Return the texels (row, column) whose centre lies in the triangle, and their weights."""
     low = np.maximum(np.floor(uv.min(axis=0) - 1).astype(int), 0)
     high = np.minimum(np.ceil(uv.max(axis=0) + 1).astype(int), size - 1)
     columns, rows = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
@@ -36,7 +36,7 @@ def _cover(uv: Floats, size: int) -> tuple[np.ndarray, np.ndarray, Floats]:
         return rows.ravel()[:0], columns.ravel()[:0], np.empty((0, 3))
     bc = np.linalg.solve(edge, (at - uv[0]).T).T
     weights = np.column_stack([1 - bc.sum(axis=1), bc])
-    inside = weights.min(axis=1) > -1e-6  # rounding; a texel on an edge belongs to both sides
+    inside = weights.min(axis=1) > -1e-6  # tolerance: a texel on an edge belongs to both triangles
     return rows.ravel()[inside], columns.ravel()[inside], weights[inside]
 
 
@@ -57,13 +57,13 @@ def bake(
     unit = texels[:, 3:6] / np.linalg.norm(texels[:, 3:6], axis=1, keepdims=True)
     image[filled] = paint(texels[:, :3], unit, texels[:, 6])
     away, nearest = distance_transform_edt(~filled, return_indices=True)
-    # Beyond the reach of mip-mapping one colour keeps the file small.
+    # Texels too far from charts for mipmaps get a single colour, to keep the file small.
     image = np.where((away < MARGIN)[..., None], image[tuple(nearest)], image[filled].mean(axis=0))
     return Image.fromarray((image[::-1] * 255 + 0.5).astype(np.uint8))
 
 
 def _palette(image: np.ndarray) -> np.ndarray:
-    """Choose `COLOURS` colours (C, 3), rare ones favoured: an eye is small but matters."""
+    """Choose `COLOURS` colours (C, 3), favouring rare ones: an eye is small but important."""
     _, inverse, counts = np.unique(
         (image // 6) @ [4096, 64, 1], return_inverse=True, return_counts=True
     )

@@ -1,4 +1,4 @@
-"""Skin weights by heat diffusion over the surface, so that no weight jumps across a gap.
+"""Skin weights by heat diffusion over the surface, which does not cross gaps.
 
 Baran and Popovic 2007, "Automatic Rigging and Animation of 3D Characters", section 4:
 (-Laplacian + H) w = H p, with p = 1 at the joint nearest to a vertex and H = 1 / distance^2.
@@ -13,17 +13,17 @@ from scipy.sparse.linalg import splu
 from .body import REGIONS, regions
 from .skeleton import Joint, segments
 
-CONTRAST = 1.3  # exponent that thins out the long faint ends of the diffusion
-INNER_LEG = 0.022  # metres from the midline where legs begin
-SMALLEST = 0.006  # weights under this are dropped
-# How far a region's joints blend into each other, in limb radii.
+CONTRAST = 1.3  # exponent that attenuates the long tails of the diffusion
+INNER_LEG = 0.022  # distance in metres from the midline at which legs begin
+SMALLEST = 0.006  # smaller weights are dropped
+# Blending distance between the joints of a region, in limb radii.
 SPREAD = {"torso": 0.75, "neck": 0.8, "head": 0.5, "jaw": 0.35, "ear": 0.8, "tail": 0.8}
 
 
 def _allowed(vertices: Floats, table: list[Joint]) -> np.ndarray:
-    """Tell (V, J) which joints a vertex may belong to: same region, same side of the body."""
+    """Return a mask (V, J) of the joints that may influence a vertex: same region, same side."""
     own = np.array(REGIONS)[regions(vertices)]
-    # Between the legs the trunk's underside is nearer to a leg's shape than to its own.
+    # Between the legs the underside of the trunk is nearer to the legs' shapes than to its own.
     own[np.isin(own, ("fore", "hind")) & (np.abs(vertices[:, 0]) < INNER_LEG)] = "torso"
     allowed = own[:, None] == np.array([joint.region for joint in table])
     side = np.array([joint.name[-2:] for joint in table])
@@ -36,7 +36,7 @@ def diffuse_weights(vertices: Floats, triangles: np.ndarray, table: list[Joint])
     """Return weights (V, J) that sum to 1, for a closed mesh of vertices welded at seams."""
     reach = segment_distances(vertices, *segments(table))
     allowed = _allowed(vertices, table)
-    # A vertex on the midline in a paired region falls to whatever is nearest in the middle.
+    # A midline vertex in a paired region is assigned to the nearest joint on the midline.
     alone = ~allowed.any(axis=1)
     allowed[alone] = [joint.name[-2:] not in ("_l", "_r") for joint in table]
     owner = np.where(allowed, reach, np.inf).argmin(axis=1)

@@ -1,1 +1,1 @@
-"""What the generators of the bundled figures share: shapes, polygons, remeshing, diffusion."""
+"""Tools shared by the generators of the bundled figures: shapes, remeshing, diffusion."""

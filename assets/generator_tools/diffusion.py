@@ -36,7 +36,7 @@ def cotangent_stiffness(vertices: Floats, triangles: np.ndarray) -> tuple[csr_ma
 
 
 def averaging(triangles: np.ndarray, n: int) -> csr_matrix:
-    """Return the matrix (n, n) that replaces each value by half itself, half its neighbours."""
+    """Return the matrix (n, n) that averages each value with the mean of its neighbours."""
     i = np.concatenate([triangles, np.roll(triangles, -1, axis=1)], axis=1).ravel()
     j = np.concatenate([np.roll(triangles, -1, axis=1), triangles], axis=1).ravel()
     links = coo_matrix((np.ones(len(i)), (i, j)), shape=(n, n)).tocsr()

@@ -8,14 +8,14 @@ from skimage.measure import marching_cubes
 
 from .shapes import Floats
 
-BLOCK = 4  # grid cells per edge of the blocks that are skipped when far from the surface
+BLOCK = 4  # grid cells per side of a block, which is skipped if far from the surface
 Distance = Callable[[Floats], Floats]
 
 
 def planes(
     start: float, stop: float, fine: list[tuple[float, float]], steps: tuple[float, float]
 ) -> Floats:
-    """Return ascending coordinates, ``steps`` (coarse, fine) apart: fine in some intervals."""
+    """Return ascending coordinates at spacings ``steps`` (coarse, fine), fine in some intervals."""
     coarse, small = steps
     places = [start]
     while places[-1] < stop:
@@ -58,7 +58,7 @@ def polygonise(distance: Distance, axes: list[Floats]) -> tuple[Floats, np.ndarr
     pieces, _ = label(grid < 0)
     inside = pieces == np.bincount(pieces[pieces > 0]).argmax()
     grid = np.where((grid < 0) & ~inside, 1e-4, grid)
-    # skimage winds triangles clockwise for inside-negative fields unless told that values descend.
+    # For fields that are negative inside, skimage winds triangles clockwise unless told otherwise.
     indices, triangles, _, _ = marching_cubes(grid, 0.0, gradient_direction="descent")
     vertices = np.stack(
         [np.interp(indices[:, a], np.arange(len(axes[a])), axes[a]) for a in range(3)], axis=1

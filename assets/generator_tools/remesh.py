@@ -1,7 +1,7 @@
-"""Even triangles: split long edges, collapse short ones, flip for valence 6, relax on the surface.
+"""Isotropic remeshing: split long edges, collapse short ones, flip for valence 6, relax.
 
-Botsch and Kobbelt 2004, "A Remeshing Approach to Multiresolution Modeling", with every pass
-done on a set of independent edges at once. The mesh is one half, open along the plane x = 0.
+Botsch and Kobbelt 2004, "A Remeshing Approach to Multiresolution Modeling", with each pass applied
+to a set of independent edges at once. The mesh is one half, open along the plane x = 0.
 """
 
 from collections.abc import Callable
@@ -29,12 +29,12 @@ class Edges:
 
     @property
     def is_boundary(self) -> np.ndarray:
-        """Tell which edges have one face."""
+        """Return a mask of the edges with a single face."""
         return self.faces[:, 1] < 0
 
 
 def find_edges(triangles: Ints) -> Edges:
-    """List the edges of an edge-manifold mesh."""
+    """Return the edges of an edge-manifold mesh."""
     directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     apex = np.concatenate([triangles[:, 2], triangles[:, 0], triangles[:, 1]])
     face = np.tile(np.arange(len(triangles)), 3)
@@ -60,7 +60,7 @@ def face_normals(vertices: Floats, triangles: Ints) -> Floats:
 
 
 def _relative_lengths(vertices: Floats, ends: Ints, size: Sizing) -> Floats:
-    """Edge lengths divided by the wanted length at their middle."""
+    """Return edge lengths relative to the target length at their midpoints."""
     a, b = vertices[ends[:, 0]], vertices[ends[:, 1]]
     return np.linalg.norm(a - b, axis=1) / size(0.5 * (a + b))
 
@@ -72,7 +72,7 @@ def _adjacency(edges: Edges, n: int) -> csr_matrix:
 
 
 def split_long(vertices: Floats, triangles: Ints, size: Sizing) -> tuple[Floats, Ints]:
-    """Halve every edge longer than 4/3 of the wanted length that is its faces' longest."""
+    """Halve edges that are the longest of their faces and exceed 4/3 of the target length."""
     edges = find_edges(triangles)
     ratio = _relative_lengths(vertices, edges.ends, size)
     longest = np.zeros(len(triangles) + 1)
@@ -96,9 +96,9 @@ def split_long(vertices: Floats, triangles: Ints, size: Sizing) -> tuple[Floats,
 
 
 def _independent(edges: Edges, candidates: Ints, ratio: Floats, n: int) -> Ints:
-    """Choose candidates, shortest first, no two of which touch one triangle."""
+    """Choose candidates, shortest first, of which no two are adjacent to the same triangle."""
     rank = np.full(len(edges.ends), np.inf)
-    # Ranks spread by hashing: sorted lengths alone would choose few edges a pass.
+    # Ranks are spread by hashing, as sorted lengths alone would choose few edges per pass.
     scatter = (candidates * 2654435761 % 4294967296) / 4294967296
     rank[candidates] = np.round(ratio[candidates] * 4) + scatter
     near = np.full(n, np.inf)
@@ -111,7 +111,7 @@ def _independent(edges: Edges, candidates: Ints, ratio: Floats, n: int) -> Ints:
 
 
 def collapse_short(vertices: Floats, triangles: Ints, size: Sizing) -> tuple[Floats, Ints]:
-    """Merge the ends of edges shorter than 4/5 of the wanted length where topology allows."""
+    """Collapse edges shorter than 4/5 of the target length where the topology allows it."""
     n = len(vertices)
     edges = find_edges(triangles)
     ratio = _relative_lengths(vertices, edges.ends, size)
@@ -145,7 +145,7 @@ def collapse_short(vertices: Floats, triangles: Ints, size: Sizing) -> tuple[Flo
 
 
 def _has_chord(triangles: Ints, on_rim: np.ndarray, rim_edges: Ints) -> np.ndarray:
-    """Tell which triangles join two rim vertices off the rim; mirrored, four faces would meet."""
+    """Return triangles with an inner edge between rim vertices; mirroring gives it four faces."""
     n = len(on_rim)
     rim_edges = np.sort(rim_edges, axis=1)
     sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
@@ -154,7 +154,7 @@ def _has_chord(triangles: Ints, on_rim: np.ndarray, rim_edges: Ints) -> np.ndarr
 
 
 def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
-    """Return mean unit face normals (V, 3), shorter than 1 where the surface is pointed."""
+    """Return area-weighted means of face normals (V, 3), shorter than 1 at pointed vertices."""
     faces = face_normals(vertices, triangles)
     areas = np.linalg.norm(faces, axis=1)
     total, area = np.zeros_like(vertices), np.full(len(vertices), 1e-15)
@@ -167,9 +167,9 @@ def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
 def _merged(
     vertices: Floats, ends: Ints, on_rim: np.ndarray, flatness: Floats
 ) -> tuple[Ints, Floats]:
-    """Return the vertex that each vertex becomes, and the moved positions.
+    """Return the vertex that each vertex is merged with, and the new positions.
 
-    Rim vertices stay, and so do pointed ones: a midpoint would wear the tips down.
+    Rim vertices keep their positions, and so do pointed ones: midpoints would wear down the tips.
     """
     target, moved = np.arange(len(vertices)), vertices.copy()
     keep, gone = ends.T
@@ -190,7 +190,7 @@ def drop_unused(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
 
 def flip_for_valence(vertices: Floats, triangles: Ints) -> Ints:
-    """Flip edges where that brings the four valences nearer to 6 (4 on the rim)."""
+    """Flip edges where that brings the four valences closer to 6 (4 on the rim)."""
     edges = find_edges(triangles)
     n = len(vertices)
     valence = np.bincount(edges.ends.ravel(), minlength=n)
@@ -217,7 +217,7 @@ def flip_for_valence(vertices: Floats, triangles: Ints) -> Ints:
 
 
 def _flipped(triangles: Ints, edges: Edges, chosen: Ints) -> tuple[Ints, Ints]:
-    """Return the two triangles on the other diagonal, winding kept."""
+    """Return the two triangles on the other diagonal, with the same winding."""
     first = triangles[edges.faces[chosen, 0]]
     c, d = edges.opposite[chosen].T
     start = np.argmax(first == c[:, None], axis=1)
@@ -227,7 +227,7 @@ def _flipped(triangles: Ints, edges: Edges, chosen: Ints) -> tuple[Ints, Ints]:
 
 
 def _flip_is_safe(vertices: Floats, triangles: Ints, edges: Edges, inner: Ints) -> np.ndarray:
-    """Tell which flips keep both triangles facing the way they did."""
+    """Return a mask of the flips after which both triangles still face the same way."""
     old = [face_normals(vertices, triangles[edges.faces[inner, i]]) for i in range(2)]
     new = [face_normals(vertices, t) for t in _flipped(triangles, edges, inner)]
     unit = [v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-15) for v in (*old, *new)]
@@ -239,7 +239,7 @@ def _flip_is_safe(vertices: Floats, triangles: Ints, edges: Edges, inner: Ints) 
 
 
 def relax(vertices: Floats, triangles: Ints, size: Sizing, project: Callable) -> Floats:
-    """Slide each vertex towards the weighted mean of its neighbours, then onto the surface."""
+    """Move each vertex towards the weighted mean of its neighbours, then onto the surface."""
     edges = find_edges(triangles)
     rim_edges = edges.ends[edges.is_boundary]
     on_rim = np.zeros(len(vertices), dtype=bool)
@@ -268,7 +268,7 @@ def relax(vertices: Floats, triangles: Ints, size: Sizing, project: Callable) ->
 def remesh(
     vertices: Floats, triangles: Ints, size: Sizing, project: Callable
 ) -> tuple[Floats, Ints]:
-    """Thin a fine mesh out to the wanted edge lengths, then even it."""
+    """Coarsen a fine mesh to the target edge lengths, then make it uniform."""
     for _ in range(80):
         before = len(vertices)
         vertices, triangles = collapse_short(vertices, triangles, size)

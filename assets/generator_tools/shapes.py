@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 Floats = NDArray[np.float64]
 
-MIRROR_SOFTNESS = 0.006  # metres; rounds the crease that mirroring leaves on the midline
-FAR = 0.12  # metres; beyond this from a shape's box its distance is only a bound
+MIRROR_SOFTNESS = 0.006  # metres; rounds the crease that mirroring would leave on the midline
+FAR = 0.12  # metres; beyond this distance from its box, a shape's distance is only a bound
 
 
 def fold(points: Floats) -> Floats:
@@ -29,7 +29,7 @@ def smooth_min(a: Floats, b: Floats, k: float) -> Floats:
 
 
 def smooth_max(a: Floats, b: Floats, k: float) -> Floats:
-    """Intersect two shapes with a rounded edge; the mirror image of `smooth_min`."""
+    """Intersect two shapes with a rounded edge; the counterpart of `smooth_min`."""
     return -smooth_min(-a, -b, k)
 
 
@@ -96,7 +96,7 @@ def tube(rows: ArrayLike, flat: float = 1.0, axis: ArrayLike = (1, 0, 0), sample
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ellipsoid:
-    """A ball with three radii, tipped about the x axis by ``pitch`` radians."""
+    """An ellipsoid rotated about the x axis by ``pitch`` radians."""
 
     centre: tuple[float, float, float]
     radii: tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""Operations on a surface that is modelled as a half and mirrored."""
+"""Operations on a surface that is modelled as one half and mirrored."""
 
 from collections.abc import Callable, Sequence
 
@@ -13,7 +13,7 @@ Detail = tuple[tuple[float, float, float], float, float]
 def graded_length(
     points: Floats, largest: float, growth: float, details: Sequence[Detail]
 ) -> Floats:
-    """Return the edge length (N,) wanted at each point.
+    """Return the target edge length (N,) at each point.
 
     ``largest``, or less near the balls of ``details`` (centre, radius, edge length inside), away
     from which the length grows by ``growth`` metres per metre.
@@ -26,7 +26,7 @@ def graded_length(
 
 
 def project(points: Floats, distance: Callable, gradient: Callable) -> Floats:
-    """Move points to the zero level of the distance, a few damped Newton steps."""
+    """Move points to the zero level of the distance by a few damped Newton steps."""
     for _ in range(3):
         step = np.clip(distance(points), -0.003, 0.003)
         points = points - step[:, None] * gradient(points)
@@ -34,7 +34,7 @@ def project(points: Floats, distance: Callable, gradient: Callable) -> Floats:
 
 
 def mirror(vertices: Floats, triangles: np.ndarray) -> tuple[Floats, np.ndarray, np.ndarray]:
-    """Close a half mesh; also return the half's vertex that each vertex copies."""
+    """Return the closed mesh of a half, and the vertex of the half that each vertex copies."""
     on_rim = vertices[:, 0] == 0
     others = np.nonzero(~on_rim)[0]
     image = np.arange(len(vertices))

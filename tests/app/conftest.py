@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from app import box_body
+from app.curves.plotted import SIZE, clip_text
 from app.driver import Driver
 from app.tiny import write_rig
 from formats.synthetic_smpl import model
@@ -58,15 +59,22 @@ def drive_body(drive, tmp_path):
 
 
 @pytest.fixture
-def box(drive_body):
-    """A hand on an app that shows the box, with all of its panels in reach."""
-    return drive_body()
+def curves(drive, rig, tmp_path):
+    """A hand on the Curves panel of the tiny rig; the arm's curves are shown."""
+    (tmp_path / "wave.anim").write_text(clip_text())
+    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
+    hand.show_panel("Curves")
+    hand.state.selected_joint = 1
+    hand.step(3)
+    hand.click("curve arm.x")
+    hand.step(3)
+    return hand
 
 
 @pytest.fixture
-def quick_fits(monkeypatch):
-    """Fits take a quarter of the usual time, and are nearly as good."""
-    monkeypatch.setattr("viewer.autorig.alignment.surface_alignment.SAMPLES", 500)
+def box(drive_body):
+    """A hand on an app that shows the box, with all of its panels in reach."""
+    return drive_body()
 
 
 @pytest.fixture

@@ -45,6 +45,10 @@ class Driver:
         As for ``HeadlessApp``.
     samples : int
         Of multisampling: 4 as in the window takes ten times as long without a graphics card.
+    scene : Scene, optional
+        Shown in place of files.
+    layout : str
+        Places of panels as ImGui remembers them.
     """
 
     def __init__(
@@ -55,6 +59,7 @@ class Driver:
         pixels_per_point=1.0,
         samples=1,
         scene=None,
+        layout="",
     ):
         scene = scene or viewer.load(*paths)
         self.state = make_state(scene, paths, samples)
@@ -62,13 +67,22 @@ class Driver:
         self.io = imgui.get_io()
         # Clicks of a test follow each other quickly: only double_click means two as one.
         self.io.mouse_double_click_time = 1e-4
-        self.step(4)
+        self._is_open = True
+        imgui.load_ini_settings_from_memory(layout)
+        try:
+            self.step(4)
+        except BaseException:
+            # One that stays open makes all later tests fail.
+            self.close()
+            raise
 
     def step(self, frames=1):
         self.app.step(frames)
 
     def close(self):
-        self.app.release()
+        if self._is_open:
+            self._is_open = False
+            self.app.release()
 
     # Mouse
 

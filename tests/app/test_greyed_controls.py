@@ -70,7 +70,7 @@ def test_controls_of_a_motion_act(drive, rig, tooltips):
 def test_gaps_can_be_filled_where_there_are_some(drive, rig):
     hand = drive(scene=people(rig, [True, False, True]), size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")
-    assert hand.state.clock.fill_gaps
+    assert hand.state.clock.interpolate_gaps
 
 
 def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
@@ -80,7 +80,7 @@ def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
     scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")
-    assert not hand.state.clock.fill_gaps
+    assert not hand.state.clock.interpolate_gaps
     rest(hand, "Interpolate gaps")
     assert tooltips[-1].endswith("no motion has missing frames")
 

@@ -178,7 +178,7 @@ def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch)
 
 def test_f12_says_that_the_legend_is_not_in_the_picture(hand, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = "Saved without the legend: turn on Legend in pictures in the Weights panel"
+    text = 'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
     hand.key("f12")
     assert not hand.says(text)
     hand.state.options.shading, hand.state.options.scalar = "scalar", "influences"

@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from app.captured import people
-from app.driver import Driver, make_state
 from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 
-import viewer
 from viewer.app.features import PANELS
-from viewer.app.headless import HeadlessApp
 from viewer.app.shown_panels import ShownPanels
 
 
@@ -176,20 +173,15 @@ def test_menu_that_closes_leaves_the_timeline_before_the_curves(drive, rig):
     assert "Scrubber" in hand.state.item_rects and "plot" not in hand.state.item_rects
 
 
-def test_panel_that_a_remembered_layout_does_not_know_joins_its_neighbours(rig):
-    hand = Driver(*rig)
+def test_panel_that_a_remembered_layout_does_not_know_joins_its_neighbours(drive, rig):
+    hand = drive(*rig)
     sections = imgui.save_ini_settings_to_memory().split("\n\n")
     old = "\n\n".join(part for part in sections if not part.startswith("[Window][Weights]"))
     assert len(old) < len("\n\n".join(sections))
     hand.close()
-    app = HeadlessApp(make_state(viewer.load(*rig), rig, samples=1), (900, 640))
-    try:
-        imgui.load_ini_settings_from_memory(old)
-        app.step(4)
-        docks = {
-            title: imgui.internal.find_window_by_name(title).dock_id
-            for title in ("Weights", "Display", "Camera")
-        }
-        assert docks["Weights"] == docks["Display"] != docks["Camera"]
-    finally:
-        app.release()
+    drive(*rig, layout=old)
+    docks = {
+        title: imgui.internal.find_window_by_name(title).dock_id
+        for title in ("Weights", "Display", "Camera")
+    }
+    assert docks["Weights"] == docks["Display"] != docks["Camera"]

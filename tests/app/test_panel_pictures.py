@@ -84,7 +84,7 @@ def _skinning(hand):
     for number, joint in enumerate(("left_hip", "spine1", "left_shoulder")):
         pose.dofs[hand.dof_index(f"{joint}.z")] = 0.4 - 0.3 * number
     options.skinning.max_influences = 2
-    options.shading, options.scalar = "scalar", "cut"
+    options.shading, options.scalar = "scalar", "pruning"
 
 
 def _weights(hand):

@@ -9,7 +9,7 @@ import copy
 
 import numpy as np
 import pytest
-from app.curves.test_curves_panel import clip_text
+from app.curves.plotted import clip_text
 from app.posing_rigs import around, joint_seen
 
 from viewer.app.core.view_frame import view_frame

@@ -47,8 +47,8 @@ def recording(tmp_path):
 def test_keypoints_are_written_person_by_person(keypoints, tmp_path, capsys):
     assert convert(keypoints, "-o", tmp_path / "m.npz") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith(f"{tmp_path}/m-0.npz: 3 frames at 30 per second, z up: name, up, ")
-    assert lines[1].startswith(f"{tmp_path}/m-4.npz: 3 frames at 30 per second; 2 of them missing")
+    assert lines[0].startswith(f"{tmp_path}/m-0.npz: 3 frames at 30 fps, z up: name, up, ")
+    assert lines[1].startswith(f"{tmp_path}/m-4.npz: 3 frames at 30 fps; 2 of them missing")
     with np.load(tmp_path / "m-4.npz") as arrays:
         assert (str(arrays["name"]), str(arrays["up"])) == ("kp body25 4", "z")
         assert arrays["frames"].tolist() == [10, 11, 12]
@@ -118,7 +118,7 @@ def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path,
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
-    message = "everybody is absent in frame 23: there is nothing to write"
+    message = "nobody is present in frame 23: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
     assert {path.name for path in tmp_path.iterdir()} == before
 
@@ -126,7 +126,7 @@ def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path,
 def test_nobody_there_at_one_time_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
-    message = "everybody is absent at that time: there is nothing to write"
+    message = "nobody is present at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 

@@ -194,7 +194,6 @@ HALF = math.sqrt(0.5)
         (["--method", "dqs"], 1),
         (["--method", "mix", "--blend-factor", "0"], HALF),
         (["--method", "mix", "--blend-factor", "1"], 1),
-        (["--method", "mix", "--dqs-share", "1"], 1),  # the option's second spelling
         (["--method", "mix"], (1 + HALF) / 2),
     ],
 )

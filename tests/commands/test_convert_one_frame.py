@@ -65,7 +65,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert_allclose(places["left_hand"], hand, atol=PRINTED)
     assert_allclose(places["right_hand"], [3, -2, 0], atol=PRINTED)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith(f"{out}: 5 joints, 1 frame (0) at 30 per second, ")
+    assert lines[0].startswith(f"{out}: 5 joints, 1 frame (0) at 30 fps, ")
     assert lines[1:] == [STILL]
 
 
@@ -127,7 +127,7 @@ def test_still_body_becomes_parameters_of_its_family(tmp_path, capsys):
     assert_allclose(rotation(record["Rh"][0]), rotation(pose[:3]), atol=1e-6)
     assert_allclose(record["poses"][0], [0, 0, 0, *pose[3:]], atol=1e-6)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == f"{tmp_path}/a.npz: 1 frame of SMPL at 30 per second, y up"
+    assert lines[0] == f"{tmp_path}/a.npz: 1 frame of SMPL at 30 fps, y up"
     assert lines[1] == lines[-1] == STILL
 
 
@@ -145,8 +145,8 @@ def test_keys_hold_one_pose_and_move_the_rig_there(arms, tmp_path, capsys):
 def test_figures_that_move_otherwise_have_no_keys(tmp_path, capsys):
     assert convert("--body", "-o", tmp_path / "x.anim") == 2
     assert capsys.readouterr().err == (
-        "viewer: .anim moves a root and three angles of each joint, as .skel files do; "
-        "body moves otherwise\n"
+        "viewer: .anim needs a root translation and three angles per joint, as in .skel files; "
+        "body has other DOFs\n"
     )
     assert not written(tmp_path, "*")
 
@@ -204,7 +204,7 @@ def test_one_frame_of_a_capture_is_its_own(recording, tmp_path, capsys):
         assert one.n_frames == 1
         places = whole.places(1)
         assert_allclose([one.places(0)[n] for n in places], list(places.values()), atol=1e-4)
-    assert "1 frame (21) at 30 per second" in capsys.readouterr().out.splitlines()[0]
+    assert "1 frame (21) at 30 fps" in capsys.readouterr().out.splitlines()[0]
 
 
 def test_one_frame_of_a_capture_goes_back_under_its_number(recording, tmp_path, capsys):

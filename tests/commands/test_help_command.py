@@ -40,7 +40,7 @@ def test_at_a_terminal_tables_are_laid_out(monkeypatch: pytest.MonkeyPatch) -> N
     printed = terminal.getvalue()
     assert "\x1b[" in printed, "no style"
     assert "| R |" not in printed and "---" not in printed, "Markdown is left"
-    assert "reset every DOF to the file's pose" in printed
+    assert "reset the pose to that of the file" in printed
 
 
 def test_of_a_command_it_lists_the_options(capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,7 +48,7 @@ def test_names_left_out_are_told(render, tmp_path):
     path.write_text("balljoint a { " + "balljoint b { } " * 4 + "}")
     _, said = render(str(path), "--joint-names")
     # Two names have room beside the place where all five joints are, two above and below it.
-    assert said.endswith("warning: 1 of 5 names of joints left out: they would cover another\n")
+    assert said.endswith("warning: 1 of 5 joint names omitted: they would cover another\n")
 
 
 def test_what_no_figure_has_is_told(render, rig):

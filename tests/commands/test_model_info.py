@@ -154,9 +154,9 @@ def test_cut_of_six_influences_is_measured(describe, lines, box):
     # Whole, its distance from the axis is 1 - 2 * 0.15 of what the cut leaves alone.
     options = about_z(4, HALF_TURN)
     effects = describe(box, *options)["effects"]
-    assert effects["cut to 4 influences"] == pytest.approx(0.3 * ACROSS)
-    assert "cut to 8 influences" not in effects
-    assert "effect     cut to 4 influences: up to 671 mm in this pose" in lines(box, *options)
+    assert effects["pruned to 4 influences"] == pytest.approx(0.3 * ACROSS)
+    assert "pruned to 8 influences" not in effects
+    assert "effect     pruned to 4 influences: up to 671 mm in this pose" in lines(box, *options)
 
 
 def test_cut_of_ten_influences_is_measured_twice(describe, tmp_path):
@@ -168,8 +168,8 @@ def test_cut_of_ten_influences_is_measured_twice(describe, tmp_path):
         skinning_weights="\n".join(weights),
     )
     effects = describe(str(box), "--pose", pose_190(10, n32=HALF_TURN))["effects"]  # joint 9
-    assert effects["cut to 4 influences"] == pytest.approx(0.2 * ACROSS)
-    assert effects["cut to 8 influences"] == pytest.approx(0.2 * ACROSS)
+    assert effects["pruned to 4 influences"] == pytest.approx(0.2 * ACROSS)
+    assert effects["pruned to 8 influences"] == pytest.approx(0.2 * ACROSS)
 
 
 def test_cut_of_a_figure_at_rest_has_no_effect(describe, lines, box):
@@ -213,7 +213,7 @@ def test_correctives_are_measured(describe, body):
 def test_scaled_figure_shows_scaled_effects(describe, box):
     pose = pose_190(6, n17=HALF_TURN, n21=2.0)  # joint 4 about z; the whole figure doubled
     effects = describe(box, "--pose", pose)["effects"]
-    assert effects["cut to 4 influences"] == pytest.approx(2 * 0.3 * ACROSS)
+    assert effects["pruned to 4 influences"] == pytest.approx(2 * 0.3 * ACROSS)
 
 
 def test_bundled_body_measures_as_a_grown_person(describe):

@@ -119,7 +119,7 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ),
         # Skinning
         ("smpl.npz --blend-factor -0.1", "--blend-factor: expected 0 to 1, found -0.1"),
-        ("smpl.npz --dqs-share 1.5", "--blend-factor: expected 0 to 1, found 1.5"),
+        ("smpl.npz --blend-factor 1.5", "--blend-factor: expected 0 to 1, found 1.5"),
         ("smpl.npz --influences -1", "--influences: expected 0 or more, found -1"),
         # Hands, mirror
         ("smpl.npz --hands mean", "--hands: no file has hand components"),

@@ -141,8 +141,8 @@ def test_cut_is_shown_where_there_are_many_influences(draw, box):
     changed = []
     for azimuth in (135, 315):
         view = [*posed, "--azimuth", azimuth]
-        cut = draw(*view, "--scalar", "cut")
-        nothing = draw(*view, "--scalar", "cut", "--scalar-range=0:1e9")
+        cut = draw(*view, "--scalar", "pruning")
+        nothing = draw(*view, "--scalar", "pruning", "--scalar-range=0:1e9")
         assert (covered(cut) == covered(nothing)).all()
         changed.append(differing(cut, nothing).sum() / covered(cut).sum())
     # From one corner of the box two faces with this vertex are seen, from the other none.

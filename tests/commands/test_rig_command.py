@@ -21,7 +21,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_npz_opens_again_and_moves_as_the_template(folder, tmp_path, capsys):
     )
     with np.load(out) as arrays:
         assert arrays["field_0_values"].shape == (figure.mesh.n_vertices,)
-        assert arrays["field_0_names"].tolist() == ["matched", "filled", "rigid"]
+        assert arrays["field_0_names"].tolist() == ["matched", "inpainted", "rigid"]
         assert_allclose(arrays["alignment"][:3, :3], 100.0 * np.array([[0, 0, 1], [0, 1, 0],
                         [-1, 0, 0]]), atol=1e-9)  # fmt: skip
 
@@ -159,11 +159,23 @@ def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
     pairs = tmp_path / "pairs.txt"
     pairs.write_text("head 1 2 3\njaw 4 5 6  # there\n\n0 0 0 7 8 9\n")
     options = ["--method", "nearest", "--up", "z", "--facing", "x", "--scale", "axes", "--smooth"]
-    more = ["--max-influences", "4", "--joints", "copied", "--max-distance", "0.02", "--no-refine"]
+    more = [
+        "--max-influences",
+        "4",
+        "--joints",
+        "alignment",
+        "--max-distance",
+        "0.02",
+        "--no-refine",
+    ]
     arguments = ["rig", str(folder / "scan.obj"), "--from", "fox", *options, *more]
     assert run([*arguments, "--landmarks", str(pairs), "-o", str(tmp_path / "x.skel")]) == 130
     settings = seen["settings"]
-    assert (settings.method, settings.joints, settings.correctives) == ("nearest", "copied", False)
+    assert (settings.method, settings.joints, settings.correctives) == (
+        "nearest",
+        "alignment",
+        False,
+    )
     where = settings.alignment
     assert (where.up, where.facing, where.scale, where.refines) == ("z", "x", "axes", False)
     assert_allclose(where.landmarks[:, 1], [[1, 2, 3], [4, 5, 6], [7, 8, 9]])

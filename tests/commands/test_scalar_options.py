@@ -55,7 +55,7 @@ def test_line_says_what_the_numbers_are(render, body):
         ("dominant", "Dominant joint: 24 of 24"),
         ("sums", "|sum of weights - 1|: 0 to 0"),
         ("stretch", "Edge stretch, largest: 0 to 0 %"),
-        ("cut", "Distance to 4 influences: 0 to 0 mm"),
+        ("pruning", "Distance to 4 influences: 0 to 0 mm"),
     ):
         assert render(body, "--scalar", name, "--no-grid")[1] == f", {text}\n"
 
@@ -118,15 +118,15 @@ def test_legend_stays_in_its_corner(render, body):
             "--scalar-range: expected --scalar NAME, to which it applies",
         ),
         (
-            ["--scalar", "cut", "--scalar-range", "5:1"],
+            ["--scalar", "pruning", "--scalar-range", "5:1"],
             '--scalar-range: expected A:B, two numbers with A below B, found "5:1"',
         ),
         (
-            ["--scalar", "cut", "--scalar-range", "nan:inf"],
+            ["--scalar", "pruning", "--scalar-range", "nan:inf"],
             '--scalar-range: expected A:B, two numbers with A below B, found "nan:inf"',
         ),
         (
-            ["--scalar", "cut", "--scalar-range", "7"],
+            ["--scalar", "pruning", "--scalar-range", "7"],
             '--scalar-range: expected A:B, two numbers with A below B, found "7"',
         ),
         (

@@ -18,7 +18,7 @@ from viewer.rig.motion.clip_edit import clip_from_frames
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
 TURN = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
 

@@ -59,7 +59,7 @@ def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
     path = tmp_path / "walk.npz"
     arrays, notes = written(family_animation(family(kind), motion), path, world_up="z")
     title = {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X"}[kind]
-    assert notes == [f"{path}: 4 frames of {title} at 50 per second, z up"]
+    assert notes == [f"{path}: 4 frames of {title} at 50 fps, z up"]
     assert (arrays["poses"].shape, arrays["betas"].shape) == ((4, 3 * COUNTS[kind]), (16,))
     assert_array_equal(arrays["betas"], [*waves(10, seed=2.0), *[0.0] * 6])
     assert (arrays["mocap_framerate"], arrays["mocap_frame_rate"]) == (50.0, 50.0)
@@ -144,7 +144,9 @@ def test_changing_shapes_have_a_row_a_frame(family, tmp_path):
     motion = family_motion(24, shape=shapes)
     arrays, notes = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     assert_array_equal(arrays["betas"][:, :10], shapes)
-    assert notes[1:] == ["the shape changes: betas has one row a frame, which few programs read"]
+    assert notes[1:] == [
+        "the shape changes: betas has one row per frame, which few programs support"
+    ]
     for frame in (0, 3):
         found = vertices_about_pelvis(
             model("smpl"), arrays["poses"][frame], arrays["trans"][frame], shapes[frame]
@@ -165,7 +167,7 @@ def test_gaps_are_held_and_marked(family, tmp_path):
     expected = motion.vectors.reshape(4, 72)[rows]
     assert_allclose(arrays["poses"], expected, rtol=0, atol=ATOL)
     assert notes[1:] == [
-        "frames 10, 13 to 14 missing: filled with the last pose, and marked in present"
+        "frames 10, 13 to 14 missing: the last pose is held, and the frames are marked in present"
     ]
     back = read(Source.open(tmp_path / "a.npz"))
     assert (back.timing.rows >= 0).tolist() == arrays["present"].tolist()
@@ -182,7 +184,7 @@ def test_gaps_are_bridged(family, tmp_path):
     )
     assert_allclose(arrays["poses"][:, 1], [0, 0.3, 0.6, 0.9], rtol=0, atol=ATOL)
     assert_allclose(arrays["trans"][:, 0], [0, 1, 2, 3], rtol=0, atol=ATOL)
-    assert notes[1].endswith("bridged on the shorter arc, and marked in present")
+    assert notes[1].endswith("interpolated along the shorter arc, and marked in present")
 
 
 def test_gaps_split_the_file(family, tmp_path):
@@ -193,9 +195,9 @@ def test_gaps_split_the_file(family, tmp_path):
     )  # fmt: skip
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.npz", "a-2.npz"]
     assert notes == [
-        f"{tmp_path}/a-1.npz: 2 frames of SMPL at 50 per second, y up",
-        f"{tmp_path}/a-2.npz: 2 frames of SMPL at 50 per second, y up",
-        "frames 0, 3 to 4 missing: left out between the files",
+        f"{tmp_path}/a-1.npz: 2 frames of SMPL at 50 fps, y up",
+        f"{tmp_path}/a-2.npz: 2 frames of SMPL at 50 fps, y up",
+        "frames 0, 3 to 4 missing: omitted between the files",
     ]
     with np.load(tmp_path / "a-2.npz") as arrays:
         assert_allclose(arrays["poses"], motion.vectors[2:].reshape(2, 72), rtol=0, atol=ATOL)
@@ -217,8 +219,8 @@ def test_losses_are_told(family, tmp_path):
     assert_array_equal(arrays["trans"], [[1.5, 2.0, 3.0]] * 2)
     assert notes[1].startswith(f"{tmp_path}/a.npz: joints differ from the motion by up to ")
     assert notes[2:] == [
-        "joints that move within their parents are left out (up to 0.25 m)",
-        "the figure's scale is left out (1 to 1.5)",
+        "translations of joints are omitted (up to 0.25 m)",
+        "the figure's scale is omitted (1 to 1.5)",
     ]
 
 
@@ -228,7 +230,7 @@ def test_bundled_body_says_whose_shape_it_is(tmp_path):
     figure = viewer.load(bundled_body()).actors[0].figure
     motion = family_motion(24, shape=None)
     _, notes = written(family_animation(figure, motion), tmp_path / "a.npz")
-    assert notes[1].startswith(f"shape and translation are meant for {figure.name}, which is no")
+    assert notes[1].startswith(f"shape and translation are those of {figure.name}, which is no")
 
 
 def test_figures_of_other_kinds_are_refused(family, tmp_path):
@@ -246,7 +248,10 @@ def test_figures_of_other_kinds_are_refused(family, tmp_path):
 def test_options_and_empty_motions_are_refused(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24, rows=np.array([0, -1, 1])))
     for words, message in (
-        ({"gaps": "close"}, 'gaps: expected one of hold, interpolate, split, found "close"'),
+        (
+            {"gaps": "close"},
+            'handling of gaps: expected one of hold, interpolate, split, found "close"',
+        ),
         ({"up": "x"}, 'up axis: expected y or z, found "x"'),
     ):
         with pytest.raises(RigError) as caught:

@@ -176,8 +176,9 @@ def test_place_of_the_figure_moves_the_root_and_what_does_not_fit_is_said(tmp_pa
     assert [channel.values.tolist() for channel in again.channels[:3]] == [
         [0.5, 1.0], [1.0, 2.0], [1.5, 3.0]]  # fmt: skip
     assert notes[3:] == [
-        ".anim cannot hold the figure's scale of 2: it is left out",
-        ".anim moves the root alone: translations of other joints, up to 0.5 units, are left out",
+        ".anim cannot hold the figure's scale of 2, which is omitted",
+        ".anim translates only the root: translations of other joints, up to 0.5 "
+        "units, are omitted",
     ]
     # The file's figure has a scale of 1 about the root's place, which is half the one here, and its
     # second joint is where it rests.
@@ -197,7 +198,7 @@ def test_place_of_a_figure_with_keys_is_left_out_and_said(tmp_path):
     actor.pose.figure_translation[0] = 1.0
     _, notes = written(actor, tmp_path / "a.anim")
     assert notes[1].startswith(f"{tmp_path}/a.anim: joints differ from the motion by up to 1 units")
-    assert notes[-1] == "the place of the whole figure is no part of its clip: it is left out"
+    assert notes[-1] == "the placement of the whole figure is not part of its clip and is omitted"
 
 
 def test_figures_that_move_otherwise_are_refused(tmp_path):
@@ -206,7 +207,8 @@ def test_figures_that_move_otherwise_are_refused(tmp_path):
     with pytest.raises(RigError) as caught:
         written(Actor(body, clip=turning([0.0, 1.0])), tmp_path / "a.anim")
     assert str(caught.value) == (
-        ".anim moves a root and three angles of each joint, as .skel files do; body moves otherwise"
+        ".anim needs a root translation and three angles per joint, as in .skel files; "
+        "body has other DOFs"
     )
     assert list(tmp_path.iterdir()) == []
 

@@ -66,8 +66,8 @@ def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
     motion = family_motion(COUNTS[kind], shape=shape)
     frames, notes = written(family_animation(family(kind), motion), tmp_path / "out", world_up="z")
     assert notes == [
-        f"{tmp_path}/out/smpl: 4 frames of 1 person, z up; EasyMocap keeps no frame rate: it is "
-        "50 per second"
+        f"{tmp_path}/out/smpl: 4 frames of 1 person, z up; EasyMocap stores no frame rate: it is "
+        "50 fps"
     ]
     assert list(frames) == [0, 1, 2, 3]
     for frame, people in frames.items():
@@ -155,7 +155,7 @@ def test_people_and_gaps_land_in_the_same_files(family, tmp_path):
     }  # fmt: skip
     assert frames[7][0]["shapes"] == [np.round(waves(10, seed=2.0), 7).tolist()]
     assert frames[9][0]["shapes"] == [np.round(waves(10, seed=9.0), 7).tolist()]
-    assert notes[1:] == ["person 7: frame 6 missing, as in the motion"]
+    assert notes[1:] == ["person 7: frame 6 missing, as in the original motion"]
     timing = clip_of(tmp_path, figure, 7).timing
     assert (timing.first_frame, timing.present.tolist()) == (5, [True, False, True, *[False] * 5])
 
@@ -200,7 +200,7 @@ def test_other_files_are_never_deleted(family, tmp_path):
     with pytest.raises(OutputError) as caught:
         written(animation, tmp_path)
     assert str(caught.value) == (
-        f"{tmp_path}/smpl: holds other files than frames (000000.jpg), and is not replaced"
+        f"{tmp_path}/smpl: holds files other than frames (000000.jpg) and is not replaced"
     )
     assert [path.name for path in tmp_path.rglob("*")] == ["smpl", "000000.jpg"]
 
@@ -247,7 +247,7 @@ def test_people_must_fit_each_other(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     other = replace(animation, frame_rate=25.0)
     for animations, persons, message in (
-        ([], [], "expected somebody to write, found nobody"),
+        ([], [], "expected at least one person to write, found none"),
         ([animation, animation], [1, 1], "expected a number for each of 2 people, found [1, 1]"),
         ([animation, other], None, "expected one frame rate for all people, found 25, 50"),
         ([replace(animation, first_frame=-2)], None, "walk: expected frames from 0 on, found -2"),

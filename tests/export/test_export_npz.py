@@ -136,7 +136,7 @@ def test_points_of_all_frames(tmp_path):
     path = tmp_path / "two.npz"
     (line,) = export_points(sampled_points(), path, MotionOptions(world_up="z"))
     assert line == (
-        f"{path}: 2 frames at 10 per second; 1 of them missing, NaN, z up: name, up, frame_rate, "
+        f"{path}: 2 frames at 10 fps; 1 of them missing, NaN, z up: name, up, frame_rate, "
         "times, frames, present, points, confidences, joint_names, limbs, sides, layout"
     )
     with np.load(path, allow_pickle=False) as arrays:

@@ -100,7 +100,7 @@ def test_gltf_of_centimetres_is_in_metres(walk, tmp_path, capsys):
         text, error = capsys.readouterr()
         assert error == f"warning: {walk}: {GUESS}\n"
         assert text.splitlines()[-1] == (
-            "lengths are centimetres: a node above the figure scales them to metres, by 0.01"
+            "lengths are in centimetres: a node above the figure scales them to metres by 0.01"
         )
         gltf = Gltf(tmp_path / name)
         world = gltf.world(0.1) if name == "motion.glb" else gltf.world()
@@ -128,7 +128,7 @@ def test_gltf_turns_and_scales_a_skinned_mesh_at_once(tmp_path):
     wanted = 0.0254 * (2 * POSITIONS + [1, 2, 3]) @ TO_Z  # (x, y, z) -> (x, z, -y)
     assert_allclose(order, np.unique(np.round(wanted, 6), axis=0), rtol=0, atol=2e-6)
     assert gltf.named("z up, inches") == gltf.top(gltf.named("root"))
-    assert "lengths are inches: a node above the figure scales them to metres, by 0.0254" in notes
+    assert "lengths are in inches: a node above the figure scales them to metres by 0.0254" in notes
 
 
 # The SMPL family is in metres.
@@ -166,9 +166,9 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
             expected = turn @ rotation(vectors[frame, 0])
             assert_allclose(rotation(poses[0]), expected, rtol=0, atol=1e-12)
     assert notes[1:] == [
-        "lengths were centimetres, and are written as metres",
-        "places count from the skeleton's own root at rest, (0.01, 0.95, 0.02) m: a model whose "
-        "root rests elsewhere stands off by the difference (--model drives one, and is exact)",
+        "lengths were converted from centimetres to metres",
+        "translations are relative to the skeleton's root at rest, (0.01, 0.95, 0.02) m: a model "
+        "with another rest root is offset by the difference (use --model for exact translations)",
     ]
 
 
@@ -181,7 +181,7 @@ def test_easymocap_of_a_skeleton_turns_about_the_origin(tmp_path):
         found = rotation(np.array(record["Rh"][0])) @ (0.01 * ROOT) + record["Th"][0]
         assert_allclose(found, 0.01 * places[frame], rtol=0, atol=1e-6)
         assert_allclose(record["Rh"][0], vectors[frame, 0], rtol=0, atol=1e-6)
-    assert notes[1] == "lengths were centimetres, and are written as metres"
+    assert notes[1] == "lengths were converted from centimetres to metres"
 
 
 @pytest.mark.parametrize(
@@ -192,8 +192,8 @@ def test_skeletons_of_unknown_unit_are_refused(tmp_path, kind, what):
     with pytest.raises(RigError) as caught:
         export_animation(animation, tmp_path / "out.npz", kind, MotionOptions())
     assert str(caught.value) == (
-        f"walk cannot be written as {what}, which is in metres: its unit is not known (of a BVH, "
-        "--unit says it)"
+        f"walk cannot be written as {what}, which is in metres: its unit is unknown (for a BVH, "
+        "--unit sets it)"
     )
     assert not any(tmp_path.iterdir())
 

@@ -84,9 +84,10 @@ def test_fox_is_drawn_as_it_is_skinned(tmp_path):
     size = np.linalg.norm(np.ptp(actor.figure.mesh.positions, axis=0))
     percent = 100 * np.linalg.norm(apart, axis=1).max() / size
     assert notes[1:] == [
-        "lengths stay as they are: fox does not say its unit, and programs take glTF's for metres",
+        "lengths are unchanged: the unit of fox is unknown, and programs interpret glTF lengths as "
+        "metres",
         f"up to {counts.max()} influences per vertex, all of them written, strongest first: "
-        f"programs that read only JOINTS_0 are off by up to {percent:.3g} % of the size",
+        f"programs that read only JOINTS_0 have errors of up to {percent:.3g} % of the size",
         "not held by glTF: limits of joints",
     ]
 
@@ -105,9 +106,9 @@ def test_body_is_baked_in_shape_and_pose(tmp_path):
     )
     off = np.linalg.norm(apart, axis=1)
     assert notes[1:] == [
-        "the shape is baked in: mesh and joints are written as it has them",
+        "the shape is baked into mesh and joints",
         f"{tmp_path}/out.glb: vertices differ from the pose by up to {1000 * off.max():.3g} mm "
-        f"(vertex {off.argmax()}): pose correctives cannot be held",
+        f"(vertex {off.argmax()}): pose correctives are not supported",
         "not held by glTF: 10 blend shapes as such, pose correctives, the symmetry map, the joint "
         "regressor",
     ]
@@ -149,7 +150,7 @@ def test_z_up_is_turned_by_a_node(tmp_path):
     gltf, notes = write(tmp_path, actor)
     assert_drawn(gltf, actor.figure, actor.pose, TO_Y)
     assert_joints(gltf, actor.figure, actor.pose, TO_Y)
-    assert notes[1:] == ["z is up: a node above the figure turns it by -90 degrees about x"]
+    assert notes[1:] == ["z is up: a node above the figure rotates it by -90 degrees about x"]
 
 
 def test_materials_are_primitives_with_their_pictures(tmp_path):
@@ -212,7 +213,7 @@ def test_too_many_morphs_are_baked_in(tmp_path):
     gltf, notes = write(tmp_path, actor)
     assert_drawn(gltf, actor.figure, actor.pose)
     assert "targets" not in gltf.primitives[0]
-    assert notes[1] == "the shape is baked in: mesh and joints are written as it has them"
+    assert notes[1] == "the shape is baked into mesh and joints"
     assert notes[2] == "not held by glTF: 65 blend shapes as such"
 
 
@@ -247,7 +248,7 @@ def test_points_without_triangles_and_nothing_at_all(tmp_path):
     skin = skin_from_lists([], np.eye(4)[None])
     gltf, notes = write(tmp_path, Actor(Figure("none", mesh, skeleton, skin, unit="m")))
     assert "meshes" not in gltf.root and "skins" not in gltf.root
-    assert notes[1] == "the mesh has no vertices, and is left out"
+    assert notes[1] == "the mesh has no vertices and is omitted"
 
 
 def test_text_and_arrays_in_two_files(tmp_path):
@@ -258,7 +259,7 @@ def test_text_and_arrays_in_two_files(tmp_path):
     assert_drawn(gltf, actor.figure, actor.pose)
     assert gltf.nodes[0]["name"] == "ro?of"
     size = (tmp_path / "a roof%1.bin").stat().st_size
-    assert notes[1] == f"{tmp_path / 'a roof%1.bin'}: its arrays, {size} bytes"
+    assert notes[1] == f"{tmp_path / 'a roof%1.bin'}: array data, {size} bytes"
     assert files_written("x.gltf")[1].name == "x.bin" and len(files_written("x.glb")) == 1
 
 

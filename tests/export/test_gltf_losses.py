@@ -65,7 +65,7 @@ def test_weights_are_scaled_and_the_largest_move_is_told(tmp_path):
     assert_allclose(corners(gltf, gltf.vertices()[0]), POSITIONS[TRIANGLES], rtol=0, atol=EXACT)
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to 500 mm (vertex 1): weights of "
-        "2 vertices do not add up to 1: scaled, as glTF demands"
+        "2 vertices do not add up to 1: scaled, as glTF requires"
     )
 
 
@@ -78,7 +78,9 @@ def test_vertices_without_influence_hold_on_to_a_node_that_never_moves(tmp_path)
     assert_drawn(gltf, actor.figure, actor.pose)
     assert_allclose(gltf.vertices()[0][[1, 4]], [[1, 0, 5], [3, 3, 8]], rtol=0, atol=EXACT)
     assert gltf.root["skins"][0]["joints"][-1] == gltf.named("fixed")
-    assert notes[1:] == ["2 vertices without influence: bound to a node that never moves, fixed"]
+    assert notes[1:] == [
+        '2 vertices without influence: bound to the node "fixed", which never moves'
+    ]
 
 
 def test_negative_and_repeated_weights_become_what_gltf_allows(tmp_path):
@@ -93,7 +95,7 @@ def test_negative_and_repeated_weights_become_what_gltf_allows(tmp_path):
     assert gltf.influence_sets()[0][1][1].tolist() == [0.5, 0.5, 0, 0]
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to 1000 mm (vertex 0): weights "
-        "of 1 vertex are negative: left out and the others scaled, as glTF demands"
+        "of 1 vertex are negative: omitted and the others scaled, as glTF requires"
     )
 
 
@@ -107,7 +109,7 @@ def test_other_skinning_is_told(tmp_path):
     assert_drawn(gltf, actor.figure, actor.pose)
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to {1000 * worst:.0f} mm "
-        "(vertex 3): Dual quaternion (DQS) skinning cannot be held, glTF blends linearly"
+        "(vertex 3): Dual quaternion (DQS) skinning is not supported, glTF uses linear blending"
     )
 
 
@@ -123,8 +125,8 @@ def test_several_losses_are_summed_up(tmp_path):
     (line,) = [note for note in notes if "differ" in note]
     assert f" by up to {worst:.3g} mm (" in line
     assert line.endswith(
-        "): weights of 96 vertices do not add up to 1: scaled, as glTF demands; pose correctives "
-        "cannot be held"
+        "): weights of 96 vertices do not add up to 1: scaled, as glTF requires; pose correctives "
+        "are not supported"
     )
 
 

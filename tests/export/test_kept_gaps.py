@@ -56,7 +56,7 @@ def test_numbered_meshes(tmp_path, gaps, places):
     if gaps in FILLED:
         assert notes == [span, FILLED[gaps]]
     else:
-        assert notes == [f"{span}; 2 frames are missing in the motion, and have no file"]
+        assert notes == [f"{span}; 2 frames are missing in the motion and have no file"]
 
 
 @pytest.mark.parametrize(
@@ -83,8 +83,8 @@ def test_arrays_are_not_split(tmp_path):
 @pytest.mark.parametrize(
     ("gaps", "rows", "note"),
     [
-        ("", [0, None, 2], "frame 6 missing, as in the motion"),
-        ("split", [0, None, 2], "frame 6 missing, as in the motion"),
+        ("", [0, None, 2], "frame 6 missing, as in the original motion"),
+        ("split", [0, None, 2], "frame 6 missing, as in the original motion"),
         ("hold", [0, 0, 2], "missing frame 6: the last pose is held"),
     ],
 )
@@ -125,7 +125,7 @@ def test_unknown_ways_are_refused(tmp_path, key):
     if key == "easymocap":
         animation = family_animation(family_figure("smpl", tmp_path), family_motion(24))
     before = sorted(tmp_path.iterdir())
-    message = 'way to close gaps: expected one of hold, interpolate, split, found "jump"'
+    message = 'handling of gaps: expected one of hold, interpolate, split, found "jump"'
     with pytest.raises(RigError, match=f"^{message}$"):
         export_animation(animation, tmp_path / "m_{frame}", key, MotionOptions(gaps="jump"))
     assert sorted(tmp_path.iterdir()) == before

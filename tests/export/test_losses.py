@@ -201,7 +201,7 @@ def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path
     notes = write(animation, tmp_path, "gltf", "a.glb")
     assert said(notes) == {}
     (line,) = [note for note in notes if "JOINTS_0" in note]
-    assert line.startswith("up to 5 influences per vertex") and line.endswith("by up to 100 mm")
+    assert line.startswith("up to 5 influences per vertex") and line.endswith("of up to 100 mm")
     cut = write(animation, tmp_path, "gltf", "b.glb", skinning=Skinning(max_influences=4))
     assert said(cut) == {} and not [note for note in cut if "JOINTS_0" in note]
 
@@ -216,7 +216,7 @@ def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path
     animation = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
     (line,) = [note for note in notes if "JOINTS_0" in note]
-    size = float(re.search(r"off by up to (\S+) mm", line)[1])
+    size = float(re.search(r"errors of up to (\S+) mm", line)[1])
     assert size == pytest.approx(1000 * np.hypot(0.1, 0.05), rel=TOLD)
 
 
@@ -333,7 +333,7 @@ def test_a_peak_between_frames_is_told(tmp_path, at):
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
         notes = write(animation, tmp_path, kind, name)
         (line,) = [note for note in notes if " differ from " in note]
-        assert line.endswith(": written at 1 per second") and " between frames by " in line
+        assert line.endswith(": written at 1 fps") and " between frames by " in line
         found = said([line])
         assert found["joints"][0] == size and found["vertices"][0] == size
 

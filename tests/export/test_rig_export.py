@@ -102,7 +102,7 @@ def test_shape_is_baked_into_the_rest_mesh(tmp_path, body):
     assert_allclose(inverse_bind[:, :3, 3], -joints, rtol=0, atol=EXACT)
     assert again.figure.n_shapes == 0
     (lost,) = [note for note in notes if note.startswith("not held")]
-    assert "10 shape directions (the present shape is kept)" in lost
+    assert "10 blend shapes (the current shape is kept)" in lost
     assert "pose correctives" in lost and "the joint regressor" in lost
 
 
@@ -219,7 +219,7 @@ def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeyp
 
 def test_up_axis_is_said_to_be_lost(tmp_path):
     _, notes = there_and_back(seamed_actor(up="z"), tmp_path)
-    assert "not held by .skel and .skin: that z is up" in notes
+    assert "not held by .skel and .skin: the up axis z" in notes
 
 
 # Weights and seams
@@ -245,7 +245,7 @@ def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
     # As part of the skin only half of the 5 m reach vertex 0.
     assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
     lost = " ".join(notes)
-    for words in ("that z is up", "body parts", "the symmetry map", "the reduced mesh"):
+    for words in ("the up axis z", "body parts", "the symmetry map", "the reduced mesh"):
         assert words in lost
 
 
@@ -302,13 +302,15 @@ def refused(actor, folder, error=RigError):
 def test_other_orders_of_rotation_are_refused(tmp_path):
     joints = skeleton([-1, 0], [(0, "x", 0), (1, "z", 0), (1, "x", 0)], names=["hip", "knee"])
     assert refused(Actor(Figure("a", skeleton=joints)), tmp_path) == (
-        ".skel turns joints about x, then y, then z; joint knee turns otherwise"
+        ".skel rotates joints about x, then y, then z; joint knee has another rotation order"
     )
 
 
 def test_two_rotations_about_one_axis_are_refused(tmp_path):
     joints = skeleton([-1], [(0, "x", 0), (0, "x", 0)], names=["hip"])
-    assert "joint hip turns otherwise" in refused(Actor(Figure("a", skeleton=joints)), tmp_path)
+    assert "joint hip has another rotation order" in refused(
+        Actor(Figure("a", skeleton=joints)), tmp_path
+    )
 
 
 def test_rest_rotations_are_refused(tmp_path):

@@ -61,7 +61,7 @@ def test_without_correctives_the_target_is_met_in_its_pose(rigged):
 def test_course_rig_gives_the_target_and_says_what_is_lost(rigged, tmp_path):
     target, found = rigged
     lines = write_rigged(found, tmp_path / "arm.skel")
-    assert lines[-1].startswith("pose correctives have no place in .skel and .skin: ")
+    assert lines[-1].startswith("pose correctives cannot be stored in .skel and .skin: ")
     assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
     files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
     actor = viewer.load(*files).actors[0]

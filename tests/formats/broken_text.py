@@ -1,4 +1,4 @@
-"""Small files to break, and readers that go on from faults in them."""
+"""Small files for tests of faults, and tolerant reading of them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ channel { extrapolate constant constant keys 3 {
 def gone_on(
     module: Any, text: str, name: str
 ) -> tuple[Any, list[tuple[Fault, int, str, list[int]]]]:
-    """Return what is read in spite of faults, and each fault with its count, part and places."""
+    """Return the contents read despite faults, and each fault with its count, part and places."""
     source = Source(name, text.encode(), diagnostics=Collector(keeps_errors=True))
     content = module.read(source)
     faults = [

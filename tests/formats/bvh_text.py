@@ -1,4 +1,4 @@
-"""Small BVH files as text, for the tests of the reader."""
+"""Small BVH files as text, for tests of the reader."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def one_joint(channels: str, frames: str, extra: str = "") -> str:
 
 
 def person(scale: float = 1.0) -> str:
-    """Return a person of 1.7 with hips, knees and a head, standing, then turned by 90 degrees.
+    """Return a standing person 1.7 tall with hips, knees and a head, then rotated by 90 degrees.
 
-    In the second frame the root is at (0.5, 0.9, 0.25), and turned about z.
+    In the second frame the root is at (0.5, 0.9, 0.25), and rotated about z.
     """
 
     def offset(*place: float) -> str:
@@ -103,4 +103,4 @@ PERSON_TURNED = [
     [0.95, 0.8, 0.25],
     [-0.1, 0.9, 0.25],
 ]
-"""Where ``person()`` has its joints in the second frame: (x, y) at rest becomes (-y, x)."""
+"""Joint positions of ``person()`` in the second frame: (x, y) at rest becomes (-y, x)."""

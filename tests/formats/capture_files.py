@@ -1,4 +1,4 @@
-"""Folders as EasyMocap writes them, for tests."""
+"""Folders in EasyMocap's layout, for tests."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def points(person: int, count: int = 25, columns: int = 4, seed: float = 0.0, **
 
 
 def write_frames(folder: Path, frames: dict[int | str, object]) -> Path:
-    """Write frame files: numbers become six digits, texts are written as they are."""
+    """Write frame files: file numbers get six digits, strings are used unchanged."""
     folder.mkdir(parents=True, exist_ok=True)
     for frame, content in frames.items():
         name = f"{frame:06}" if isinstance(frame, int) else frame
@@ -60,7 +60,7 @@ def opened(path: Path, **options):
 
 
 def noticed(parts: list, path: Path | None = None) -> list[Fault]:
-    """Return what was noticed in parts, all of it in one file if a path is given."""
+    """Return the warnings of all parts; with a path, all of them must be about that file."""
     found = [one for part in parts for one in part.warnings]
     assert all(str(one).isprintable() for one in found)
     assert path is None or all(one.path == path for one in found)

@@ -1,4 +1,4 @@
-"""Pickles put together step by step, as no writer of today would, and the reading of them."""
+"""Pickles assembled opcode by opcode, in ways that current writers do not use."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ PATH = Path("model.pkl")
 
 
 def opened(data: bytes) -> Archive:
-    """The archive of some bytes, without a file."""
+    """Return the archive of some bytes, without a file."""
     return open_archive(Source(PATH, data))
 
 
 def refusal(data: bytes) -> Fault:
-    """What bytes are refused with, of the file that it names."""
+    """Return the refusal of some bytes, which must name the file."""
     with pytest.raises(FormatError) as caught:
         archive = opened(data)
         for key in archive.keys:
@@ -140,7 +140,7 @@ def matrix(
     name: str = "csc_matrix",
     shape_key: str = "_shape",
 ) -> bytes:
-    """A sparse matrix; as it stands [[1, 0, 3], [0, 0, 2]]."""
+    """A sparse matrix; by default [[1, 0, 3], [0, 0, 2]]."""
     state = {
         "data": array(np.array(data, np.float64)),
         "indices": array(np.array(indices, np.int32)),
@@ -152,12 +152,12 @@ def matrix(
 
 
 def fake_class(monkeypatch: pytest.MonkeyPatch, module: str, name: str) -> type:
-    """A class under a name of which Python's own pickler believes that it can be imported."""
+    """A class with a name that Python's own pickler takes for importable."""
     made = type(name, (), {"__module__": module})
     parts = module.split(".")
     for count in range(1, len(parts) + 1):
         path = ".".join(parts[:count])
-        # The real ones, where another test has imported them, warn or refuse.
+        # If another test has imported the real modules, they warn or refuse.
         monkeypatch.setitem(sys.modules, path, ModuleType(path))
     monkeypatch.setattr(sys.modules[module], name, made, raising=False)
     return made

@@ -1,4 +1,4 @@
-"""A PIG model of five vertices and three joints to bend and break, and how the tests read it.
+"""A PIG model of five vertices and three joints for tests, and functions that read it.
 
 Two triangles share the edge from vertex 1 to vertex 2; on the texture they are apart, so that
 these two vertices have two texture coordinates each. Vertex 4 belongs to no triangle. All
@@ -50,7 +50,7 @@ def write(folder, files=GOOD, **changes):
 
 
 def read(path):
-    """Return the figure and the warnings of a folder or archive, these as data."""
+    """Return the figure and the warnings of a folder or archive, the latter as data."""
     source = Source.open(path)
     return pig.read(source), warnings_of(source.diagnostics)
 
@@ -62,7 +62,7 @@ def silent(path):
 
 
 def refusal(path):
-    """Return the file of a model that is refused, and why: its name, key, line and values."""
+    """Return the file and the reason of a model's refusal: name, key, line and values."""
     with pytest.raises((FormatError, RigError)) as caught:
         viewer.load(path)
     assert caught.value.exit_code == 2
@@ -103,7 +103,7 @@ WEIGHTS = [[(0, 1)], [(1, 1)], [(0, 0.75), (1, 0.25)], [(2, 1)], [(1, 0.5), (2, 
 
 
 def assert_core(figure):
-    """The part that every variant has."""
+    """Check the parts that all variants have."""
     mesh, skeleton = figure.mesh, figure.skeleton
     rest = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 2, -1]]
     assert_array_equal(mesh.positions, rest)
@@ -119,7 +119,7 @@ def assert_core(figure):
 
 
 def assert_good(figure):
-    """All of ``GOOD``."""
+    """Check all parts of ``GOOD``."""
     assert_core(figure)
     mesh = figure.mesh
     assert_array_equal(mesh.uvs, [[0, 0], [0.5, 0], [0, 1], [0.75, 0], [1, 1], [0.5, 1]])

@@ -1,4 +1,4 @@
-"""A good ``.skel`` text to bend and break, and how the tests read it."""
+"""A valid ``.skel`` text that tests modify, and a function that reads it."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A good ``.skin`` text to bend and break, and how the tests read it."""
+"""A valid ``.skin`` text that tests modify, and a function that reads it."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,8 @@
-"""Small made-up models with the keys of the SMPL family, the same to the bit on every machine.
+"""Small synthetic models with the keys of the SMPL family, bit-identical on every machine.
 
-All numbers are sines and cosines of indices rounded to multiples of a power of two that float32
-holds too, so a reader that passes through float32 (as the package smplx does) sees the same model.
+All numbers are sines and cosines of indices, rounded to multiples of a power of two that float32
+represents exactly, so a reader that converts to float32 (as the package smplx does) gets the same
+model.
 """
 
 from __future__ import annotations
@@ -11,18 +12,18 @@ from collections.abc import Iterable
 import numpy as np
 
 KINDS = ("smpl", "smplh", "smplx", "mano", "flame")
-"""The kinds of models, by the published names in small letters."""
+"""Kinds of models, by their published names in lower case."""
 
 NO_PARENT = 4294967295
 """The parent of the root in ``kintree_table``: -1 as an unsigned number."""
 
 TURNS = 8
-"""Vertices in each turn of the spiral that the skin is wound of."""
+"""Vertices per turn of the spiral that forms the skin."""
 
 BODY_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
 FACE_PARENTS = (15, 15, 15)
 
-# From the parent's joint to the joint, in metres; the pelvis and the left side of the body.
+# Offsets from the parent joint in metres, for the pelvis and the left side of the body.
 BODY_STEPS = {
     0: (0.0, -0.25, 0.03),
     1: (0.08, -0.08, 0.0),
@@ -46,18 +47,18 @@ HEAD_STEPS = ((0.0, -0.05, 0.01), (0.0, 0.06, 0.02), *FACE_STEPS)
 def model(
     kind: str, n_vertices: int = 96, n_shapes: int = 10, n_expressions: int = 10
 ) -> dict[str, np.ndarray]:
-    """Return a complete model, as the arrays that a published file would hold.
+    """Return a complete model as the arrays of a published file.
 
     Parameters
     ----------
     kind
         One of ``KINDS``: 24, 52, 55, 16 or 5 joints.
     n_vertices
-        At least 16; the triangles are then twice as many, less four.
+        At least 16; there are four triangles fewer than twice as many.
     n_shapes
         Columns of ``shapedirs`` for the shape.
     n_expressions
-        Columns behind those for the expression; only smplx and flame have them.
+        Further columns for the expression; only smplx and flame have them.
 
     >>> body = model("smplx")
     >>> body["weights"].shape, body["shapedirs"].shape, body["posedirs"].shape
@@ -134,7 +135,7 @@ def _waves(seed: float, *shape: int) -> np.ndarray:
 
 
 def _template(kind: str, n_vertices: int) -> np.ndarray:
-    """Return a spiral wound upwards round a body with arms held out, a hand or a head."""
+    """Return a rising spiral around a body with outstretched arms, a hand or a head."""
     index = np.arange(n_vertices)
     height = index / (n_vertices - 1)
     angle = 2.0 * np.pi * index / TURNS
@@ -168,7 +169,7 @@ def _faces(n_vertices: int) -> np.ndarray:
 
 
 def _joint_targets(kind: str) -> np.ndarray:
-    """Return where the joints should be, about."""
+    """Return the approximate positions of the joints."""
     parents = joint_parents(kind)
     places = np.zeros((len(parents), 3))
     for joint, parent in enumerate(parents):
@@ -177,7 +178,7 @@ def _joint_targets(kind: str) -> np.ndarray:
 
 
 def _joint_step(kind: str, joint: int) -> np.ndarray:
-    """Return the way from the parent's joint to a joint."""
+    """Return the offset of a joint from its parent."""
     if kind == "flame":
         return np.array(HEAD_STEPS[joint])
     if kind == "mano":
@@ -194,7 +195,7 @@ def _joint_step(kind: str, joint: int) -> np.ndarray:
 
 
 def _finger_step(joint: int) -> np.ndarray:
-    """Return the way to a joint of the left fingers, 0 to 14, from its parent."""
+    """Return the offset of a joint of the left fingers, 0 to 14, from its parent."""
     finger, bone = divmod(joint, 3)
     return np.array([0.03 if bone else 0.09, -0.004 * bone, 0.0 if bone else 0.045 - 0.02 * finger])
 
@@ -207,7 +208,7 @@ def _order_by_distance(points: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _regressor(template: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Return rows of sixteenths over the nearest vertices and one elsewhere, to part the joints."""
+    """Return rows of sixteenths over the nearest vertices and a distant one, to part the joints."""
     regressor = np.zeros((len(targets), len(template)))
     nearest = _order_by_distance(targets, template)
     for joint, row in enumerate(regressor):
@@ -218,7 +219,7 @@ def _regressor(template: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
 
 def _weights(template: np.ndarray, targets: np.ndarray, parents: Iterable[int]) -> np.ndarray:
-    """Return rows of one to four sixteenths; each joint holds a vertex if there are enough."""
+    """Return rows of one to four sixteenths; each joint influences a vertex if there are enough."""
     weights = np.zeros((len(template), len(targets)))
     nearest = _order_by_distance(template, targets)
     above = [max(parent, 0) for parent in parents]
@@ -232,7 +233,7 @@ def _weights(template: np.ndarray, targets: np.ndarray, parents: Iterable[int]) 
 
 
 def _shape_directions(n_vertices: int, n_shapes: int, n_columns: int, size: float) -> np.ndarray:
-    """Return displacements of up to 2 cm for shapes and 8 mm for expressions, less further on."""
+    """Return displacements of up to 2 cm for shapes, 8 mm for expressions, decreasing by index."""
     column = np.arange(n_columns)
     shape_sizes = 0.02 / (1.0 + 0.1 * column)
     expression_sizes = 0.008 / (1.0 + 0.1 * np.maximum(column - n_shapes, 0))

@@ -1,4 +1,4 @@
-"""AMASS and its relatives: every spelling, mismatched arrays, and which files are still poses."""
+"""AMASS and related motions: all spellings, mismatched arrays, and distinction from poses."""
 
 import pickle
 
@@ -117,7 +117,7 @@ def test_second_release(tmp_path):
         poses=waves(3, 165),
         betas=waves(16),
         num_betas=np.array(16),
-        # Parts as float32 have them are the same, and the fingers need not be there.
+        # Parts rounded to float32 count as equal, and the fingers may be missing.
         root_orient=waves(3, 165)[:, :3].astype(np.float32),
         pose_body=waves(3, 165)[:, 3:66],
         pose_eye=waves(3, 165)[:, 69:75],

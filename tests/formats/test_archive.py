@@ -1,4 +1,4 @@
-"""The one door to pickles, ``.npz`` and ``.npy``: what it opens, and what a reader may ask it."""
+"""Opening of pickles, ``.npz`` and ``.npy``, and access to their values."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def opened(data: bytes, name: str = "x.npz") -> Archive:
 
 
 def refused(action: Any, *arguments: Any) -> Fault:
-    """What a call is refused with; of the file that it names."""
+    """Return the refusal of a call, which must name the file."""
     with pytest.raises(FormatError) as caught:
         action(*arguments)
     assert str(caught.value).isprintable() and caught.value.path is not None
@@ -317,7 +317,7 @@ def test_values_are_kept() -> None:
 
 
 def test_halves_are_widened(tmp_path: Path) -> None:
-    """65504 is the largest half: comparing one with a larger number would overflow."""
+    """65504 is the largest half: comparing it with a larger number would overflow."""
     np.savez(tmp_path / "a.npz", half=np.array([0.5, 65504], "f2"))
     half = open_archive(Source.open(tmp_path / "a.npz")).array("half").values()
     assert (half.dtype, half.tolist()) == (np.float64, [0.5, 65504.0])

@@ -1,4 +1,4 @@
-"""Broken frame files: each is named, becomes a gap, and the others are read."""
+"""Broken frame files: each is reported and becomes a gap, and the others are read."""
 
 import json
 import os
@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from capture_files import body, noticed, opened, points, rows_of, write_frames
 from faults import INF, NAN, fault_of
+from formats.capture_faults import gap
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source, easymocap
-from viewer.formats._json_places import line_at, nearest_place
 
 
 def refusal(path, **options):
@@ -20,16 +20,6 @@ def refusal(path, **options):
         easymocap.open_capture(Source.open(path, **options))
     assert str(caught.value).isprintable()
     return fault_of(caught.value.diagnostic)
-
-
-def gap(tmp_path, content, kind="smpl"):
-    """Read three frames, the second of which is broken; return what is said of it."""
-    good = points(0) if kind == "keypoints3d" else body(0)
-    folder = write_frames(tmp_path / "smpl", {0: [good], 1: content, 2: [good]})
-    _, parts, _ = opened(tmp_path)
-    found = [person for part in parts for person in (*part.bodies, *part.points)]
-    assert found[:1] == [0]
-    return noticed(parts, folder / "000001.json"), parts
 
 
 @pytest.mark.parametrize(
@@ -64,7 +54,7 @@ def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
 def test_file_that_is_no_text_is_a_gap(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
     (folder / "000001.json").write_bytes(b"[\n\xff\xfe]")
-    (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a mark is fine
+    (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a byte order mark is accepted
     _, parts, _ = opened(tmp_path)
     problem = ("F002.capture-text", None, {})
     found = noticed(parts, folder / "000001.json")
@@ -256,67 +246,6 @@ def test_two_numbers_of_one_person_are_noticed(tmp_path):
     assert rows_of(parts, 1) == [1]
 
 
-def test_keypoints_that_are_no_numbers_are_not_seen(tmp_path):
-    record = points(0)
-    rows = record["keypoints3d"]
-    rows[1][3], rows[2][0], rows[3][3] = -0.5, float("nan"), float("nan")
-    rows[4] = [float("nan")] * 3 + [0.0]
-    folder = write_frames(tmp_path / "keypoints3d", {0: [record]})
-    _, parts, _ = opened(tmp_path)
-    assert tuple(noticed(parts[:1], folder / "000000.json")) == (
-        (
-            "F007.record",
-            1,
-            {
-                "problem": (
-                    "F002.record",
-                    None,
-                    {"item": "person 0", "problem": Phrase("record-unseen", n=3)},
-                )
-            },
-        ),
-    )
-    found = parts[0].points[0][1].points[0]
-    assert not found[1:5].any() and found[5:, 3].all()
-
-
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        ([[0.0] * 4] * 24, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-points", expected=25,
-         found=24)})})),
-        ([[0.0] * 4] * 24 + [[0.0] * 5], ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-other-rows")})})),
-        ([[0.0] * 4] * 24 + [["1"] * 4], ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-other-rows")})})),
-        ([0.0] * 25, ("F007.record", 1, {"problem": ("F002.record", None,
-         {"item": "person 0: keypoints3d", "problem": Phrase("record-other-rows")})})),
-        (3, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "person 0: keypoints3d",
-         "problem": Phrase("record-points", expected=25, found=Phrase("found-value",
-         value="3"))})})),
-    ],
-)  # fmt: skip
-def test_broken_keypoints_are_a_gap(tmp_path, rows, message):
-    warnings, parts = gap(tmp_path, [{"id": 0, "keypoints3d": rows}], "keypoints3d")
-    assert warnings == [message]
-    assert len(parts[1].points[0][1].points) == 1
-
-
-def test_keypoints_that_nobody_saw_are_noticed_at_the_end(tmp_path):
-    unseen = points(3)
-    unseen["keypoints3d"] = [[0.0] * 4] * 25
-    late = {
-        frame: [unseen, points(4) if frame == 70 else unseen | {"id": 4}] for frame in range(80)
-    }
-    folder = write_frames(tmp_path / "take" / "keypoints3d", late)
-    _, parts, _ = opened(folder)
-    assert noticed(parts[:-1]) == []
-    assert tuple(noticed(parts[-1:])) == (
-        ("F007.record-unseen", None, {"name": "take", "people": ["person 3"]}),
-    )
-
-
 def test_many_faults_are_counted(tmp_path):
     broken = dict.fromkeys(range(1, 31), "[")
     write_frames(tmp_path / "smpl", {0: [body(0)], **broken, 31: [body(0)]})
@@ -410,53 +339,3 @@ def test_mutations_are_read_or_refused_in_one_line(tmp_path):
             list(easymocap.read(Source.open(path)).parts())
         except FormatError as problem:
             assert str(problem).isprintable()
-
-
-# Lines
-
-
-PEOPLE = [body(3, 9), body(4, 9)]
-
-
-@pytest.mark.parametrize("wrapper", ["", "annots"])
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("poses", [1.0]), ("Th", [[1.0, float("nan"), 0.0]]), ("shapes", "x"), ("Rh", None)],
-)
-def test_the_line_of_the_key_at_fault_is_named(tmp_path, wrapper, key, value):
-    people = [PEOPLE[0], {**PEOPLE[1], key: value}]
-    content = {"note": [{"poses": 1}], wrapper: people} if wrapper else people
-    text = json.dumps(content, indent=1)
-    # The second of the keys that is written so, as both people have it.
-    rows = [number for number, row in enumerate(text.splitlines(), 1) if f'"{key}":' in row]
-    write_frames(tmp_path / "smpl", {0: PEOPLE, 1: text})
-    _, parts, _ = opened(tmp_path / "smpl")
-    ((_, line, values),) = noticed(parts, tmp_path / "smpl" / "000001.json")
-    assert (line, values["problem"][2]["item"]) == (rows[-1], f"person 4: {key}")
-
-
-def test_the_line_of_a_record_is_named_where_a_key_is_missing(tmp_path):
-    people = [PEOPLE[0], {key: value for key, value in PEOPLE[1].items() if key != "Th"}]
-    text = json.dumps(people, indent=1)
-    begins = [number for number, row in enumerate(text.splitlines(), 1) if row == " {"]
-    write_frames(tmp_path / "smpl", {0: PEOPLE, 1: text})
-    _, parts, _ = opened(tmp_path / "smpl")
-    ((_, line, values),) = noticed(parts, tmp_path / "smpl" / "000001.json")
-    assert (line, values["problem"][2]["item"]) == (begins[1], "person 4: Th")
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "line"),
-    [
-        ('{"a": 1,\n"b": 2}', ("b",), 2),
-        ('{"a": {"b": 1},\n"b": 2}', ("b",), 2),  # not the one inside
-        ('{"a": "b",\n"b": 2}', ("b",), 2),  # nor a value of that name
-        ("[[1,\n2],\n[3]]", (1, 0), 3),
-        ('["}",\n"\\"]",\n3]', (2,), 3),  # brackets and quotes in texts
-        ('[{"a": []},\n{"a": 1}]', (1, "b"), 2),  # its record
-        ("[]", (0,), None),
-    ],
-)
-def test_places_in_a_text_have_a_line(text, place, line):
-    offset = nearest_place(text, place)
-    assert (None if offset is None else line_at(text, offset)) == line

@@ -189,7 +189,7 @@ def test_large_file_in_the_folder_is_refused_before_it_is_read(folder):
     )
 
 
-# Weights that are odd, but load
+# Unusual weights that load
 
 
 def test_vertices_without_weights_stay_at_rest(folder):

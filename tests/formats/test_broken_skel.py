@@ -1,4 +1,4 @@
-"""Broken ``.skel`` files with what is said of them, and large ones."""
+"""Broken ``.skel`` files with their messages, and large files."""
 
 import tracemalloc
 
@@ -236,7 +236,7 @@ def test_file_cut_anywhere_is_refused_or_warned_of(cut):
     except FormatError as problem:
         assert str(problem).startswith("a.skel")
     else:
-        # Only the last brace may be missing without making it another file.
+        # Only the last brace may be missing without changing the contents.
         assert ("F006.closing", None, {}) in warnings_of(source.diagnostics)
 
 

@@ -1,4 +1,4 @@
-"""Cameras of EasyMocap: OpenCV's FileStorage, good and broken, beside the frames or above them."""
+"""Cameras of EasyMocap: valid and broken files of OpenCV's FileStorage, and their location."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def matrix(key, rows, columns, numbers):
     return f"{text}  data: [{data}]\n"
 
 
-# A quarter turn about x: y goes to z.
+# A rotation by 90 degrees about x: y goes to z.
 QUARTER = [1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0]
 EXTRINSIC = HEAD + 'names: [ "01", "b c" ]\n'
 EXTRINSIC += matrix("R_01", 3, 1, [9.0, 9.0, 9.0]) + matrix("Rot_01", 3, 3, QUARTER)

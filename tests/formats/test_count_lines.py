@@ -1,4 +1,4 @@
-"""A count that is wrong is refused at the line that states it, with both numbers."""
+"""Wrong counts are refused at the line of the count, with both numbers."""
 
 import pytest
 from bvh_text import GOOD as BVH
@@ -44,7 +44,7 @@ def refusal(name, text):
     return refusal_of(lambda: read(Source(name, text.encode())))
 
 
-# File, what stands before a count, the count, and what the file has instead of each wrong one.
+# File, text before a count, the count, and the actual number for each wrong one.
 COUNTS = [
     ("a.skin", "positions ", 3),
     ("a.skin", "normals ", 3),
@@ -80,7 +80,7 @@ def test_too_many_rows_of_a_table_are_refused_at_its_element(element, count, lin
 
 @pytest.mark.parametrize(("stated", "line"), [("1 0 0.25 1 0.75", 13), ("3 0 0.25 1 0.75", 13)])
 def test_a_vertex_that_misstates_its_influences_is_refused_at_its_line(stated, line):
-    """Behind it, the counts of all others seem to shift."""
+    """The counts of all later vertices seem to be shifted."""
     fault = refusal("a.skin", SKIN.replace("2 0 0.25 1 0.75", stated))
     values = {"vertex": 1, "pairs": stated[:1].encode(), "found": 4}
     assert fault == ("F002.skin-influences", line, values)

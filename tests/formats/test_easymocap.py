@@ -1,4 +1,4 @@
-"""EasyMocap folders: people by number, gaps, every layout of poses, keypoints, one timeline."""
+"""EasyMocap folders: people by number, gaps, all layouts of poses, keypoints, the timeline."""
 
 import json
 
@@ -16,7 +16,7 @@ FACE = ("jaw", "left_eye", "right_eye")
 
 
 def only(parts, person=0):
-    """Return the one motion of a person who is in one part."""
+    """Return the only motion of a person, who is in a single part."""
     found = [part.bodies[person] for part in parts if person in part.bodies]
     assert len(found) == 1
     return found[0]
@@ -146,7 +146,7 @@ def test_parts_grow_and_the_first_ends_with_somebody(tmp_path):
     assert [part.bodies[0].n_rows for part in parts] == [1, 64, 256, 77]
     assert all(part.bodies[0].timing.n_frames == 400 for part in parts)
     assert rows_of(parts, 0) == list(range(2, 400))
-    assert [part.stop for part in capture.parts()] == [3, 67, 323, 400]  # reads anew
+    assert [part.stop for part in capture.parts()] == [3, 67, 323, 400]  # reads the files again
 
 
 # People

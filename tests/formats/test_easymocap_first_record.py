@@ -1,4 +1,4 @@
-"""A faulty record that comes first: it is a gap, and no measure for the others."""
+"""A faulty first record: it is a gap, and does not define the layout of the others."""
 
 import json
 
@@ -12,7 +12,7 @@ INFINITE = json.loads("1e400")
 
 
 def fault_in(parts, path):
-    """Return the line of the only fault, and what it is."""
+    """Return the line and the text of the only fault."""
     ((key, line, values),) = noticed(parts, path)
     assert key == "F007.record"
     return line, values["problem"]

@@ -1,4 +1,4 @@
-"""Coefficients that records leave out: which of the earlier ones they get."""
+"""Coefficients missing from records, which are repeated from earlier records."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_last_good_row_is_remembered():
 
 
 def shapes_of(parts, person):
-    """Return the shape of every row of a person, as the records have it."""
+    """Return the shape of every row of a person, as stored in the records."""
     motions = [part.bodies[person] for part in parts if person in part.bodies]
     rows = [np.broadcast_to(motion.shape, (motion.n_rows, 10)) for motion in motions]
     return np.concatenate(rows)[:, 0].tolist()
@@ -62,11 +62,11 @@ def test_last_good_shapes_are_kept(tmp_path):
     values = [None, 1.0, None, 2.0, float("nan"), None, None, 4.0]
     write_frames(tmp_path / "smpl", {frame: record(value) for frame, value in enumerate(values)})
     _, parts, _ = opened(tmp_path)
-    # The record that is no number is a gap, and nobody's shape.
+    # The record with an invalid number is a gap, and its shape is not repeated.
     assert rows_of(parts, 0) == [0, 1, 2, 3, 5, 6, 7]
     found = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 4.0]
     rows = [part.bodies[0] for part in parts]
-    assert rows[0].shape is None  # nobody had said a word of shapes
+    assert rows[0].shape is None  # no record had a shape before
     assert shapes_of(parts[1:], 0) == found[1:]
     names = [found.path.name for part in parts for found in part.warnings]
     assert names == ["000001.json", "000004.json", "000002.json"]

@@ -1,6 +1,6 @@
-"""Refusals of text formats say in which line: counted over mutations of tiny files by seed.
+"""Refusals of text formats give the line, counted over seeded mutations of tiny files.
 
-Only a file as a whole has no line: one that is empty, or that no format knows.
+Only faults of a whole file have no line: an empty file, or one in no known format.
 """
 
 import json
@@ -52,7 +52,7 @@ SHARE = 0.99
 
 
 def refusal(source):
-    """Return how a file of a known kind is refused; None if it is not, or is not known."""
+    """Return the refusal of a file; None if it is accepted or its format is unknown."""
     try:
         detect(source)
     except FormatError:
@@ -65,13 +65,13 @@ def refusal(source):
 
 
 def assert_lines(problems, fewest):
-    """Hold refusals, each with the bytes that are refused, to the share that has a line."""
+    """Check the fraction of refusals, each with the refused bytes, that have a line."""
     told = [(problem, data) for problem, data in problems if data.strip()]
     assert len(told) >= fewest
     without = [str(problem) for problem, _ in told if problem.line is None]
     assert len(without) <= (1.0 - SHARE) * len(told), without
     for problem, data in told:
-        # A line end may be CR, LF or both; one more for the end of the file.
+        # A line may end with CR, LF or both; one more for the end of the file.
         assert problem.line is None or 1 <= problem.line <= 1 + len(re.findall(rb"[\r\n]", data))
 
 
@@ -94,7 +94,7 @@ def test_frames_of_easymocap(tmp_path, name):
         for data in (mutate(FRAMES[name], rng) for _ in range(TRIES)):
             (tmp_path / name).write_bytes(data)
             problem = refusal(Source.open(tmp_path / name))
-            # A frame without the key "annots" is read as a pose, which is not looked at here.
+            # A frame without the key "annots" is read as a pose, which is not tested here.
             problems += (
                 [(problem, data)]
                 if problem and not problem.diagnostic.key.startswith("F002.pose-")
@@ -112,7 +112,7 @@ def test_tables_of_a_pig(tmp_path):
             name = rng.choice(list(PIG))
             (folder / name).write_bytes(mutate(PIG[name].encode(), rng))
             problem = refusal(Source.open(folder))
-            # Another file may be at fault: what one says decides what others may say.
+            # Another file may be at fault, as the contents of one restrict those of the others.
             problems += [(problem, problem.path.read_bytes())] if problem else []
             (folder / name).write_text(PIG[name])
     assert_lines(problems, TRIES)

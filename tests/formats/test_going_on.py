@@ -1,4 +1,4 @@
-"""Readers that go on: what is neutral stands in place of what is lost."""
+"""Readers that continue after faults: neutral values replace invalid ones."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_faults_of_a_body_model_are_noted_by_vertex_and_joint(tmp_path: Any) -> 
     assert "v_template: expected finite numbers, found nan at vertex 3" in texts
     assert "weights: expected finite numbers, found inf at vertex 4" in texts
     assert "weights: vertex 5: expected weights that sum to 1, found 0.5" in texts
-    # The others are scaled to a sum of exactly 1, the faulty ones are as in the file.
+    # Valid rows are scaled to a sum of exactly 1, faulty ones are as in the file.
     sums = np.bincount(
         np.repeat(np.arange(figure.skin.n_vertices), np.diff(figure.skin.starts)),
         figure.skin.weights,
@@ -133,7 +133,7 @@ def test_faults_of_a_body_model_are_noted_by_vertex_and_joint(tmp_path: Any) -> 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_reader_goes_on_from_faults_alone(seed: int) -> None:
-    """What the strict reader refuses has a fault; what it takes has none."""
+    """Files that the strict reader refuses have a fault; files that it accepts have none."""
     rng = random.Random(seed)
     texts = {**FILES, "dir/b.skin": SKIN.encode(), "dir/a.obj": OBJ.encode(),
              "dir/a.ply": PLY.encode(), "dir/a.bvh": BVH.encode()}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Places in JSON texts, counted by hand or by another way through the same text."""
+"""Positions in JSON texts, counted by hand or found by an independent parser."""
 
 import json
 
@@ -31,7 +31,7 @@ TEXT = r'{"a": [1, {"b": "x,]}\"", "c": []}, -2e5], "": {}, "d\u00e9": {"a": nul
 def test_value_is_found_by_what_leads_to_it(path, value):
     place = value_place(TEXT, path)
     assert TEXT[place:].startswith(value)
-    # Python's parser, set down there, reads the same value.
+    # Python's parser, started at that position, reads the same value.
     found = json.loads(TEXT)
     for key in path:
         found = found[key]

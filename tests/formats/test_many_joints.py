@@ -1,6 +1,7 @@
-"""The work for files of many joints grows with their number, not with its square.
+"""The work for files with many joints grows linearly with their number.
 
-Calls are counted, at some number of joints and at four times as many: no clock is looked at.
+Function calls are counted for some number of joints and for four times as many; no time is
+measured.
 """
 
 import sys
@@ -20,7 +21,7 @@ from viewer.rig.posing.pose_record import record_of
 from viewer.rig.skeleton import ball_skeleton, dof_label, dof_labels, joint_labels
 
 FEW, MANY = 200, 800
-LINEAR = 4.4  # times the work for four times the joints: beside it there is some for the file
+LINEAR = 4.4  # times the work for four times the joints, as part of it is constant
 SKEL = "balljoint j{} {{\n offset 0 1 0\n rotxlimit -1 1\n pose 0.5 0 0\n"
 BVH = "j{}\n{{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
 
@@ -61,7 +62,7 @@ FILES = {
 
 
 def calls(work):
-    """Return how many functions are called, Python's own among them."""
+    """Return the number of function calls, including Python's own functions."""
     count = 0
 
     def note(frame, event, argument):
@@ -95,7 +96,7 @@ def test_readers_are_linear_in_the_joints(name, takes_faults):
 
 
 class Names(tuple):
-    """Names that count how often somebody looks at one of them."""
+    """Names that count how often they are accessed."""
 
     __slots__ = ()
     looked = 0

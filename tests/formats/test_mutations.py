@@ -1,4 +1,4 @@
-"""Broken files by the thousand: each gives a figure or one line that starts with the path."""
+"""Thousands of broken files: each gives a figure or one line that starts with the path."""
 
 import random
 import re
@@ -95,7 +95,7 @@ TOKENS = [
 
 
 def check(path, data):
-    """Read one file; whatever loads must also move."""
+    """Read one file; if it loads, it must also move."""
     source = Source(path, data)
     try:
         figure = read(source)
@@ -143,7 +143,7 @@ def star_skeleton(n_joints):
 
 
 def mutate(data, rng):
-    """Return the bytes with one to four changes of the kinds that happen to files."""
+    """Return the bytes with one to four realistic changes."""
     for _ in range(rng.randint(1, 4)):
         data = rng.choice(MUTATIONS)(data, rng)
     return data
@@ -287,7 +287,7 @@ def test_replaced_words_give_a_figure_or_one_line(data, path):
 def test_word_that_should_be_a_number_is_found_on_its_line(path, end):
     lines = FILES[path].split(b"\n")
     for number, line in enumerate(lines, start=1):
-        # Rows of numbers, whole or after the keyword of an item; not what follows an unknown word.
+        # Rows of numbers, whole or after the keyword of an item; not those after an unknown word.
         if b"unknown" in line or not re.search(rb"[\d.]+$", line) or b"{" in line:
             continue
         broken = [*lines[: number - 1], line[:-1] + b"x", *lines[number:]]

@@ -1,4 +1,4 @@
-"""Broken models and poses by the thousand: each moves to finite numbers or gives one line."""
+"""Thousands of broken models and poses: each moves to finite positions or gives one line."""
 
 import io
 import json
@@ -52,7 +52,7 @@ DTYPES = ["?", "i1", "u1", ">i2", "u4", "i8", "u8", "f2", ">f4", "f8", "U3", "S4
 
 
 def move(figure):
-    """Pose a figure in several ways, by everything that it has."""
+    """Pose a figure in several ways, using all its parts."""
     pose = rest_pose(figure.skeleton)
     poses = [rest_pose(figure.skeleton) for _ in range(3)]
     poses[1].dofs[:] = 0.7
@@ -66,7 +66,7 @@ def move(figure):
 
 
 def check(source, target="head"):
-    """Read and use one file; what fails must say so on one line that begins with the path."""
+    """Read and use one file; errors must be one line that begins with the path."""
     texts = source.warnings
     try:
         content = read(source)
@@ -76,7 +76,7 @@ def check(source, target="head"):
             try:
                 apply_record(content, figure, pose)
             except RigError as problem:
-                texts = [*texts, f"{source.path}: {problem}"]  # as loading puts it
+                texts = [*texts, f"{source.path}: {problem}"]  # as the loader reports it
             assert np.isfinite(deform(figure, pose)[0]).all()
         elif isinstance(content, Figure) and content.mesh and content.skeleton:
             move(content)

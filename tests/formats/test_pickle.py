@@ -1,4 +1,4 @@
-"""Pickles of every writer that people have: what they hold arrives, as views of the file."""
+"""Pickles of all common writers: their contents are read, as views of the file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from viewer.rig.arrays import Deferred, frozen
 ROWS = np.arange(12.0).reshape(4, 3) / 8
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
-# What cPickle of Python 2.7 with numpy 1.16 writes for {'v': array([[1.5, -2.0]])}, protocol 0.
+# Output of cPickle of Python 2.7 with numpy 1.16 for {'v': array([[1.5, -2.0]])}, protocol 0.
 PYTHON_2_TEXT = rb"""(dp1
 S'v'
 p2

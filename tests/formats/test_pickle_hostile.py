@@ -1,4 +1,4 @@
-"""Pickles that attack: each gives one line, and nothing of theirs is run, written or allocated."""
+"""Malicious pickles: each gives one line, and nothing in them is executed, written or allocated."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ FORBIDDEN = "which is not allowed; nothing was executed"
 
 @pytest.fixture(autouse=True)
 def marker(tmp_path: Path) -> Iterator[Path]:
-    """A file that every attack here would write."""
+    """A file that every attack would write."""
     path = tmp_path / "marker"
     yield path
     assert not path.exists()
@@ -94,7 +94,7 @@ def test_attacks_of_this_file_work_where_they_are_not_refused(tmp_path: Path) ->
         ("copy_reg", "add_extension"),
         ("_codecs", "decode"),
         ("_codecs", "register"),
-        # Look-alikes of what is allowed
+        # Names similar to allowed ones
         ("numpy.core.multiarray ", "_reconstruct"),
         (" numpy", "ndarray"),
         ("Numpy", "ndarray"),

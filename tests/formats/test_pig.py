@@ -1,4 +1,4 @@
-"""PIG models, from a folder of tables or an archive: every file, and every way to write one."""
+"""PIG models from a folder of tables or an archive: all files, and all ways to write them."""
 
 import pickle
 
@@ -137,7 +137,7 @@ def test_body_part_names_may_have_blanks_and_may_lack(folder):
 def test_root_turns_by_euler_angles_and_others_by_rotation_vectors(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
-    # A quarter turn about z, then the root's first number; a quarter about x for joint 1.
+    # 90 degrees about z, the root's first number; 90 degrees about x for joint 1.
     numbers = [0, 0, 0, np.pi / 2, 0, 0, np.pi / 2, 0, 0, 0, 0, 0, 1]
     assert apply_record(PoseRecord(vector=np.array(numbers)), figure, pose) == []
     # Joint 2 is at (0, 1, 0.5) from joint 1: about x (0, -0.5, 1), plus (1, 0, 0), about z.

@@ -1,4 +1,4 @@
-"""The published PIG model, if it lies beside the checkout: counts and check values of its spec."""
+"""The published PIG model, if available: counts and check values of its specification."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Files that change a figure opened beside them: poses and pictures."""
+"""Poses and pictures that are opened together with a figure."""
 
 import json
 
@@ -161,7 +161,7 @@ def test_broken_picture_is_refused(files):
     assert (caught.value.path, caught.value.diagnostic.key) == (files["red"], "F001.picture")
 
 
-# A figure that is open already
+# A figure that is already open
 
 
 def additions(files, *names):

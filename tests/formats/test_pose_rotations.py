@@ -1,4 +1,4 @@
-"""Turns of joints in pose files: they come back to the bit, and broken ones are refused."""
+"""Joint rotations in pose files: bit-exact round trips, and refusal of invalid ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.retargeting.pose_transfer import JointRotations
 
 NAMES = ("root", "", "left knee", "knee", "knee")
 ROWS = np.array([[0.5, 0.5, 0.5, 0.5], [0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 1, 0, 0], [0, 0, -1, 0]])
-BENEATH = ROWS[::-1] / 3  # of any length: they come back as they are
+BENEATH = ROWS[::-1] / 3  # of any length: they are not normalised
 SHIFTS = np.arange(15.0).reshape(5, 3) / 7
 GOOD = {"dofs": {"a.x": 1.0}, "joint_names": ["a"], "joint_turns": [[0, 0, 0, 1]]}
 
@@ -33,9 +33,9 @@ def turns(shifts=SHIFTS, rotations=None) -> JointRotations:
 @pytest.mark.parametrize("shifts", [SHIFTS, np.zeros((5, 3))])
 def test_turns_come_back(tmp_path: Path, suffix, shifts):
     path = tmp_path / f"a{suffix}"
-    viewer.write(PoseRecord(dofs={"a.x": 0.25}, turns=turns(shifts)), path)
+    viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(shifts)), path)
     source = Source(path, path.read_bytes())
-    found = pose.read(source).turns
+    found = pose.read(source).joint_rotations
     assert source.warnings == []
     assert (found.figure, found.names, found.up, found.layout) == (
         "some cat", NAMES, "z", "0123abcd",
@@ -47,14 +47,16 @@ def test_turns_come_back(tmp_path: Path, suffix, shifts):
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
 def test_rotations_beneath_the_dofs_come_back(tmp_path: Path, suffix):
     path = tmp_path / f"a{suffix}"
-    viewer.write(PoseRecord(dofs={"a.x": 0.25}, turns=turns(rotations=BENEATH)), path)
+    viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(rotations=BENEATH)), path)
     source = Source(path, path.read_bytes())
-    assert_array_equal(pose.read(source).turns.rotations, BENEATH)
+    assert_array_equal(pose.read(source).joint_rotations.rotations, BENEATH)
     assert source.warnings == []
 
 
 def test_what_is_at_rest_is_not_written():
-    named = json.loads(pose.pose_text(PoseRecord(dofs={"a.x": 1.0}, turns=turns(0 * SHIFTS))))
+    named = json.loads(
+        pose.pose_text(PoseRecord(dofs={"a.x": 1.0}, joint_rotations=turns(0 * SHIFTS)))
+    )
     assert "joint_turns" in named
     assert "joint_rotations" not in named and "joint_shifts" not in named
 
@@ -90,7 +92,7 @@ def read(**values):
 
 
 def test_a_file_needs_no_more_than_names_and_turns():
-    found = read(joint_turns=[[0, 0, 0, 2]]).turns
+    found = read(joint_turns=[[0, 0, 0, 2]]).joint_rotations
     assert found.relative.tolist() == [[0, 0, 0, 1]] and found.shifts.tolist() == [[0, 0, 0]]
     assert found.rotations is None
     assert (found.figure, found.up, found.layout) == ("", "y", "")
@@ -98,7 +100,7 @@ def test_a_file_needs_no_more_than_names_and_turns():
 
 def test_without_turns_the_other_words_mean_nothing():
     source = Source("a.json", b'{"dofs": {"a.x": 1}, "joint_names": 3, "up": "y"}')
-    assert pose.read(source).turns is None
+    assert pose.read(source).joint_rotations is None
     assert warnings_of(source.diagnostics) == [
         ("F007.pose-keys", 1, {"keys": ["joint_names", "up"]})
     ]

@@ -1,4 +1,4 @@
-"""Motions that lead further than single precision can draw: refused where they say so."""
+"""Motions beyond the range of single precision, refused at the line of the number."""
 
 import numpy as np
 import pytest

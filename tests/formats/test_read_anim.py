@@ -1,29 +1,20 @@
-"""The .anim reader and writer: grammar, quirks, and what is said of broken files."""
+"""The .anim reader and writer: grammar, quirks, and messages about broken files."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-from faults import Fault, fault_of, refusal_of, warnings_of
+from faults import fault_of
+from formats.anim_text import GOOD, parse
 from formats.synthetic_smpl import model
 
-from viewer.diagnostics import Phrase
-from viewer.errors import FormatError, RigError, UnsupportedFormatError
+from viewer.errors import RigError, UnsupportedFormatError
 from viewer.formats import Source, detect, read, write
 from viewer.loading import load
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Channel, Clip
 
-ONE = "channel { extrapolate cycle bounce keys 2 { 0 1 flat smooth 2 3 linear -0.5 } }"
-GOOD = f"animation {{ range -1 4 numchannels 1 {ONE} }}"
 SKEL = "balljoint root { offset 0 0 0 }"
-
-
-def parse(text: str) -> tuple[Clip, list[Fault]]:
-    source = Source("walk.anim", text.encode())
-    clip = read(source)
-    assert isinstance(clip, Clip)
-    return clip, warnings_of(source.diagnostics)
 
 
 def test_reads_every_part() -> None:
@@ -51,246 +42,6 @@ def test_reads_every_part() -> None:
 def test_quirks_load_without_a_word(text: str) -> None:
     clip, warnings = parse(text)
     assert len(clip.channels) == 1 and warnings == []
-
-
-def test_unsorted_keys_are_sorted_with_a_warning() -> None:
-    clip, warnings = parse(GOOD.replace("0 1 flat smooth 2", "3 1 flat smooth 2"))
-    np.testing.assert_array_equal(clip.channels[0].times, [2, 3])
-    assert warnings == [("C001.anim-sorted", 1, {"channel": 0, "late": 1, "before": 0})]
-
-
-def test_channel_without_keys_warns() -> None:
-    _, warnings = parse("animation { range 0 1 numchannels 1 channel { keys 0 { } } }")
-    assert warnings == [("C010.anim-no-keys", None, {"channel": 0})]
-
-
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        (
-            "balloon {",
-            (
-                "F002.anim-word",
-                1,
-                {
-                    "where": Phrase("animation"),
-                    "found": b"balloon",
-                    "begins": None,
-                    "expected": "animation",
-                    "looks": None,
-                },
-            ),
-        ),
-        (
-            GOOD.replace("\n", "").replace("keys", "\nkeys").replace("flat", "steep"),
-            (
-                "F002.anim-tangent",
-                2,
-                {
-                    "where": Phrase("anim-key", channel=0, index=0),
-                    "found": b"steep",
-                    "begins": None,
-                    "rules": ("flat", "linear", "smooth"),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("bounce", "jump"),
-            (
-                "F002.anim-mode",
-                1,
-                {
-                    "where": Phrase("anim-channel", channel=0),
-                    "found": b"jump",
-                    "begins": None,
-                    "modes": ("constant", "linear", "cycle", "cycle_offset", "bounce"),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("{ 0 1", "{ 0 nan"),
-            (
-                "F003.number",
-                1,
-                {
-                    "where": Phrase("anim-key", channel=0, index=0),
-                    "found": b"nan",
-                    "begins": None,
-                    "item": Phrase(
-                        "anim-item", where=Phrase("anim-key", channel=0, index=0), item="value"
-                    ),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("keys 2", "keys 3"),
-            (
-                "F002.anim-keys",
-                1,
-                {
-                    "where": Phrase("anim-channel", channel=0),
-                    "found": 2,
-                    "begins": None,
-                    "expected": 3,
-                },
-            ),
-        ),
-        (
-            GOOD.replace("keys 2", "keys 2000000000"),
-            (
-                "F002.anim-count",
-                1,
-                {
-                    "where": Phrase("anim-channel", channel=0),
-                    "found": b"2000000000",
-                    "begins": None,
-                    "item": Phrase(
-                        "anim-item", where=Phrase("anim-channel", channel=0), item="keys"
-                    ),
-                    "left": len(GOOD.split("keys 2")[1]),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("numchannels 1", "numchannels 2"),
-            (
-                "F002.anim-channels",
-                1,
-                {"where": Phrase("animation"), "found": 1, "begins": None, "expected": 2},
-            ),
-        ),
-        (
-            GOOD.split("keys")[0],
-            (
-                "F002.anim-word",
-                1,
-                {
-                    "where": Phrase("anim-channel", channel=0),
-                    "found": None,
-                    "begins": Phrase(
-                        "anim-begins", where=Phrase("anim-channel", channel=0), line=1
-                    ),
-                    "expected": "}",
-                    "looks": None,
-                },
-            ),
-        ),
-        (
-            GOOD.replace("channel {", "\nchannel {").replace(" linear", "").split("-0.5")[0],
-            (
-                "F002.anim-tangent",
-                2,
-                {
-                    "where": Phrase("anim-key", channel=0, index=1),
-                    "found": None,
-                    "begins": Phrase(
-                        "anim-begins", where=Phrase("anim-channel", channel=0), line=2
-                    ),
-                    "rules": ("flat", "linear", "smooth"),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("} }", "} keys 0 { } }", 1),
-            (
-                "F002.anim-keys-again",
-                1,
-                {"where": Phrase("anim-channel", channel=0), "found": b"keys", "begins": None},
-            ),
-        ),
-        (
-            GOOD.replace("numchannels 1 channel", "numchannels 1 chanel"),
-            (
-                "F002.anim-item",
-                1,
-                {"where": Phrase("animation"), "found": b"chanel", "begins": None},
-            ),
-        ),
-        (
-            GOOD.replace("numchannels 1", "numchannels -1"),
-            (
-                "F002.anim-count",
-                1,
-                {
-                    "where": Phrase("animation"),
-                    "found": b"-1",
-                    "begins": None,
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="numchannels"),
-                    "left": len(GOOD.split("numchannels 1")[1]),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("numchannels 1", "numchannels 1.5"),
-            (
-                "F002.anim-count",
-                1,
-                {
-                    "where": Phrase("animation"),
-                    "found": b"1.5",
-                    "begins": None,
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="numchannels"),
-                    "left": len(GOOD.split("numchannels 1")[1]),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("range -1 4", "range -1 up"),
-            (
-                "F002.number",
-                1,
-                {
-                    "where": Phrase("animation"),
-                    "found": b"up",
-                    "begins": None,
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="range"),
-                },
-            ),
-        ),
-        ("", ("F002.kind", None, {"wanted": ".anim", "looks": "an empty file"})),
-        (
-            GOOD.replace("extrapolate", "extrapolates"),
-            (
-                "F002.anim-channel-item",
-                1,
-                {
-                    "where": Phrase("anim-channel", channel=0),
-                    "found": b"extrapolates",
-                    "begins": None,
-                },
-            ),
-        ),
-        (
-            "animation {\nrange 0",
-            (
-                "F002.anim-end",
-                2,
-                {
-                    "where": Phrase("animation"),
-                    "found": None,
-                    "begins": Phrase("anim-begins", where=Phrase("animation"), line=1),
-                    "item": Phrase("anim-item", where=Phrase("animation"), item="range"),
-                },
-            ),
-        ),
-        (
-            GOOD.replace("numchannels 1 ", ""),
-            ("F002.anim-no-count", 1, {"where": Phrase("animation"), "found": 1, "begins": None}),
-        ),
-    ],
-)
-def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) -> None:
-    assert refusal_of(lambda: parse(text)) == fault
-
-
-def test_truncation_anywhere_is_an_error_or_a_warning() -> None:
-    for length in range(len(GOOD)):
-        try:
-            _, warnings = parse(GOOD[:length])
-        except FormatError as problem:
-            assert str(problem).startswith("walk.anim")
-        else:
-            assert warnings, GOOD[:length]
 
 
 def test_write_then_read_gives_the_clip_back(tmp_path: Path) -> None:
@@ -391,7 +142,7 @@ def test_clip_of_another_skeleton_names_both_numbers(tmp_path: Path) -> None:
 
 
 def test_clip_of_a_body_says_why_it_does_not_fit(tmp_path: Path) -> None:
-    """The wasp's 72 channels and SMPL's 72 numbers mean different things."""
+    """The wasp's 72 channels and SMPL's 72 numbers have different meanings."""
     np.savez(tmp_path / "smpl.npz", **model("smpl", 32))
     channel = "channel { extrapolate linear linear keys 1 { 0 0 flat flat } } "
     (tmp_path / "a.anim").write_text(f"animation {{ range 1 2 numchannels 72 {72 * channel} }}")

@@ -1,4 +1,4 @@
-"""The BVH reader: every rotation order, positions on any joint, quirks, and what is guessed."""
+"""The BVH reader: all rotation orders, positions on any joint, quirks, and estimates."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def test_reads_every_part() -> None:
     np.testing.assert_array_equal(skeleton.rest_translations, offsets)
     assert motion.clip.timing.frame_rate == 30.0
     assert motion.clip.timing.rows.tolist() == [0, 1]
-    assert ("frames", "2 at 30 a second") in motion.figure.facts
+    assert ("frames", "2 at 30 fps") in motion.figure.facts
 
 
 def test_joints_are_where_the_channels_put_them() -> None:
     motion, _ = read(GOOD)
     places = worlds(motion)[..., :3, 3]
-    # Frame 0: the thigh turns 90 degrees about z, so the foot, 0.9 below, is 0.9 to the right.
+    # Frame 0: the thigh rotates by 90 degrees about z, so the foot, 0.9 below, is 0.9 to the right.
     np.testing.assert_allclose(
         places[0], [[0, 1, 0], [0.1, 1, 0], [1, 1, 0], [0, 1.6, 0]], atol=1e-15
     )
@@ -178,7 +178,7 @@ def test_joints_without_channels_stay_at_rest() -> None:
 
 def test_end_sites_are_the_far_ends_of_boxes() -> None:
     boxes = read(GOOD)[0].figure.skeleton.boxes
-    # Twice the middle of a box with one way out of the joint is that way.
+    # With a single child, twice the centre of a box is the child's offset.
     np.testing.assert_allclose(boxes[3].sum(axis=0), [0, 0.2, 0], atol=1e-15)
     np.testing.assert_allclose(boxes[2].sum(axis=0), [0, 0, 0.2], atol=1e-15)
     np.testing.assert_allclose(boxes[1].sum(axis=0), [0, -0.9, 0], atol=1e-15)

@@ -1,4 +1,4 @@
-"""``.obj`` files: what is read, what is said, and what is refused."""
+"""``.obj`` files: contents, warnings, and refusals."""
 
 import time
 
@@ -75,7 +75,7 @@ def test_negative_indices_count_back_from_the_line() -> None:
 
 
 def test_negative_indices_reach_back_over_pieces() -> None:
-    # 40,000 quads of their own four vertices are more than one piece of the file.
+    # 40,000 quads with four vertices each span several pieces of the file.
     block = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n"
     mesh = silent(block * 40_000).mesh
     expected = np.arange(160_000).reshape(-1, 4)

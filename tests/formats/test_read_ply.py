@@ -1,4 +1,4 @@
-"""``.ply`` files: text and both byte orders, what is said, and what is refused."""
+"""``.ply`` files in text and both byte orders: contents, warnings, and refusals."""
 
 import struct
 
@@ -47,7 +47,7 @@ def refusal(data):
 
 
 def binary(order, elements, comments=()) -> bytes:
-    """Write elements, each (name, properties, rows), with struct alone."""
+    """Write elements, each (name, properties, rows), using only struct."""
     kind = {"<": "little", ">": "big"}[order]
     lines = ["ply", f"format binary_{kind}_endian 1.0", *comments]
     body = b""

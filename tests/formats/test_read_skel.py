@@ -1,4 +1,4 @@
-"""Every quirk of ``.skel`` as a tiny file."""
+"""All quirks of ``.skel``, each as a tiny file."""
 
 import numpy as np
 import pytest
@@ -171,7 +171,7 @@ def test_minimum_above_maximum_is_ignored_with_a_warning():
     assert warnings == [("S003.ignored", 4, values)]
 
 
-# What is not known
+# Unknown content
 
 
 @pytest.mark.parametrize(

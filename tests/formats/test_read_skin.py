@@ -1,4 +1,4 @@
-"""Every quirk of ``.skin`` as a tiny file."""
+"""All quirks of ``.skin``, each as a tiny file."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_white_space_order_and_optional_braces_mean_nothing(text):
 
 
 def test_rows_of_a_binding_are_the_columns_of_its_matrix():
-    # A quarter turn about z, scaled by 2: x goes to 2y, y to -2x, z to 2z; then move by 1 2 3.
+    # 90 degrees about z, scaled by 2: x goes to 2y, y to -2x, z to 2z; then moved by 1 2 3.
     rows = "0 2 0  -2 0 0  0 0 2  1 2 3"
     figure = silent(
         BARE + f"skinweights 3 {{ 1 0 1 1 0 1 1 0 1 }} bindings 1 {{ matrix {{ {rows} }} }}"
@@ -99,7 +99,7 @@ def test_several_sections_of_triangles_follow_each_other():
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [2, 1, 0], [0, 2, 1]]
 
 
-# What is missing, repeated or unknown
+# Missing, repeated or unknown sections
 
 
 def test_mesh_without_weights_and_bindings_loads_with_a_warning():

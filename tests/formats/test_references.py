@@ -1,4 +1,4 @@
-"""Files that a file names must lie below its folder, links resolved, in every format alike."""
+"""Referenced files must be below the folder of the referencing file, with links resolved."""
 
 import json
 
@@ -27,7 +27,7 @@ PLY = (
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return a model's folder, with a secret picture beside it, and links that lead there."""
+    """Return a model's folder, with a secret picture next to it, and links that lead there."""
     model = tmp_path / "model"
     (tmp_path / "secret").mkdir()
     (model / "sub").mkdir(parents=True)
@@ -46,7 +46,7 @@ OUTSIDE = [
     "link.png",
     "way/x.png",
     "{top}/secret/x.png",
-    "{top}/model/in.png",  # a name that fits only this machine
+    "{top}/model/in.png",  # an absolute name, valid only on this machine
     "C:\\x.png",
     "C:x.png",
     "../model2/x.png",

@@ -1,4 +1,4 @@
-"""Rigged meshes in one ``.npz``: what is written is read, and what is broken is named."""
+"""Rigged meshes in one ``.npz``: round trips, and messages about invalid parts."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def glazed() -> Material:
 
 
 def figure() -> Figure:
-    """Return a figure that has everything the format can hold."""
+    """Return a figure with all parts that the format can store."""
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     mesh = Mesh(

@@ -1,85 +1,31 @@
-"""What is written is read back equal, and what the format cannot hold is refused."""
-
-import math
-import tempfile
-from pathlib import Path
+"""Round trips of all writers, and refusal of content that a format cannot store."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from formats.round_trips import (
+    INF,
+    LARGEST,
+    again,
+    assert_equal_meshes,
+    assert_equal_skeletons,
+    assert_equal_skins,
+    skeleton,
+)
 
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats import Source, skel, skin, write
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
-from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import skin_from_lists
 
 pytestmark = pytest.mark.slow
-
-INF = math.inf
-LARGEST = float(np.finfo(np.float32).max)
-
-
-def skeleton(parents, **changes) -> Skeleton:
-    """Build a skeleton with the DOFs that ``.skel`` has."""
-    n_joints = len(parents)
-    parts = {
-        "names": tuple(f"j{joint}" for joint in range(n_joints)),
-        "parents": parents,
-        "rest_translations": np.zeros((n_joints, 3)),
-        "rest_rotations": np.tile([0.0, 0, 0, 1], (n_joints, 1)),
-        "rest_scales": np.ones((n_joints, 3)),
-        "dof_joints": np.repeat(np.arange(n_joints), [6] + [3] * (n_joints - 1)),
-        "dof_kinds": [0, 1, 2] + [3, 4, 5] * n_joints,
-        "rest_dofs": np.zeros(3 + 3 * n_joints),
-        "dof_limits": np.tile([-INF, INF], (3 + 3 * n_joints, 1)),
-        "boxes": np.tile([[-0.1] * 3, [0.1] * 3], (n_joints, 1, 1)),
-    }
-    return Skeleton(**{**parts, **changes})
 
 
 def mesh(n_vertices=3, **changes) -> Mesh:
     positions = np.arange(3.0 * n_vertices).reshape(-1, 3)
     parts = {"positions": positions, "normals": positions + 1, "triangles": [[0, 1, 2]]}
     return Mesh(**{**parts, **changes})
-
-
-def again(figure, kind):
-    """Write a figure and read the file."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"figure.{kind.__name__.rpartition('.')[2]}")
-        write(figure, path)
-        source = Source.open(path)
-        return kind.read(source), source.warnings
-
-
-def assert_equal_skeletons(found, wanted):
-    assert found.names == wanted.names
-    for name in ("parents", "rest_translations", "dof_joints", "dof_kinds", "rest_dofs", "boxes"):
-        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
-    assert np.array_equal(found.dof_limits, wanted.dof_limits)
-    assert np.array_equal(found.rest_rotations, wanted.rest_rotations)
-    assert np.array_equal(found.rest_scales, wanted.rest_scales)
-
-
-def assert_equal_meshes(found, wanted):
-    for name in ("positions", "normals", "triangles", "material_indices"):
-        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
-    assert (found.uvs is None) == (wanted.uvs is None)
-    assert found.uvs is None or np.array_equal(found.uvs, wanted.uvs)
-    names = [(material.name, material.texture) for material in found.materials]
-    assert names == [(material.name, material.texture) for material in wanted.materials]
-
-
-def assert_equal_skins(found, wanted):
-    for name in ("starts", "joints", "weights"):
-        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
-    # The file holds the bindings, not their inverses.
-    assert_allclose(found.inverse_bind, wanted.inverse_bind, rtol=1e-12, atol=1e-12)
 
 
 def test_hand_made_skeleton_comes_back():
@@ -184,93 +130,7 @@ def test_real_files_come_back(shared, name):
     assert_equal_skins(found.skin, skin_read.skin)
 
 
-# Any figure
-
-NUMBERS = st.floats(-LARGEST, LARGEST, allow_nan=False)
-SMALL = st.floats(-10, 10)
-LETTERS = st.characters(exclude_characters="{} \t\n\r\v\f\ud800", exclude_categories=["Cs"])
-WORDS = st.text(LETTERS, min_size=1, max_size=6).filter(
-    lambda word: word.encode() not in {*skel.KEYWORDS, b"texture"}
-)
-NAMES = st.lists(WORDS, max_size=3).map(" ".join)
-
-
-@st.composite
-def skeletons(draw):
-    n_joints = draw(st.integers(1, 8))
-    parents, path = [-1], [0]
-    for joint in range(1, n_joints):
-        # Depth-first: a parent is the joint before, one of its ancestors, or none.
-        parent = draw(st.sampled_from([-1, *path]))
-        path = [*path[: path.index(parent) + 1], joint] if parent >= 0 else [joint]
-        parents.append(parent)
-    bound = st.one_of(st.just(INF), st.floats(-99_999, 99_999))
-    limits, dofs = [[-INF, INF]] * 3, [0.0] * 3
-    for _ in range(3 * n_joints):
-        low, high = -draw(bound), draw(bound)
-        low, high = (low, high) if low <= high else (high, low)
-        limits, dofs = [*limits, [low, high]], [*dofs, min(max(draw(NUMBERS), low), high)]
-    triples = st.lists(NUMBERS, min_size=3, max_size=3)
-    corners = st.lists(triples, min_size=2, max_size=2)
-    return skeleton(
-        parents,
-        names=tuple(draw(st.lists(NAMES, min_size=n_joints, max_size=n_joints))),
-        rest_translations=draw(st.lists(triples, min_size=n_joints, max_size=n_joints)),
-        rest_dofs=dofs,
-        dof_limits=limits,
-        boxes=np.sort(draw(st.lists(corners, min_size=n_joints, max_size=n_joints)), axis=1),
-    )
-
-
-@st.composite
-def skinned_meshes(draw):
-    n_vertices, n_joints = draw(st.integers(1, 6)), draw(st.integers(1, 4))
-    row = st.lists(NUMBERS, min_size=3, max_size=3)
-    rows = st.lists(row, min_size=n_vertices, max_size=n_vertices)
-    long_row = row.filter(lambda normal: max(map(abs, normal)) >= 1e-15)
-    normals = st.lists(long_row, min_size=n_vertices, max_size=n_vertices)
-    corner = st.integers(0, n_vertices - 1)
-    triangles = draw(st.lists(st.tuples(corner, corner, corner), min_size=1, max_size=6))
-    names = draw(st.lists(NAMES, max_size=3))
-    indices = sorted(draw(st.integers(-1, len(names) - 1)) for _ in triangles)
-    shape = Mesh(
-        positions=draw(rows),
-        normals=draw(normals),
-        triangles=triangles,
-        uvs=draw(st.none() | rows.map(lambda table: [row[:2] for row in table])),
-        materials=tuple(Material(name) for name in names),
-        triangle_materials=indices,
-    )
-    pair = st.tuples(st.integers(0, n_joints - 1), NUMBERS)
-    influences = draw(
-        st.lists(st.lists(pair, max_size=7), min_size=n_vertices, max_size=n_vertices)
-    )
-    bind = np.tile(np.eye(4), (n_joints, 1, 1))
-    for joint in range(n_joints):
-        # Far enough from singular for 1e-12: the diagonal dominates.
-        tilt = draw(st.lists(st.floats(-0.2, 0.2), min_size=9, max_size=9))
-        bind[joint, :3, :3] += np.reshape(tilt, (3, 3))
-        bind[joint, :3, 3] = draw(st.lists(SMALL, min_size=3, max_size=3))
-    return Figure("any", shape, skin=skin_from_lists(influences, np.linalg.inv(bind)))
-
-
-@given(skeletons())
-@settings(max_examples=150)
-def test_any_skeleton_comes_back(wanted):
-    found, warnings = again(Figure("any", skeleton=wanted), skel)
-    assert warnings == []
-    assert_equal_skeletons(found.skeleton, wanted)
-
-
-@given(skinned_meshes())
-@settings(max_examples=150)
-def test_any_skin_comes_back(wanted):
-    found, _ = again(wanted, skin)
-    assert_equal_meshes(found.mesh, wanted.mesh)
-    assert_equal_skins(found.skin, wanted.skin)
-
-
-# What does not fit
+# Unsupported content
 
 
 def refused_for(caught):

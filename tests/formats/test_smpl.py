@@ -1,4 +1,4 @@
-"""Body models of the SMPL family: every way of writing one that real files show."""
+"""Body models of the SMPL family, in all variants found in real files."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def load(tmp_path):
 
 
 def assert_smpl(figure):
-    """The whole of ``SMPL``, whatever way it was written."""
+    """Check all parts of ``SMPL``, regardless of how it was written."""
     assert_array_equal(figure.mesh.positions, SMPL["v_template"])
     assert_array_equal(figure.mesh.triangles, SMPL["f"])
     assert figure.skeleton.parents.tolist() == [
@@ -124,7 +124,7 @@ def test_model_of_another_hierarchy_has_no_names(load):
 
 
 def animal(n_joints=35):
-    """A model with other counts than any of the family: a chain of joints."""
+    """A model with a chain of joints, unlike any member of the family."""
     regressor = np.zeros((n_joints, VERTICES))
     regressor[np.arange(n_joints), np.arange(n_joints) % VERTICES] = 1.0
     weights = np.zeros((VERTICES, n_joints))
@@ -238,7 +238,7 @@ def test_shapes_may_be_named(load):
     assert figure.blend_shapes.names == tuple(names.tolist())
 
 
-# What models may have
+# Optional parts
 
 
 def test_texture_coordinates_split_seams(load):
@@ -256,7 +256,7 @@ def test_landmarks_are_keypoints_on_triangles(load):
     points = load(arrays).keypoints
     assert (len(points.names), points.names[50]) == (51, "landmark 50")
     found = keypoint_positions(points, arrays["v_template"], np.zeros((55, 3)))
-    # Landmark 1 lies on triangle (7 + 3) with the shares 2, 13 and 1 sixteenths.
+    # Landmark 1 is on triangle (7 + 3), at barycentric coordinates of 2, 13 and 1 sixteenths.
     corners = arrays["v_template"][arrays["f"][10]]
     assert_allclose(found[1], (2 * corners[0] + 13 * corners[1] + corners[2]) / 16, atol=1e-15)
 
@@ -323,7 +323,7 @@ def test_facts_list_keys_used_ignored_and_unknown(load):
 
 @pytest.fixture
 def damaged(tmp_path):
-    """Write a model whose big arrays are damaged in the middle; their headers stay whole."""
+    """Write a model whose big arrays are damaged in the middle; their headers stay intact."""
 
     def write(*keys):
         path = tmp_path / "body.npz"

@@ -1,4 +1,4 @@
-"""Body models posed as the package smplx and the published formulas pose them."""
+"""Body models posed like the package smplx and by the published formulas."""
 
 from functools import cache
 from pathlib import Path
@@ -29,7 +29,7 @@ HANDS = {
 
 @cache
 def inputs_of_all_cases():
-    """What the file holds, by case."""
+    """Inputs stored in the file, by case."""
     cases = {name: {} for name in EXPECTED["cases"].tolist()}
     for key in EXPECTED.files:
         case, slash, name = key.partition("/")
@@ -89,7 +89,7 @@ def test_pose_equals_that_of_smplx(case, figure_of):
     assert_allclose(np.linalg.norm(normals, axis=1), 1.0, rtol=0, atol=1e-12)
 
 
-# The made-up model in the published file's own layout
+# The synthetic model in the layout of the published file
 
 HALF_A_STEP = 2.5e-7  # metres; vertices are stored as float32, up to 2 m from the origin
 

@@ -1,4 +1,4 @@
-"""Body models as they are published: pickles with sparse matrices and chumpy's objects."""
+"""Body models in their published form: pickles with sparse matrices and chumpy objects."""
 
 import pickle
 
@@ -30,12 +30,12 @@ def sparse(dense, **options):
 
 
 def chumpy(values):
-    """A value that chumpy computes with, as its authors' files hold the shapes."""
+    """A chumpy value, as the authors' files store the shapes."""
     return created("chumpy.ch", "Ch", mapping(x=array(values), _dirty_vars=b"N", _itr=b"N"))
 
 
 def python_2(**changes):
-    """The model as Python 2 pickled it."""
+    """The model as pickled by Python 2."""
     given = {key: array(SMPL[key]) for key in MATRICES}
     given |= {"J_regressor": sparse(SMPL["J_regressor"]), "shapedirs": chumpy(SMPL["shapedirs"])}
     given |= {"bs_style": text("lbs"), "bs_type": text("lrotmin")}
@@ -71,7 +71,8 @@ def test_pickle_of_python_2_is_read(load):
 
 def test_regressor_may_be_dense_or_of_rows(load):
     assert_smpl(load(python_2(J_regressor=array(SMPL["J_regressor"]))))
-    turned = SMPL["J_regressor"].T  # its compressed columns are the other's compressed rows
+    # The compressed columns of one are the compressed rows of the other.
+    turned = SMPL["J_regressor"].T
     data, indices, indptr = columns(turned)
     rows = matrix(
         sides=turned.shape[::-1],

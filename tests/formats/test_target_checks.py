@@ -1,4 +1,4 @@
-"""The gate of results: what it refuses, and what it takes for the same file."""
+"""Checks of output files: refused targets, and paths of the same file."""
 
 from __future__ import annotations
 

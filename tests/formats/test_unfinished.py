@@ -1,4 +1,4 @@
-"""Temporary files that are removed where the process ends at once."""
+"""Temporary files that are removed when the process is terminated."""
 
 import pytest
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lint.planted import FAULTS, made, weighted
 from lint.sound import column, keypoints, scene_of, standing
-from lint.test_planted_faults import FAULTS, made, weighted
 
 import viewer.lint
 from viewer.diagnostics import Diagnostic

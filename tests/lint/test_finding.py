@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from lint.sound import column, legs, make_mesh
 
-from viewer.lint import MAX_TURN, LintOptions, Subject
+from viewer.lint import MAX_ROTATION, LintOptions, Subject
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
@@ -39,5 +39,5 @@ def test_shares_of_the_size_are_told_without_strays() -> None:
 
 
 def test_the_largest_turn_is_the_one_that_is_told_in_degrees() -> None:
-    assert MAX_TURN == 3400.0
-    assert np.degrees(LintOptions().max_turn) == pytest.approx(MAX_TURN)
+    assert MAX_ROTATION == 3400.0
+    assert np.degrees(LintOptions().max_rotation) == pytest.approx(MAX_ROTATION)

@@ -149,7 +149,7 @@ def test_a_body_that_floats_and_turns_has_no_ground() -> None:
     rises = 2.0 + 0.3 * np.sin(2.0 * np.pi * _K / 20)
     (note,) = found(rises, 0.0)
     assert note.message == (
-        "feet rest at no height long enough: ground height unclear, feet not checked"
+        "feet never rest long enough at one height: ground height unclear, feet not checked"
     )
 
 

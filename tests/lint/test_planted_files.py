@@ -225,7 +225,7 @@ def test_a_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
 
 
 def test_every_code_is_planted_somewhere() -> None:
-    from lint.test_planted_faults import FAULTS as FIGURES
+    from lint.planted import FAULTS as FIGURES
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
     planted |= {code for _, code in MODELS.values()} | {"F001"}

@@ -73,6 +73,7 @@ def test_synthetic_models_and_captures_are_sound(shared_data: Path, name: str) -
     assert heavy(findings) == []
 
 
+@pytest.mark.usefixtures("quick_fits")
 def test_a_mesh_that_was_given_a_rig_is_sound(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
     body = viewer.load(bundled_body()).actors[0]

@@ -69,7 +69,7 @@ _SCENES: dict[str, tuple[Callable[[], Scene], str, tuple[float, float]]] = {
     "stretch-mean": (lambda: posed_fox(2), "stretch-mean", (60.0, 15.0)),
     "area": (_posed_body, "area", (20.0, 12.0)),
     "methods": (_posed_body, "methods", (20.0, 12.0)),
-    "cut": (lambda: posed_fox(2), "cut", (60.0, 15.0)),
+    "pruning": (lambda: posed_fox(2), "pruning", (60.0, 15.0)),
     "normalized": (_uneven_arm, "normalized", (35.0, 15.0)),
     "correctives": (_posed_body, "correctives", (20.0, 12.0)),
     "asymmetry": (_posed_body, "asymmetry", (20.0, 12.0)),

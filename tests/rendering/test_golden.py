@@ -94,11 +94,7 @@ def changed_scenes() -> dict[str, Shot]:
     fewer = replace(mesh, triangles=kept, triangle_materials=None)
     holed = bent(replace(figure, mesh=fewer), *BEND)
     lights = options().lights
-    swapped = replace(
-        lights,
-        key=replace(lights.key, color=lights.rim.color),
-        rim=replace(lights.rim, color=lights.key.color),
-    )
+    blue = replace(lights, key=replace(lights.key, color=(0.2, 0.4, 1.0)))
     aside = bent(figure, *BEND)
     aside.placement[0, 3] = 0.06
     blank = bent(figure, *BEND)
@@ -107,7 +103,7 @@ def changed_scenes() -> dict[str, Shot]:
     return {
         "a joint moved by 7 degrees": Shot(Scene([moved]), options()),
         "triangles missing": Shot(Scene([holed]), options()),
-        "colours swapped": Shot(whole, options(lights=swapped)),
+        "a blue key light": Shot(whole, options(lights=blue)),
         "another shading": Shot(whole, options(shading="normals")),
         "a step aside": Shot(Scene([aside]), options()),
         "nothing drawn": Shot(Scene([blank]), options()),

@@ -120,7 +120,7 @@ def posed(figure, seed=0):
     return pose
 
 
-@pytest.mark.parametrize("name", ["methods", "correctives", "cut"])
+@pytest.mark.parametrize("name", ["methods", "correctives", "pruning"])
 def test_every_split_vertex_has_the_number_of_its_vertex(buffers, name):
     figure = buffers.mesh.figure
     pose, how = posed(figure), Skinning(max_influences=2)
@@ -150,8 +150,8 @@ def test_numbers_are_computed_when_something_changed_only(buffers, monkeypatch):
     ):
         change()
         before = len(calls)
-        buffers.update("cut", pose, how)
-        buffers.update("cut", pose, how)
+        buffers.update("pruning", pose, how)
+        buffers.update("pruning", pose, how)
         assert len(calls) == before + 1
     buffers.update("methods", pose, how)
     assert calls[-1] == "methods"
@@ -188,14 +188,14 @@ def test_numbers_grow_with_the_figure(buffers):
 
 
 def test_binding_space_has_numbers_of_zero_and_a_range(buffers):
-    buffers.update("cut", posed(buffers.mesh.figure), Skinning(max_influences=1))
-    buffers.update("cut", None, Skinning(max_influences=1))
+    buffers.update("pruning", posed(buffers.mesh.figure), Skinning(max_influences=1))
+    buffers.update("pruning", None, Skinning(max_influences=1))
     assert not values_of(buffers).any()
     assert buffers.range == (0.0, 0.0)
 
 
 def test_figure_without_a_skin_can_be_drawn_so(offscreen):
-    picture = view_of(offscreen, scene_of(square()), "cut")
+    picture = view_of(offscreen, scene_of(square()), "pruning")
     assert drawn(picture).sum() == 40 * 40
 
 
@@ -351,7 +351,7 @@ def test_name_for_the_selected_joint():
     actor = two_joints(LEFT_TO_RIGHT).actors[0]
     assert name_for("weight", actor, 2) == "weight:j2"
     assert name_for("weight:j0", actor, 2) == "weight:j0"
-    assert name_for("cut", actor, 2) == "cut"
+    assert name_for("pruning", actor, 2) == "pruning"
     assert name_for("weight", actor, -1) == name_for("weight", None, 1) == "weight"
     assert name_for("weight", alone(grid_figure()).actors[0], 7) == "weight"
 

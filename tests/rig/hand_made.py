@@ -1,4 +1,4 @@
-"""Small rigs for the tests of the maths, and a plain implementation to hold it to."""
+"""Small rigs for tests of the maths, and a plain reference implementation."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def mesh(positions, normals=None, triangles=((0, 0, 0),)) -> Mesh:
 
 
 def matrix(turn=None, move=(0.0, 0.0, 0.0)):
-    """Return a 4 x 4 matrix that turns, then moves."""
+    """Return a 4 x 4 matrix that rotates, then translates."""
     result = np.eye(4)
     if turn is not None:
         result[:3, :3] = turn
@@ -62,7 +62,7 @@ def turn_z(angle):
 
 
 def plain_kinematics(parents, local):
-    """Multiply the chain of every joint on its own, from the joint up to its root."""
+    """Multiply each joint's chain of matrices separately, from the joint up to its root."""
     world = []
     for joint in range(len(parents)):
         product = np.eye(4)
@@ -74,7 +74,7 @@ def plain_kinematics(parents, local):
 
 
 def plain_skinning(positions, normals, influences, palette):
-    """Skin vertex by vertex and influence by influence, as the formula reads."""
+    """Skin vertex by vertex and influence by influence, literally by the formula."""
     out_positions, out_normals = [], []
     for position, normal, pairs in zip(positions, normals, influences, strict=True):
         if not any(weight != 0.0 for _, weight in pairs):

@@ -1,4 +1,4 @@
-"""Offsets by weight: blend shapes, pose correctives, and joints that follow the mesh."""
+"""Weighted offsets: blend shapes, pose correctives, and joints that follow the mesh."""
 
 import numpy as np
 import pytest
@@ -142,7 +142,7 @@ def test_correctives_need_nine_rows_a_joint():
 def test_joints_are_regressed_as_by_the_dense_matrix():
     rng = np.random.default_rng(1)
     dense = rng.normal(size=(6, 20)) * (rng.random((6, 20)) < 0.3)
-    dense[4] = 0.0  # a joint that no vertex gives stays at the origin
+    dense[4] = 0.0  # a joint with an empty regressor row stays at the origin
     joints, vertices = np.nonzero(dense)
     positions = rng.normal(size=(20, 3))
     order = rng.permutation(len(joints))

@@ -56,7 +56,7 @@ def test_skeleton_points_hold_all_corners_of_turned_boxes():
     box = [[[0, 0, 0], [1, 2, 3]]]
     arm = skeleton([-1], [(0, "z", math.pi / 2)], offsets=[[10, 0, 0]], boxes=box)
     points = skeleton_points(arm, rest_pose(arm))
-    # A quarter turn about z sends (x, y) to (-y, x).
+    # A rotation by 90 degrees about z maps (x, y) to (-y, x).
     corners = {(10 - y, x, z) for x in (0, 1) for y in (0, 2) for z in (0, 3)}
     assert {tuple(np.round(point, 12) + 0.0) for point in points} == corners
 

@@ -1,4 +1,4 @@
-"""Keypoints: joints, and places on triangles, of a posed figure; and what else files annotate."""
+"""Keypoints of a posed figure on joints and triangles, and other annotations of files."""
 
 from dataclasses import replace
 

@@ -79,7 +79,7 @@ def test_forward_kinematics_changes_neither_argument():
 
 
 def test_world_matrices_turn_the_child_about_its_parent():
-    # An arm of length 2 along x on a root at (0, 1, 0) that is turned a quarter about z.
+    # An arm of length 2 along x, on a root at (0, 1, 0) rotated by 90 degrees about z.
     arm = skeleton([-1, 0], [(0, "z", math.pi / 2)], offsets=[[0, 1, 0], [2, 0, 0]])
     world = world_matrices(arm, rest_pose(arm))
     assert_allclose(world[1, :3, 3], [0, 3, 0], atol=1e-15)

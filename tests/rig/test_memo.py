@@ -1,4 +1,4 @@
-"""Remembered results: how many, for how long, and shared by threads."""
+"""Cached results: number, lifetime, and use by several threads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.rig.memo import Memo
 
 
 class Owner:
-    """Something that can be referred to weakly."""
+    """An object that supports weak references."""
 
 
 def test_a_result_is_made_once() -> None:
@@ -43,7 +43,7 @@ def test_results_go_with_their_owner() -> None:
 
 
 def test_threads_that_take_each_others_room_get_their_own() -> None:
-    """One result is kept, and a second thread asks for another one while the first is made."""
+    """One result is kept, and a second thread requests another one while the first is computed."""
     memo: Memo[Owner, str] = Memo(kept=1)
     owner, inside, go = Owner(), threading.Event(), threading.Event()
     found: list[str] = []

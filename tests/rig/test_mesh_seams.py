@@ -14,7 +14,7 @@ CUBE = np.array([[a, b, c] for s in SIDES for a, b, c in ((s[0], s[1], s[2]), (s
 
 
 def atlas():
-    """Return a cube with a place of its own in the picture for each side."""
+    """Return a cube with a separate area of the picture for each side."""
     uvs, corners = [], []
     for side in range(6):
         uvs += [[side, 0], [side + 1, 0], [side + 1, 1], [side, 1]]
@@ -28,7 +28,7 @@ def build(positions=CORNERS, triangles=CUBE, **changes) -> Mesh:
 
 
 def check_split(mesh: Mesh) -> None:
-    """Hold a split to what it is for: the same corners with the same texture coordinates."""
+    """Check that a split preserves the corners and their texture coordinates."""
     sources, uv_indices, triangles = split_seams(mesh)
     assert np.array_equal(sources[triangles], mesh.triangles)
     corners = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
@@ -140,7 +140,7 @@ def test_volume_of_clockwise_triangles_is_negative():
 
 def test_volume_far_from_the_origin_keeps_its_digits():
     box = CORNERS * [2.0, 3.0, 0.7] + [1e6 / 3, -3e6 / 7, 1e6]
-    # A place 1e6 away is rounded to 1e-10; unshifted, cubes of 1e6 would be to 100.
+    # Positions 1e6 away are rounded to 1e-10; without a shift, cubes of 1e6 would be to 100.
     assert volume(box, CUBE) == pytest.approx(4.2, abs=1e-8)
 
 

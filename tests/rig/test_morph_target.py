@@ -102,19 +102,20 @@ def test_vertex_outside_the_mesh_is_refused_with_both_numbers(index):
     target = MorphTarget("smile", [0, index], np.zeros((2, 3)), np.zeros((2, 3)))
     with pytest.raises(RigError) as caught:
         with_morphs(figure(), [target])
-    assert str(caught.value) == (
-        f"morph smile: vertex index {index} is outside head, which has 3 vertices"
-    )
+    values = {"morph": "smile", "figure": "head", "found": index, "n": 3}
+    assert caught.value.diagnostic.key == "F004.morph-vertex"
+    assert caught.value.diagnostic.values == values
 
 
 def test_figures_without_mesh_or_with_shapes_of_their_own_are_refused():
     with pytest.raises(RigError) as caught:
         with_morphs(figure(mesh=None, skin=None), [LIFTED])
-    assert str(caught.value) == "morph lifted: head has no mesh to change"
+    assert caught.value.diagnostic.key == "F004.morph-mesh"
+    assert caught.value.diagnostic.values == {"morph": "lifted", "figure": "head"}
     own = BlendShapes(("taller",), np.zeros((1, 3, 3)))
     with pytest.raises(RigError) as caught:
         with_morphs(figure(blend_shapes=own), [LIFTED])
-    assert str(caught.value) == "morph lifted: head has shapes of its own"
+    assert caught.value.diagnostic.key == "F004.morph-shapes"
 
 
 def test_target_that_lists_a_vertex_twice_is_refused():

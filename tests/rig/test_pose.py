@@ -11,7 +11,7 @@ ROUNDING = 1e-15  # a few units in the last place of numbers up to 1
 
 
 def printed_matrix(x, y, z, offset):
-    """The matrix L as the specification prints it, entry by entry."""
+    """The matrix L as printed in the specification, entry by entry."""
     cx, sx, cy, sy, cz, sz = *trig(x), *trig(y), *trig(z)
     ox, oy, oz = offset
     return np.array(
@@ -43,7 +43,7 @@ def test_local_matrix_is_the_printed_one(angles):
 
 
 def test_quarter_turns_about_x_then_y_then_z_by_hand():
-    # z axis: x turns it to -y, y leaves it, z turns -y to +x.
+    # z axis: x rotates it to -y, y preserves it, z rotates -y to +x.
     joint = euler_joint("xyz", [math.pi / 2] * 3)
     local = local_matrices(joint, rest_pose(joint))[0]
     assert_allclose(local[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=ROUNDING)

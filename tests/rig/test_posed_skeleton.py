@@ -1,4 +1,4 @@
-"""World and skinning matrices of a pose: made once, right, and of its present numbers."""
+"""World and skinning matrices of a pose: correct, computed once, and up to date."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def actor():
 
 @pytest.fixture
 def runs(monkeypatch):
-    """How often forward kinematics ran."""
+    """Counts the runs of forward kinematics."""
     counted, run = [], kinematics.forward_kinematics
 
     def count(*args):
@@ -53,7 +53,7 @@ def test_kinematics_run_once_until_a_number_changes(actor, runs):
     skeleton, pose = actor.figure.skeleton, actor.pose
     first = posed_skeleton(skeleton, pose)
     assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
-    pose.figure_translation[0] += 1.0  # comes after skinning
+    pose.figure_translation[0] += 1.0  # applied after skinning
     pose.figure_scale = 2.0
     assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
 

@@ -1,4 +1,4 @@
-"""Shape: the rest mesh changes, joints and bindings follow, and the rest pose still returns it."""
+"""Shapes: joints and bindings follow the rest mesh, which the rest pose reproduces."""
 
 import gc
 import weakref
@@ -114,7 +114,7 @@ def test_joint_turns_about_its_shaped_place():
 
 
 def turned_chain(scale=1.0) -> Figure:
-    """Return a chain of three whose rest rotations are not the identity, bound as it rests."""
+    """Return a chain of three with rest rotations, bound in its rest pose."""
     rng = np.random.default_rng(0)
     bones = skeleton(
         [-1, 0, 1],
@@ -190,7 +190,7 @@ def test_family_at_rest_is_its_template_plus_the_shape(tmp_path, kind):
 
 
 def plain_smpl(arrays, weights, turns):
-    """The forward pass as the authors write it: loops, one joint and one vertex at a time."""
+    """The authors' forward pass, with loops over joints and vertices."""
     shape = arrays["v_template"] + arrays["shapedirs"] @ weights
     joints = arrays["J_regressor"] @ shape
     parents = arrays["kintree_table"][0].astype(np.int64)
@@ -243,7 +243,7 @@ def test_another_rest_mesh_moves_the_joints_by_the_regressor():
 
 
 class Owner:
-    """Something a memo can hold weakly."""
+    """An object that supports weak references."""
 
 
 def test_memo_makes_once_keeps_a_few_and_forgets_with_the_owner():
@@ -254,7 +254,7 @@ def test_memo_makes_once_keeps_a_few_and_forgets_with_the_owner():
 
     assert [memo.get(owner, key, make(key)) for key in "aabab"] == list("aabab")
     assert made == ["a", "b"]
-    memo.get(owner, "c", make("c"))  # the oldest, a, makes room
+    memo.get(owner, "c", make("c"))  # the oldest, a, is evicted
     memo.get(owner, "b", make("b"))
     memo.get(owner, "a", make("a again"))
     assert made == ["a", "b", "c", "a again"]

@@ -1,4 +1,4 @@
-"""Units of length: one table, and what looks like metres."""
+"""Units of length: conversion factors, and detection of metres."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,12 @@ import pytest
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import length_text, length_unit
 from viewer.rig.skeleton import ball_skeleton
-from viewer.rig.units import METRES, SIZES, WORDS, is_metres, unit_of_scaled
+from viewer.rig.units import METRES, SIZES, UNIT_NAMES, is_metres, unit_of_scaled
 
 
 def test_factors_are_those_of_the_units():
     assert METRES == {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-    assert WORDS.keys() == METRES.keys() and SIZES.keys() < METRES.keys()
+    assert UNIT_NAMES.keys() == METRES.keys() and SIZES.keys() < METRES.keys()
 
 
 @pytest.mark.parametrize("unit", SIZES)
@@ -42,13 +42,13 @@ def test_small_lengths_are_millimetres_in_every_known_unit(unit, text):
     ("unit", "scale", "expected"),
     [
         ("m", 1.0, "m"),
-        ("m", 0.6, "m"),  # a child beside a grown-up
+        ("m", 0.6, "m"),  # a child and an adult
         ("m", 110.0, "cm"),
         ("m", 900.0, "mm"),
         ("cm", 0.011, "m"),
         ("in", 1.2, "in"),
         ("in", 2.54, "cm"),
-        ("m", 39.37, ""),  # inches are never guessed
+        ("m", 39.37, ""),  # inches are never estimated
         ("m", 7.0, ""),
         ("", 1.0, ""),
         ("furlong", 1.0, ""),

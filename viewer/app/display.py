@@ -1,4 +1,4 @@
-"""Search for a display where a window can be opened, and the reason if there is none."""
+"""Detection of a display on which a window can be opened, with the reason if there is none."""
 
 from __future__ import annotations
 
@@ -29,41 +29,41 @@ def import_glfw() -> Any:
 
     import glfw
 
-    # GLFW reports errors as Python warnings; here they are asked for and raised instead.
+    # By default errors become Python warnings; the viewer queries and raises them instead.
     glfw.ERROR_REPORTING = "ignore"
     return glfw
 
 
-def window_error(words: str) -> RenderError:
-    """Return an error with the OpenGL version of a display that refused a window.
+def window_error(message: str) -> RenderError:
+    """Return an error with the OpenGL version of a display on which no window could be created.
 
     Parameters
     ----------
-    words : str
-        GLFW's message, used if the display offers no OpenGL at all.
+    message : str
+        GLFW's message, used if the display has no OpenGL at all.
     """
     glfw = import_glfw()
     glfw.default_window_hints()
     glfw.window_hint(glfw.VISIBLE, False)
-    # Any version: the newest compatibility profile that there is.
+    # Without a requested version, GLFW creates the newest compatibility profile.
     handle = glfw.create_window(64, 64, "viewer", None, None)
     if not handle:
-        return RenderError(explain(words))
+        return RenderError(explain(message))
     try:
         glfw.make_context_current(handle)
         address = glfw.get_proc_address("glGetString")
-        return RenderError(offer_text(offer_of(address)) if address else explain(words))
+        return RenderError(offer_text(offer_of(address)) if address else explain(message))
     finally:
         glfw.destroy_window(handle)
 
 
 def find_display() -> None:
-    """Return if a window could be opened.
+    """Check that a window can be opened.
 
     Raises
     ------
     NoDisplay
-        With the reason in one line.
+        If not; the message gives the reason in one line.
     """
     if sys.platform.startswith("linux"):
         names = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -79,6 +79,6 @@ def find_display() -> None:
     if not started:
         stop_watching()
         code, text = glfw.get_error()
-        words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
+        message = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
         display = os.environ.get("DISPLAY", "")
-        raise NoDisplay(f"no display found (DISPLAY={display}: {words})")
+        raise NoDisplay(f"no display found (DISPLAY={display}: {message})")

@@ -1,8 +1,8 @@
-"""Orderly end of the program when the X server goes away.
+"""Clean exit of the program when the connection to the X server is lost.
 
-Xlib then exits the process from within whatever called it, with its own message and exit code 1.
-A program can install a handler instead, which must not return: OpenGL drivers would use replies
-that the X server never sent, and crash. So the handler does all of the clean-up.
+By default Xlib then exits the process, with its own message and exit code 1. A program can install
+its own handler, but the handler must not return: OpenGL drivers would use replies that the X server
+never sent, and crash. So the handler does all of the clean-up.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ _Handler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 def watch_display() -> None:
-    """Install the handler that ends the process in order if the X server goes away.
+    """Install the handler that exits cleanly if the connection to the X server is lost.
 
-    Called before GLFW starts: the server may go away while a window is created. It may be
-    called repeatedly.
+    Called before GLFW starts, because the connection may be lost while a window is created. Further
+    calls have no effect.
     """
     global _library
     if _library is None:
@@ -47,7 +47,7 @@ def _leave(_: Any) -> int:
     try:
         remove_unfinished()
         display = os.environ.get("DISPLAY", "")
-        text = f"the display is lost: the X server closed the connection (DISPLAY={display})"
+        text = f"lost the display: the X server closed the connection (DISPLAY={display})"
         if sys.stderr is not None:
             sys.stderr.write(f"viewer: {text}\n")
             sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""Table of the panels and keys that features add to the window.
+"""Tables of the panels and keys that features add to the window.
 
 A panel is a module ``<name>_panel.py`` of its feature's folder with ``draw(state)``; a key runs a
 function of the state. Both are imported when they are first used.
@@ -37,10 +37,10 @@ class Panel:
     place : str
         Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
-        Part of ``Figure`` without which the panel is hidden; ``"motion"`` or ``"actors"``:
-        a motion, or a motion or several actors; empty for none.
+        Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
+        ``"actors"`` a motion or several actors; empty if the panel is always available.
     leads : bool
-        Whether it comes to the front of its tabs when a scene makes it available.
+        Whether it is brought to the front of its tabs when a scene makes it available.
     on_demand : bool
         Whether it is closed until the user opens it.
     """
@@ -60,13 +60,13 @@ class Shortcut:
     Attributes
     ----------
     chords : tuple of int
-        ImGui's key codes with their modifiers.
+        ImGui's key codes with modifiers.
     label : str
         Name of the key.
     text : str
-        Its effect, as shown in lists of keys.
+        Effect of the key, as shown in lists of keys.
     action : str
-        Module and function within ``viewer.app``; called with the state.
+        Module and function within ``viewer.app``, called with the state.
     arguments : tuple
         Further arguments of the action.
     """
@@ -103,12 +103,12 @@ PANELS = {
 """Panels in the order in which they are docked and listed in the menu."""
 
 KEYS = (
-    Shortcut((_K.r,), "R", "reset every DOF to the file's pose", "posing.pose_actions.reset_pose"),
+    Shortcut((_K.r,), "R", "reset the pose to that of the file", "posing.pose_actions.reset_pose"),
     Shortcut((_K.s,), "S", "show or hide the skeleton", "view.display_actions.toggle_skeleton"),
     Shortcut(
         (_K.k,),
         "K",
-        "attached skin or skin in binding space",
+        "attached skin, or skin in binding space",
         "view.display_actions.toggle_binding",
     ),
     Shortcut((_K.w,), "W", "wireframe", _OPTION, ("wireframe", "Wireframe")),
@@ -182,7 +182,7 @@ MOUSE = (
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
     ("Wheel", "zoom to the pointer"),
-    ("Alt drag of the time line", "go between whole frames"),
+    ("Alt drag in the timeline", "seek between whole frames"),
     ("Axis gizmo", "a click looks along an axis, a drag orbits"),
     ("Drop files", "open them"),
 )

@@ -1,4 +1,4 @@
-"""One frame of the window or of a headless run: interface, input and scene, drawn together."""
+"""Frames of the window or of a headless run: interface, input, jobs and scene."""
 
 from __future__ import annotations
 
@@ -49,22 +49,22 @@ from viewer.rig.scene import Actor, Scene
 __all__ = ["Frame"]
 
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
-"""Suffixes of poses and pictures, which are applied to the open figure."""
+"""Suffixes of poses and textures, which are applied to the open figure."""
 
 
 class Frame:
-    """Draws frames of one state with one context; the caller begins ImGui's frame.
+    """Runs and draws frames of one state in one context; the caller begins ImGui's frame.
 
     Parameters
     ----------
     state : AppState
-        What is shown and changed.
+        State that is shown and changed.
     context : moderngl.Context
-        Current in this thread.
+        Context that is current in this thread.
     wake : callable
         Called from other threads when a frame must be drawn.
     keeps_recent : bool
-        Whether opened files are remembered for the next run.
+        Whether opened files are stored in the list of recent files.
     """
 
     def __init__(
@@ -89,9 +89,9 @@ class Frame:
         Parameters
         ----------
         framebuffer : moderngl.Framebuffer
-            The window's or the headless one.
+            Framebuffer of the window or of the headless context.
         size : (int, int)
-            Its width and height in pixels.
+            Width and height of the framebuffer, pixels.
         scale : float
             Pixels per window coordinate.
         """
@@ -101,7 +101,7 @@ class Frame:
         self.state.stats.frame_ms = 1e3 * (time.perf_counter() - started)
 
     def run(self, scale: float) -> None:
-        """Run a frame without painting its panels, which only a screen needs."""
+        """Run a frame without painting the panels."""
         state = self.state
         drop_motion_before_press()
         if not stops_time(state):
@@ -190,7 +190,7 @@ class Frame:
         renderer.annotations = pinned_annotations(state, size)
         key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         if key != self._drawn:
-            self._drawn = key  # even if it fails: no retry until something changes
+            self._drawn = key  # even if drawing fails: it is retried only after a change
             self._draw_target(size)
         if self.target is not None:
             picture = imgui.ImTextureRef(self.target.texture.glo)
@@ -235,9 +235,9 @@ class Frame:
         return target
 
     def open(self, paths: Sequence[Path]) -> None:
-        """Begin to read files; the current scene stays until they have been read.
+        """Begin to read files; the current scene is shown until they have been read.
 
-        A skin dropped on a lone skeleton, or the reverse, is attached to it if they fit.
+        A skin opened while the scene is a lone skeleton, or the reverse, is attached if it fits.
         """
         if not paths:
             return
@@ -292,7 +292,7 @@ class Frame:
         self.state.of(Files).stream = Stream(left, self.wake) if left else None
 
     def _add(self, contents: Contents) -> None:
-        """Apply poses and pictures to the chosen actor."""
+        """Apply poses and textures to the chosen actor."""
         state = self.state
         try:
             actor, notes = add_to_actor(contents, state.actor)
@@ -306,6 +306,7 @@ class Frame:
         state.say_status(f"Applied {', '.join(printable(path.name, 60) for path, _ in added)}")
 
     def _do_wanted(self) -> None:
+        """Serve the requests made during the frame."""
         state = self.state
         if "open dialog" in state.wants:
             state.of(Files).dialog = FileDialog(folder_of(state.paths))
@@ -319,7 +320,7 @@ class Frame:
         state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
 
     def _start_recording(self) -> None:
-        """Begin to record if asked for and no other job runs."""
+        """Start a requested recording unless another job is running."""
         state, recording = self.state, self.state.of(Recording)
         path, settings, recording.wanted = recording.wanted, recording.settings, None
         if path is None or settings is None or state.job is not None:
@@ -332,14 +333,14 @@ class Frame:
         state.clock.playing, recording.settings = False, None
 
     def _save_screenshot(self) -> None:
-        """Save the scene, without panels, under a new name in the current folder."""
+        """Save a picture of the scene under an unused name in the current folder."""
         try:
             path = free_path(Path.cwd(), self.state.scene.title, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
             if "##legend" in self.state.item_rects:  # drawn over the picture, not in it
                 self.state.say(
-                    "Saved without the legend: turn on Legend in pictures in the Weights panel"
+                    'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
                 )
         except ViewerError as problem:
             self.state.error = str(problem)

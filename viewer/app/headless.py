@@ -1,4 +1,4 @@
-"""Interface without a window, for pictures with panels and for tests with synthetic input."""
+"""Interface without a window, for screenshots with panels and tests with synthetic input."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class HeadlessApp:
     Parameters
     ----------
     state : AppState
-        What is shown and changed.
+        State that is shown and changed.
     size : (int, int)
-        Size of the imaginary window, in window coordinates.
+        Size of the virtual window, in window coordinates.
     device : int, optional
         Index of the EGL device.
     scale : float
-        Size of the interface.
+        Scale of the interface.
     pixels_per_point : float
         Framebuffer pixels per window coordinate, as on a HiDPI screen.
     """
@@ -62,8 +62,8 @@ class HeadlessApp:
     def step(self, frames: int = 1) -> None:
         """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io.
 
-        Panels are painted only for ``pixels``: in software that takes longer than the
-        rest of a frame.
+        Panels are painted only by ``pixels``, because with software rendering that takes longer
+        than the rest of a frame.
         """
         self._make_current()
         for _ in range(frames):
@@ -75,11 +75,11 @@ class HeadlessApp:
             _upload_textures()
 
     def _make_current(self) -> None:
-        """Make this context current: another one may have been used since."""
+        """Make this context current, because another one may have been used since."""
         self.context.__enter__()  # type: ignore[no-untyped-call]
 
     def pixels(self) -> Bytes:
-        """Return the interface as of the last frame, (H, W, 4) uint8."""
+        """Return the interface of the last frame as pixels, (H, W, 4) uint8."""
         self._make_current()
         self.frame.paint(self.screen.framebuffer, self.screen.size)
         return self.screen.read()
@@ -121,5 +121,5 @@ def _upload_textures() -> None:
     """Upload the glyph textures that ImGui has requested, as painting would do first."""
     for texture in imgui.get_platform_io().textures:
         if texture.status != imgui.ImTextureStatus.ok:
-            # Not in the stubs of imgui-bundle.
+            # This function is missing from the stubs of imgui-bundle.
             imgui.backends.opengl3_update_texture(texture)  # type: ignore[attr-defined,unused-ignore]

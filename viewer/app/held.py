@@ -1,4 +1,4 @@
-"""State of widgets and handles held with the mouse: edits and drags in progress."""
+"""Queries for edits and drags in progress: widgets and handles held with the mouse."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def is_held(state: AppState) -> bool:
 
 
 def stops_time(state: AppState) -> bool:
-    """Return whether time must wait: a handle is held but not dragged yet.
+    """Return whether time must stand still: a handle is held but has not been dragged yet.
 
-    A click must not pause playback, and a drag must keep its initial pose.
+    A click must not pause playback, and a drag must start from an unchanged pose.
     """
     drag = state.of(Posing).drag
     return drag is not None and not drag.has_moved

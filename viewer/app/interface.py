@@ -1,4 +1,4 @@
-"""One frame of the interface: menu, docked panels and overlays. Changes AppState only."""
+"""Layout and drawing of the interface: menu, docked panels and overlays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["draw_interface"]
 
 _DOCK = "viewer dock"
 _LEFT, _RIGHT = (0.235, 0.30, 14.0), (0.27, 0.36, 17.0)
-"""Usual and largest fraction of the window's width, and the minimum width in font sizes."""
+"""Default and largest fraction of the window's width, and the minimum width in font sizes."""
 _BOTTOM, _LOWEST = 0.2, 10.0
 """Fraction of the window's height for bottom panels, and the minimum height in font sizes."""
 
@@ -36,7 +36,7 @@ def draw_interface(state: AppState) -> list[Path]:
                 appears = _draw_panel(state, name, panel)
                 leading = panel.title if appears and panel.leads else leading
         if leading:
-            # Drawn before the panels, a closing menu would bring one of them to the front.
+            # Set after the panels are drawn: a menu that closes brings another panel to the front.
             imgui.set_window_focus(leading)
         node = imgui.internal.dock_builder_get_central_node(dock)
         state.view_rect = (node.pos.x, node.pos.y, node.size.x, node.size.y)
@@ -72,14 +72,14 @@ def _build_layout(dock: int) -> None:
     builder.dock_builder_remove_node(dock)
     builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
     builder.dock_builder_set_node_size(dock, imgui.get_main_viewport().size)
-    left_share, right_share = _share(_LEFT), _share(_RIGHT)
+    left_part, right_part = _fraction(_LEFT), _fraction(_RIGHT)
     height = imgui.get_main_viewport().size.y
-    share = min(max(_BOTTOM, _LOWEST * imgui.get_font_size() / max(height, 1.0)), 0.4)
-    whole = builder.dock_builder_split_node(dock, imgui.Dir.down, share)
-    split = builder.dock_builder_split_node(whole.id_at_opposite_dir, imgui.Dir.left, left_share)
+    fraction = min(max(_BOTTOM, _LOWEST * imgui.get_font_size() / max(height, 1.0)), 0.4)
+    whole = builder.dock_builder_split_node(dock, imgui.Dir.down, fraction)
+    split = builder.dock_builder_split_node(whole.id_at_opposite_dir, imgui.Dir.left, left_part)
     left, rest = split.id_at_dir, split.id_at_opposite_dir
-    share = right_share / (1.0 - left_share)
-    right = builder.dock_builder_split_node(rest, imgui.Dir.right, share).id_at_dir
+    fraction = right_part / (1.0 - left_part)
+    right = builder.dock_builder_split_node(rest, imgui.Dir.right, fraction).id_at_dir
     middle = builder.dock_builder_split_node(right, imgui.Dir.down, 0.64)
     bottom = builder.dock_builder_split_node(middle.id_at_dir, imgui.Dir.down, 0.48)
     places = {
@@ -94,15 +94,15 @@ def _build_layout(dock: int) -> None:
     builder.dock_builder_finish(dock)
 
 
-def _share(side: tuple[float, float, float]) -> float:
-    """Return a side's fraction of the width: the usual one, or more if the window is narrow."""
+def _fraction(side: tuple[float, float, float]) -> float:
+    """Return a side's fraction of the width: the default, or more if the window is narrow."""
     usual, largest, wanted = side
     width = max(imgui.get_main_viewport().size.x, 1.0)
     return max(usual, min(largest, wanted * imgui.get_font_size() / width))
 
 
 def _dock_of_neighbour(panel: Panel) -> int:
-    """Return where another panel of the same place is docked, 0 if none is."""
+    """Return the dock node of another panel with the same place, 0 if none is docked."""
     for other in PANELS.values():
         window = None
         if other.place == panel.place and other is not panel:
@@ -113,13 +113,13 @@ def _dock_of_neighbour(panel: Panel) -> int:
 
 
 def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
-    """Draw one panel; return whether it is new."""
-    # A panel that appears with a figure must not cover the others.
+    """Draw one panel; return whether it has just appeared."""
+    # A panel that appears together with a figure must not cover other panels.
     is_quiet = panel.needs and not panel.leads
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
     neighbour = _dock_of_neighbour(panel)
     if neighbour:
-        # A panel newer than the stored layout would float over the others.
+        # A panel that is missing from the stored layout would float over the others.
         imgui.set_next_window_dock_id(neighbour, imgui.Cond_.first_use_ever)
     shown, stays = imgui.begin(panel.title, True, flags)
     appears = imgui.is_window_appearing()

@@ -1,4 +1,4 @@
-"""Keyboard input: pressed keys run the actions of the table of features."""
+"""Keyboard input: pressed keys run the actions in the table of keys."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Keyboard:
 
 def handle_keys(state: AppState) -> None:
     """Run the actions of keys pressed in this frame; letters typed into a text box are ignored."""
-    # Otherwise ImGui would move the focus with Tab.
     keyboard = state.of(Keyboard)
+    # Otherwise ImGui would move the focus with Tab.
     imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
-    # Ctrl may be released within the frame in which the letter goes down: modifiers held
-    # in the previous frame still count, or Ctrl+S would be S.
+    # Ctrl may be released in the frame in which the letter is pressed. Modifiers held in the
+    # previous frame still count, or Ctrl+S would be taken for S.
     now = imgui.get_io().key_mods
     held, keyboard.modifiers = now | keyboard.modifiers, now
     if imgui.get_io().want_text_input:

@@ -1,4 +1,4 @@
-"""List of keys over the window: in columns if it is low, scrolled if it is small."""
+"""List of keys over the window, in columns or with a scroll bar if the window is small."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from viewer.app.keys import Keyboard
 
 __all__ = ["draw_keys"]
 
-_COLOR = (1.0, 0.78, 0.45, 1.0)  # columns of keys
-_OPACITY = 0.97  # opacity of the list: text behind it must not show through
+_COLOR = (1.0, 0.78, 0.45, 1.0)  # colour of the keys
+_OPACITY = 0.97  # text behind the list must not show through
 _GAP, _BETWEEN = 1.5, 3.0  # in font sizes: from a key to its text, from column to column
 
 
 class _Columns(NamedTuple):
-    """Number of columns, rows of each, and whether all of the list fits."""
+    """Number of columns, number of rows, and whether the whole list fits."""
 
     number: int
     rows: int
@@ -64,7 +64,7 @@ def _flags(fits: bool) -> int:
 
 
 def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
-    """Return the fewest columns that fit the height, at most as many as fit the width.
+    """Return the smallest number of columns that fit the height, limited by the width.
 
     >>> _columns(50, (1000, 600), (400, 20)), _columns(50, (1000, 400), (400, 20))
     (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))
@@ -78,7 +78,7 @@ def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -
 def _draw_lines(
     lines: Sequence[tuple[str, str]], columns: _Columns, first: float, column: float
 ) -> None:
-    """Write the lines column by column; a key and its text are one line."""
+    """Draw the lines column by column; a key and its text form one line."""
     left, top = imgui.get_cursor_pos()
     step = imgui.get_text_line_height_with_spacing()
     for index, (label, text) in enumerate(lines):

@@ -6,14 +6,20 @@ from imgui_bundle import imgui
 
 from viewer.app.core.messages import Message, message_line
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, explain, same_line_if_room
+from viewer.app.core.widgets import (
+    begin_window,
+    button,
+    checkbox,
+    explain,
+    same_line_if_room,
+)
 from viewer.phrases import printable
 
 __all__ = ["draw_error", "draw_message_window"]
 
 _ERROR_TITLE = "Error"
 _TITLE = "Messages"
-_SIZE = (42.0, 22.0)  # letters' heights
+_SIZE = (42.0, 22.0)  # in font sizes
 _ERROR_COLOR = (1.0, 0.5, 0.42, 1.0)
 _LONGEST = 1000  # longest message shown, characters
 
@@ -22,32 +28,23 @@ def draw_message_window(state: AppState) -> None:
     """Draw the window if it is open."""
     if not state.messages.is_open:
         return
-    size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
-    room = (
-        min(_SIZE[0] * size, 0.95 * viewport.size.x),
-        min(_SIZE[1] * size, 0.9 * viewport.size.y),
-    )
-    imgui.set_next_window_size(room, imgui.Cond_.appearing)
-    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
-    flags |= imgui.WindowFlags_.no_collapse
-    shown, stays = imgui.begin(_TITLE, True, flags)
+    shown, stays = begin_window(_TITLE, _SIZE)
     if shown:
         _draw_content(state)
     imgui.end()
-    state.messages.is_open = bool(stays)
+    state.messages.is_open = stays
 
 
 def _draw_content(state: AppState) -> None:
     listed = state.messages.log.listed(state.messages.lists_status)
     if button(state, "Copy all", "" if listed else "no messages yet"):
         imgui.set_clipboard_text("\n".join(map(message_line, listed)))
-    explain("to the clipboard, one per line")
+    explain("copy the messages to the clipboard, one per line")
     text = "Results of keys and buttons"
     same_line_if_room(text)
     state.messages.lists_status = checkbox(state, text, state.messages.lists_status)
     if imgui.begin_child("##messages", (0.0, 0.0), imgui.ChildFlags_.borders):
-        # New messages come at the end, which stays in view unless the user scrolls away.
+        # New messages are appended; the end stays visible unless the user scrolls away.
         follows = imgui.get_scroll_y() >= imgui.get_scroll_max_y()
         if not listed:
             imgui.text_disabled("no messages yet")

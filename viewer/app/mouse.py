@@ -1,4 +1,4 @@
-"""Mouse input in the view: orbit, pan, zoom; a click selects, a double click aims."""
+"""Mouse input in the view: orbit, pan and zoom, clicks and double clicks."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _BUTTONS = (_LEFT, imgui.MouseButton_.right, imgui.MouseButton_.middle)
 
 
 def drop_motion_before_press() -> None:
-    """Remove the pointer's motion before a press from this frame's motion.
+    """Discard the pointer's motion that preceded a press in the same frame.
 
-    ImGui reports a motion and the press after it in one frame. Whatever drags by the frame's
-    motion, as plots do, would begin with a jump. Called before anything is drawn.
+    ImGui may report a motion and a subsequent press in one frame. Drags that use the motion of
+    the frame, as in plots, would begin with a jump. Called before anything is drawn.
     """
     io = imgui.get_io()
     clicked = [button for button in _BUTTONS if imgui.is_mouse_clicked(button)]
@@ -45,7 +45,7 @@ def handle_mouse(state: AppState) -> None:
     dragging = [button for button in _BUTTONS if _drags(button)]
     delta = io.mouse_delta
     if (dragging and (delta.x or delta.y)) or io.mouse_wheel:
-        state.camera.fixed = None  # continue from the calibrated camera's place
+        state.camera.fixed = None  # continue from the position of the calibrated camera
     if dragging and (dragging != [_LEFT] or io.key_shift):
         pan(state.camera, -delta.x / height, delta.y / height)
     elif dragging:
@@ -68,8 +68,8 @@ def handle_mouse(state: AppState) -> None:
 def _drags(button: imgui.MouseButton_) -> bool:
     """Return whether the pointer's motion since the last frame belongs to a drag."""
     if imgui.is_mouse_clicked(button):
-        return False  # it moved before the button went down
-    # A move and a release within one frame belong to the drag as well.
+        return False  # the motion came before the press
+    # A motion and a release within one frame also belong to the drag.
     return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)
 
 

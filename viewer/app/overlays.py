@@ -1,7 +1,7 @@
 """Overlays of the view: progress, messages, the list of keys, and hints in a corner.
 
-They do not overlap: the legend of colours is at the top left, progress at the top beside it or
-below it, and messages grow from the bottom up to whatever is above them.
+They do not overlap: the colour legend is at the top left, the progress bar at the top beside or
+below it, and messages grow upwards from the bottom as far as there is room.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _LONGEST_NOTE = 400  # characters
 
 
 def draw_overlays(state: AppState) -> None:
-    """Draw all overlays but the hints, which lie behind the panels."""
+    """Draw all overlays except the hints, which are drawn behind the panels."""
     legend = draw_legend(state)
     tools = draw_toolbar(state, legend)
     progress = _draw_progress(state, legend, tools)
@@ -45,7 +45,7 @@ def draw_overlays(state: AppState) -> None:
 def draw_hints(state: AppState) -> None:
     """Draw the hints about the grid's spacing and the list of keys, in a corner of the view.
 
-    Drawn behind the panels like the picture of the scene, so it must come after that.
+    Like the picture of the scene they are drawn behind the panels, so they must be drawn after it.
     """
     x, y, width, height = state.view_rect
     grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
@@ -62,7 +62,7 @@ class _Progress(NamedTuple):
     """Progress of a job; a negative fraction means an indeterminate bar."""
 
     title: str
-    share: float
+    fraction: float
     text: str
     label: str
     is_aside: bool = False
@@ -85,7 +85,7 @@ def _progress(state: AppState) -> _Progress | None:
         done, total = job.progress
         label = "Cancel" if job.can_cancel else ""
         if total:
-            # Jobs without steps report percent.
+            # Jobs without countable steps report percentages.
             text = f"{done} %" if total == 100 else f"{done:,} of {total:,}"
             return _Progress(job.title, done / total, text, label)
         return _Progress(job.title, -imgui.get_time(), "", label)
@@ -114,7 +114,7 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
         imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + bar)
         imgui.text_unformatted(shown.title)
         imgui.pop_text_wrap_pos()
-        imgui.progress_bar(shown.share, (bar, 0.0), shown.text)
+        imgui.progress_bar(shown.fraction, (bar, 0.0), shown.text)
         if shown.label and button(state, shown.label):
             cancel(state)
     rect = overlay_rect(state, "##progress")
@@ -123,7 +123,7 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
 
 
 def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
-    """Draw the newest messages that fit, and the number of further ones."""
+    """Draw the newest messages that fit, and the number of hidden ones."""
     state.messages.drop_old()
     x, y, width, height = state.view_rect
     if not state.messages.notes or width <= 40:
@@ -137,7 +137,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     room = y + height - _GAP - top - 2.0 * style.window_padding.y + style.item_spacing.y
     count = _newest(heights, line, room)
     if not count and not above:
-        count = 1  # better clipped than hidden
+        count = 1  # a clipped message is better than none
     if not count and room < line:
         return
     if begin_overlay("##notes", x + _GAP, y + height - _GAP, (0.0, 1.0)):
@@ -146,15 +146,15 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
             imgui.text_unformatted(text)
         left = len(texts) - count
         if left:
-            words = f"and {left:,} more" if count else f"{left:,} messages"
-            imgui.text_disabled(f"{words} (Window > Messages)")
+            hidden = f"and {left:,} more" if count else f"{left:,} messages"
+            imgui.text_disabled(f"{hidden} (Window > Messages)")
         imgui.pop_text_wrap_pos()
     overlay_rect(state, "##notes")
     imgui.end()
 
 
 def _newest(heights: Sequence[float], line: float, room: float) -> int:
-    """Return how many texts at the end fit, with a line about the number left out.
+    """Return how many of the last texts fit, leaving room for a line about the hidden ones.
 
     >>> _newest([10, 10, 10], 10, 30), _newest([10, 10, 10], 10, 29), _newest([10] * 20, 10, 500)
     (3, 1, 8)

@@ -1,4 +1,4 @@
-"""Key that identifies the picture in the view, which is redrawn when it changes."""
+"""Key that identifies the picture in the view: the picture is redrawn when the key changes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = ["PictureKeys"]
 
 
 class PictureKeys:
-    """Makes one key per frame; large parts are copied only when they have changed.
+    """Builds one key per frame; large parts are copied only when they have changed.
 
-    The keys of poses are kept by the poses themselves, those of options and of the actors' places
-    here. Figures and clips are compared by identity: they are replaced and never mutated.
+    Poses cache their own keys; those of options and of the actors' placements are cached here.
+    Figures and clips are compared by identity: they are replaced and never mutated.
     """
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class PictureKeys:
         Parameters
         ----------
         state : AppState
-            What is shown.
+            State that is shown.
         size : (int, int)
             Width and height in pixels.
         marks, ghost, annotations : Marks or None, Ghost or None, sequence of Annotation
@@ -52,7 +52,7 @@ class PictureKeys:
             self._options = copy.deepcopy(options)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        # Motion paths show a part of the motion that moves with time.
+        # Motion paths show a window of the motion around the current time.
         time = state.scene.time if options.path_joints else None
         actors = self._actors(state.scene.actors)
         selected = (state.chosen_actor, state.selected_joint)

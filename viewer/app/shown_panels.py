@@ -1,4 +1,4 @@
-"""Open and closed panels: most are open until closed, some closed until asked for."""
+"""Open and closed panels: most are open by default, some are opened on demand."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ __all__ = ["ShownPanels", "is_open", "set_open"]
 
 @dataclass(slots=True)
 class ShownPanels:
-    """Which panels are not as they are at first.
+    """Panels that differ from the default.
 
     Attributes
     ----------
     closed : set of str
-        Those that were closed.
+        Panels open by default that were closed.
     opened : set of str
-        Of those that wait to be asked for, the ones that were.
+        Panels on demand that were opened.
     wants_reset : bool
-        Whether the layout is to be made anew.
+        Whether the default layout is to be restored.
     """
 
     closed: set[str] = field(default_factory=set)
@@ -30,7 +30,7 @@ class ShownPanels:
 
 
 def is_open(state: AppState, name: str) -> bool:
-    """Return whether a panel is shown if there is something for it to show."""
+    """Return whether a panel is open; it is drawn only if it has something to show."""
     shown = state.of(ShownPanels)
     if PANELS[name].on_demand:
         return name in shown.opened

@@ -11,7 +11,7 @@ __all__ = ["apply_theme", "change_scale"]
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
-_GRAB = (0.93, 0.55, 0.20, 0.55)  # the number shows through
+_GRAB = (0.93, 0.55, 0.20, 0.55)  # translucent: the number stays readable
 
 
 def apply_theme(scale: float) -> None:
@@ -20,7 +20,7 @@ def apply_theme(scale: float) -> None:
     Parameters
     ----------
     scale : float
-        Size of everything; 1 for an ordinary screen.
+        Scale of fonts and sizes; 1 for a standard screen.
     """
     font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
     if font.is_file():
@@ -39,7 +39,7 @@ def apply_theme(scale: float) -> None:
 
 
 def change_scale(old: float, new: float) -> None:
-    """Change the size of everything, as when a window moves to another screen."""
+    """Change the scale of fonts and sizes, as when a window moves to another screen."""
     style = imgui.get_style()
     style.scale_all_sizes(new / old)
     style.font_scale_dpi = new

@@ -1,10 +1,10 @@
-"""Keys that only type a character, left out of ImGui's queue while text is entered.
+"""Filter for keys that only type a character, which bypass ImGui's queue during text input.
 
-ImGui lets a key that goes down and up take effect in two frames, so that no press is lost, and
-holds back all that was typed after it. On a slow machine a text would appear at one or two
-characters a frame. Characters come by events of their own, so a text field needs no events of
-letters and digits. Keys that act, as Enter, Backspace and Ctrl+A, and the mouse stay in the
-queue: a press and release within one frame counts as before.
+ImGui spreads the press and release of a key over two frames, so that no press is lost, and delays
+all later input. On a slow machine typed text would appear at one or two characters per frame.
+Characters arrive as separate events, so a text field needs no key events for letters and digits.
+Keys with an effect, such as Enter, Backspace and Ctrl+A, and the mouse stay in the queue, so that a
+press and release within one frame still works.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ _CTRL, _ALT, _SUPER = 0x2, 0x4, 0x8
 
 
 class TypedKeys:
-    """Decides which key events ImGui gets; to be asked for every one."""
+    """Decides which key events are passed to ImGui; called for every event."""
 
     def __init__(self) -> None:
         self._left_out: set[int] = set()
 
     def passes(self, key: int, action: int, modifiers: int, is_typing: bool) -> bool:
-        """Return whether ImGui gets a key event.
+        """Return whether a key event is passed to ImGui.
 
         Parameters
         ----------
         key, action, modifiers : int
-            As GLFW's key callback gets them.
+            Arguments of GLFW's key callback.
         is_typing : bool
             Whether a text field is active.
         """
         if action == _RELEASE:
-            # What went down before the field was active has to come up.
+            # A key that was pressed before the field became active must be released.
             is_known = key not in self._left_out
             self._left_out.discard(key)
             return is_known
-        acts = bool(modifiers & (_CTRL | _ALT | _SUPER))
-        if not is_typing or acts or not (key in _PRINTABLE or key in _KEYPAD):
+        has_effect = bool(modifiers & (_CTRL | _ALT | _SUPER))
+        if not is_typing or has_effect or not (key in _PRINTABLE or key in _KEYPAD):
             return True
         if action == _PRESS:
             self._left_out.add(key)

@@ -48,8 +48,8 @@ from viewer.rig.scene import Scene, scene_points  # noqa: E402
 __all__ = ["probe", "show"]
 
 _SIZE = (1280, 800)
-_SETTLE_FRAMES = 3  # drawn after an event: ImGui needs two to come to rest
-_IDLE_SECONDS = 0.5  # how often messages that time out are looked at
+_SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two to settle
+_IDLE_SECONDS = 0.5  # interval at which messages that time out are checked
 _BUSY_SECONDS = 0.05  # the same while a file is read
 
 
@@ -69,23 +69,23 @@ def show(
     Parameters
     ----------
     scene : Scene
-        Its poses are changed by what the user does.
+        Scene to show; the user's edits change its poses.
     camera : Camera, optional
-        The point of view at first; fits the scene if omitted.
+        Initial camera; fitted to the scene if omitted.
     options : DisplayOptions, optional
-        What is shown and how at first.
+        Initial display settings.
     paths : sequence of str or Path
-        The files of the scene, for the title and the list of recent files.
+        Files of the scene, for the title and the list of recent files.
     scale : float, optional
-        Size of the interface; the screen's own if omitted.
+        Scale of the interface; that of the screen if omitted.
     fit_distance : bool
-        Whether the camera keeps the distance at which the scene fills the view, until it is moved.
+        Whether the camera is kept fitted to the scene until the user moves it.
     builders : sequence of Builder
-        Captures of the scene that are still to be read.
+        Captures of the scene that are not completely read yet.
     plays : bool
-        Whether motions play at once.
+        Whether motions play from the start.
     motion : MotionSettings, optional
-        How the scene's motions were taken.
+        Settings with which the scene's motions were read.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def show(
     points = scene_points(scene, options.show)
     camera = camera or facing_camera(guess_front(scene), scene.up)
     files = tuple(map(Path, paths))
-    hold()  # callbacks of GLFW swallow what is raised in them
+    hold()  # GLFW's callbacks swallow exceptions raised in them, such as an interrupt
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.motion_settings = motion
     state.framing.is_fitting = fit_distance
@@ -119,7 +119,7 @@ def show(
 
 
 def probe() -> str:
-    """Open a window that nobody sees and return what draws in it; see ``show`` for errors."""
+    """Open a hidden window and return its renderer and OpenGL version; raises as ``show``."""
     find_display()
     handle = _create_window("viewer", is_visible=False)
     try:
@@ -134,7 +134,7 @@ def probe() -> str:
 
 
 class _Window:
-    """One GLFW window with its context, its ImGui, and its loop."""
+    """One GLFW window with its OpenGL and ImGui contexts, and its frame loop."""
 
     def __init__(self, state: AppState, scale: float | None) -> None:
         self.state = state
@@ -158,7 +158,7 @@ class _Window:
         self.frame = Frame(state, self.context, glfw.post_empty_event, keeps_recent=True)
 
     def _set_callbacks(self) -> None:
-        """Note what happened; the loop acts on it, so nothing is raised inside a callback."""
+        """Set callbacks that only record events for the loop, so that none of them can raise."""
         glfw.set_drop_callback(self.handle, self._on_drop)
         glfw.set_framebuffer_size_callback(self.handle, self._on_change)
         glfw.set_window_refresh_callback(self.handle, self._on_change)
@@ -189,11 +189,11 @@ class _Window:
         apply_theme(self._scale)
         self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
         imgui.backends.glfw_init_for_opengl(self._address, True)
-        glfw.set_key_callback(self.handle, self._on_key)  # in place of ImGui's own
+        glfw.set_key_callback(self.handle, self._on_key)  # replaces the callback of ImGui
         imgui.backends.opengl3_init("#version 330")
 
     def _screen_scale(self) -> float:
-        """Return how much larger than usual the interface must be, in window coordinates."""
+        """Return the scale of the interface for the screen, in window coordinates."""
         content = glfw.get_window_content_scale(self.handle)[0] or 1.0
         return max(content / self._pixels_per_point(), 0.5)
 
@@ -218,27 +218,27 @@ class _Window:
                 glfw.set_window_should_close(self.handle, True)
 
     def _wait(self, is_settling: bool) -> bool:
-        """Take in what happened, waiting for it unless frames are left to draw.
+        """Process events, waiting for one unless frames are left to draw.
 
-        Returns whether something happened. ImGui spreads quick events over several frames, so
-        it counts as well that it has some left.
+        Returns whether there was an event. ImGui spreads quick events over several frames, so
+        events left in its queue count as well.
         """
         self._is_dirty = False
         state = self.state
-        # What a thread does is looked at now and then: frames would take its time away.
+        # Threads are polled at intervals only, because drawing frames would slow them down.
         steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
         if is_settling or state.clock.playing or steps:
             glfw.poll_events()
         else:
             moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
-            # Messages that time out, the bar of a file being read, a text cursor that blinks.
+            # Redraw for messages that time out, progress bars and blinking text cursors.
             self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
         self._is_dirty |= state.clock.playing or state.job is not None or steps
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
-        """Return whether something comes without an event: files, the extent of a motion, texts."""
+        """Return whether a change is due without an event: files, a motion's extent, hover text."""
         state = self.state
         files = state.of(Files)
         is_read = files.loader is not None or files.stream is not None
@@ -273,7 +273,7 @@ class _Window:
             self._title = title
 
     def release(self) -> None:
-        """Close the window and free everything; the layout is saved."""
+        """Save the layout, close the window, and release everything."""
         save_closed_panels(self.state.of(ShownPanels).closed)
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
@@ -286,32 +286,32 @@ class _Window:
 
 
 class _Rest:
-    """Counts the frames that are still drawn until all stands as it will stay."""
+    """Counts the frames that remain to be drawn until the interface has settled."""
 
     def __init__(self) -> None:
         self.left = _SETTLE_FRAMES
         self._awaited = False
 
     def count(self, happened: bool, awaits: bool) -> None:
-        """Go on to the next frame: drawn if ``left`` is not negative.
+        """Advance to the next frame, which is drawn if ``left`` is not negative.
 
-        What was awaited comes within a frame, maybe the last one, when panels have been drawn; so
-        it counts as an event that there is nothing more to await. Its window needs frames to size.
+        An expected change may happen in the last frame after the panels were drawn, so its
+        completion counts as an event. A tooltip's window also needs some frames to get its size.
 
         Parameters
         ----------
         happened : bool
             Whether there was an event, or something moves.
         awaits : bool
-            Whether something comes soon without an event.
+            Whether a change is due without an event.
         """
-        has_come = self._awaited and not awaits
+        is_over = self._awaited and not awaits
         self._awaited = awaits
-        self.left = _SETTLE_FRAMES if happened or has_come else self.left - 1
+        self.left = _SETTLE_FRAMES if happened or is_over else self.left - 1
 
 
 def _awaits_tooltip(context: Any) -> bool:
-    """Return whether the mouse rests on something whose tooltip comes after a while."""
+    """Return whether the mouse is over an item whose delayed tooltip is still to appear."""
     delay = imgui.get_style().hover_delay_normal
     return context.hover_item_delay_id != 0 and context.hover_item_delay_timer < delay
 
@@ -334,8 +334,8 @@ def _create_window(title: str, is_visible: bool = True) -> Any:
     handle = glfw.create_window(*_SIZE, title, None, None)
     if not handle:
         code, text = glfw.get_error()
-        words = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
-        raise window_error(words)
+        message = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
+        raise window_error(message)
     glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
     return handle
 
@@ -343,5 +343,5 @@ def _create_window(title: str, is_visible: bool = True) -> Any:
 def _context() -> moderngl.Context:
     try:
         return moderngl.create_context(require=330)
-    except Exception as problem:  # glcontext raises nothing more special
+    except Exception as problem:  # glcontext raises plain Exception
         raise RenderError(explain(str(problem))) from None

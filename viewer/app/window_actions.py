@@ -1,4 +1,4 @@
-"""Actions on the window itself: what is shown beside the scene, and what it is asked to do."""
+"""Actions on the window itself: panels, list of keys, message log, and requests."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from viewer.rig.pose import Pose
 
 __all__ = ["CONFIDENCE", "Rigged", "clip_for", "with_fields"]
 
-CONFIDENCE = ("matched", "filled", "rigid")
+CONFIDENCE = ("matched", "inpainted", "rigid")
 """Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours, or
 the rigid attachment of the island that it belongs to."""
 

@@ -33,7 +33,7 @@ from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.skeleton import Skeleton, joint_label
 from viewer.rig.skinning import joint_matrices
-from viewer.rig.units import WORDS, unit_of_scaled
+from viewer.rig.units import UNIT_NAMES, unit_of_scaled
 
 __all__ = ["robust"]
 
@@ -134,7 +134,7 @@ def _transferred_skeleton(
     mesh, skeleton, skin = template.mesh, template.skeleton, template.skin
     assert mesh is not None and skeleton is not None and skin is not None  # checked by the caller
     joints = alignment.similarity.apply(joint_matrices(template, pose)[:, :3, 3])
-    if how.joints == "copied":
+    if how.joints == "alignment":
         rest = fit_rest_skeleton(template, pose, alignment.similarity, joints, None, original)
         return rest, None, [Diagnostic("R008.aligned")]
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
@@ -224,10 +224,10 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[D
     n_reversed = int(weights.backwards[figure.require_mesh().triangles].any(axis=1).sum())
     if n_reversed:
         lines.append(Diagnostic("R014.wound", values={"n": n_reversed}))
-    if template.unit in WORDS:
+    if template.unit in UNIT_NAMES:
         lines.append(
-            Diagnostic("R014.unit", values={"unit": WORDS[figure.unit]})
-            if figure.unit in WORDS
+            Diagnostic("R014.unit", values={"unit": UNIT_NAMES[figure.unit]})
+            if figure.unit in UNIT_NAMES
             else Diagnostic("R014.unit-unknown")
         )
     return lines

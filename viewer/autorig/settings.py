@@ -20,8 +20,8 @@ METHODS = {
 }
 """Methods offered by menus and the command line."""
 
-JOINTS = ("carried", "copied")
-"""Joints moved with the surface around them, or by the alignment only."""
+JOINTS = ("surface", "alignment")
+"""What joints follow: the surface around them, or only the alignment."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class TransferSettings:
     method: str = "robust"
     alignment: AlignmentSettings = field(default_factory=AlignmentSettings)
     weights: WeightSettings = field(default_factory=WeightSettings)
-    joints: str = "carried"
+    joints: str = "surface"
     fits: bool = True
     correctives: bool = True
     repairs: bool = True

@@ -82,7 +82,7 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
 
 def _rows_text(clip: dict[str, Any]) -> str:
     frames = counted(clip["frames"], "frame")
-    frames += f" at {clip['frame_rate']:g} per second"
+    frames += f" at {clip['frame_rate']:g} fps"
     if clip["kind"] == "points":
         return f"{frames}, {counted(clip['points'], 'point')}, {100 * clip['seen']:.1f} % visible"
     shape = "a different shape in each frame" if clip["shape_varies"] else "one shape"

@@ -31,7 +31,7 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     ``source``: the file.
     ``template``: has the joints that are named.
     ``pose``: of the template, gives the positions of its joints.
-    Returns (N, 2, 3): for each pair the template's point, then the target's.
+    Returns (N, 2, 3): the template's point and the target's for each pair.
     Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
       if there are fewer than three pairs.
     """

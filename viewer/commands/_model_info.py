@@ -87,8 +87,8 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
     for count in sorted({*_LIMITS, skinning.max_influences} - {0}):
         if strongest(figure) > count:
             pruned = Skinning(max_influences=count, correctives=skinning.correctives)
-            largest = float(compute("cut", figure, pose, pruned).max())
-            effects[f"cut to {count} influences"] = largest
+            largest = float(compute("pruning", figure, pose, pruned).max())
+            effects[f"pruned to {count} influences"] = largest
     for name, text in (("normalized", "normalised weights"), ("correctives", "pose correctives")):
         effects[text] = float(compute(name, figure, pose, skinning).max())
     first, *others = (METHODS[name].short for name in PURE)

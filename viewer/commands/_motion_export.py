@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.commands._frame_numbers import numbering_of, parse_range
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_line, posed_actors
+from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -100,7 +100,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         unit=arguments.to_unit or "",
         up=arguments.to_up or "",
         rotation_order=arguments.rotation_order,
-        gaps="interpolate" if arguments.fill_gaps else arguments.gaps or "",
+        gaps="interpolate" if arguments.interpolate_gaps else arguments.gaps or "",
         rest_frame=arguments.rest_frame,
         digits=digits,
         skinning=skinning,
@@ -117,11 +117,11 @@ def write_motions(
     """Write every actor's motion; return lines about what was written and what was lost.
 
     If one pose is requested, or nothing moves, a motion of one frame is written. People absent
-    from all frames are left out, and the others keep their file names. ``check`` is called with
+    from all frames are omitted, and the others keep their file names. ``check`` is called with
     all files before the first is written, and raises if one of them must not be replaced.
 
-    Raises ViewerError if no actor has a motion that the format can hold, or everybody is absent
-      from the frames; nothing has been written then.
+    Raises ViewerError if no actor has a motion that the format can hold, or nobody is present
+      in the frames; nothing is written then.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
@@ -137,7 +137,7 @@ def write_motions(
         parts.append(_Part(actor, animation, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
-        raise RigError(f"everybody is absent in {parts[0].span}: there is nothing to write")
+        raise RigError(f"nobody is present in {parts[0].span}: there is nothing to write")
     lines = _write(there, output, key, options, check) + _untracked_lines(there, key)
     away = [part for part in parts if not part.present.any()]
     lines += [f"{printable(p.animation.name)}: absent in {p.span}, not written" for p in away]
@@ -148,7 +148,7 @@ def _whole_animation(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
 ) -> tuple[SampledAnimation | SampledPoints, str]:
     """Return the requested frames of an actor, and their up axis."""
-    frames, fills = _frames(arguments, actor), bool(arguments.fill_gaps)
+    frames, fills = _frames(arguments, actor), bool(arguments.interpolate_gaps)
     if not isinstance(actor.clip, PointClip):
         return animation_for(key, options, scene, actor, arguments.fps, frames, fills)
     if options.gaps not in ("", "interpolate"):
@@ -307,7 +307,7 @@ def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | Non
 
 
 def check_kind(arguments: argparse.Namespace, output: Path) -> None:
-    """Refuse a file name whose suffix the requested exporter does not write."""
+    """Raise for a file name whose suffix the requested exporter does not write."""
     if arguments.kind is None:
         return
     known, suffix = EXPORTERS[arguments.kind].suffixes, output.suffix.lower() or "/"
@@ -335,7 +335,7 @@ def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
 
 
 def check_frame_field(output: Path) -> None:
-    """Refuse a name of numbered files without a valid frame field."""
+    """Raise for a name of numbered files without a valid frame field."""
     try:
         first, second = (output.name.format(frame=frame) for frame in (0, 1))
     except (ValueError, KeyError, IndexError, AttributeError):

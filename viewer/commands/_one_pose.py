@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from viewer.commands._frame_numbers import numbering_of
+from viewer.commands._sequence.frame_numbers import numbering_of
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
 from viewer.rig.motion.clip import Clip
@@ -18,7 +18,7 @@ from viewer.rig.scene import Actor, Scene
 
 
 def check_frame_options(arguments: argparse.Namespace) -> None:
-    """Refuse a range of frames together with a single one.
+    """Check that a range of frames and a single one are not both given.
 
     Raises ViewerError if both are given.
     """

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.commands._frame_numbers import apply_time
 from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
+from viewer.commands._sequence.frame_numbers import apply_time
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect, read
@@ -75,7 +75,6 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--blend-factor",
-        "--dqs-share",
         type=number,
         default=0.5,
         metavar="F",
@@ -91,7 +90,7 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--normalize", action="store_true", help="normalise each vertex's weights to a sum of 1"
     )
-    group.add_argument("--no-correctives", action="store_true", help="leave out pose correctives")
+    group.add_argument("--no-correctives", action="store_true", help="omit pose correctives")
 
 
 def skinning_of(arguments: argparse.Namespace) -> Skinning:
@@ -210,9 +209,9 @@ def _apply_hands(scene: Scene, which: str) -> None:
     for actor in handed:
         for hand in actor.figure.hands:
             vectors = hand_vectors(hand, np.zeros(0), flat=which == "flat")
-            turned = rotation_vector_to_matrix(vectors)
+            rotations = rotation_vector_to_matrix(vectors)
             set_joint_rotations(
-                actor.figure.require_skeleton(), actor.require_pose(), hand.joints, turned
+                actor.figure.require_skeleton(), actor.require_pose(), hand.joints, rotations
             )
 
 

@@ -135,7 +135,7 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def _refuse_name(figures: list[Figure], name: str) -> None:
-    """Raise if a quantity names a joint or field that no figure has, though some have others."""
+    """Raise if a quantity names a joint or field that no figure has, although others exist."""
     key, about = split_name(name)
     option = f"--scalar {printable(name, 60)}"
     problems, known = [], []

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES
@@ -97,7 +97,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         help="show a BVH next to the figures instead of driving one",
     )
     group.add_argument(
-        "--fill-gaps", action="store_true", help="interpolate over the gaps of captures"
+        "--interpolate-gaps", action="store_true", help="interpolate over the gaps of captures"
     )
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
 _WORD = re.compile(r"[^\W\d_]+")  # like a command; files mostly have a suffix or a folder
-_LONGEST = 60  # letters of a word in a message
+_LONGEST = 60  # characters of a name in a message
 
 
 class Parser(argparse.ArgumentParser):
@@ -41,14 +41,14 @@ class Parser(argparse.ArgumentParser):
             sys.stdout.flush()  # argparse exits next
 
     def check_options(self, arguments: Iterable[str]) -> None:
-        """Refuse an unknown option.
+        """Raise for an unknown option.
 
         ``argparse`` would first report a missing argument, possibly the mistyped one.
 
         ``arguments``: those before ``--``.
         Raises ViewerError with the nearest options.
         """
-        known = self._option_string_actions  # it has no public name
+        known = self._option_string_actions  # argparse has no public name for it
         for argument in arguments:
             name = argument.partition("=")[0]
             # argparse treats arguments with spaces as values, and "-" as a file.
@@ -62,7 +62,7 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown option {printable(name, _LONGEST)}{f'; {near}' if near else ''}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
-        """Refuse a value that is not one of an option's choices; suggest the nearest."""
+        """Raise for a value that is not one of an option's choices; suggest the nearest."""
         if action.choices is None or value in action.choices:
             return
         choices = [str(choice) for choice in action.choices]
@@ -85,7 +85,7 @@ def command_parser(name: str) -> Parser:
 
 
 def check_command(word: str) -> None:
-    """Refuse a word that is no file but resembles a command.
+    """Raise for a word that is not a file but resembles a command.
 
     ``word``: the first argument.
     Raises ViewerError with the nearest command.
@@ -101,7 +101,7 @@ def check_command(word: str) -> None:
 
 
 def require_files(arguments: argparse.Namespace, command: str) -> None:
-    """Refuse a command without files, for which the bundled figure is no useful default.
+    """Raise if a command for which the bundled figure is no useful default has no files.
 
     Raises ViewerError if there are neither files nor ``--body``.
     """

@@ -87,7 +87,7 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="leave out a body part; may be repeated",
+        help="hide a body part; may be repeated",
     )
 
 
@@ -98,7 +98,7 @@ def _add_flags(group: argparse._ArgumentGroup) -> None:
         ("wireframe", "draw triangle edges"),
         ("normals", "draw vertex normals"),
         ("no-texture", "use plain colours instead of textures"),
-        ("no-grid", "leave out the ground grid"),
+        ("no-grid", "omit the ground grid"),
         ("keypoints", "draw a model's keypoints"),
         ("reduced", "draw the coarser mesh, if there is one"),
         ("xray", "draw bones visible through the skin"),
@@ -251,5 +251,5 @@ def _joint_notes(scene: Scene, options: DisplayOptions) -> list[str]:
         return []
     why = "there are no joints in binding space" if has_one else "no figure has a skeleton"
     names = "xray", "joint_names", "joint_axes"
-    asked = [name for name in names if getattr(options, name)]
-    return [f"--{name.replace('_', '-')}: {why}" for name in asked]
+    requested = [name for name in names if getattr(options, name)]
+    return [f"--{name.replace('_', '-')}: {why}" for name in requested]

@@ -45,7 +45,7 @@ def command_line() -> argparse.ArgumentParser:
     for name, text in COMMANDS.items():
         parser = commands.add_parser(name, help=text, description=text)
         import_module(f"viewer.commands.{name}").add_arguments(parser)
-        for action in parser._actions:  # it has no public name
+        for action in parser._actions:  # argparse has no public name for it
             if _names_a_file(action):
                 action.complete = shtab.FILE
     return whole

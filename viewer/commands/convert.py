@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
@@ -28,6 +27,7 @@ from viewer.commands._scene import (
     add_file_arguments,
     open_scene,
 )
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export import EXPORTERS, export, files_written
 from viewer.export._motion_paths import motion_paths
@@ -68,7 +68,7 @@ def _known_suffixes() -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write poses or motions; print what was written and what was lost."""
+    """Write poses or motions; print messages about written files and losses."""
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
-    """Refuse invalid outputs before anything is read."""
+    """Check the output before anything is read."""
     check_frame_options(arguments)
     require_stdout(output)
     if is_stdout(output) and not output.suffix:
@@ -108,7 +108,7 @@ def _write_poses(
     places = dict(zip(shown, motion_paths(output, shown), strict=True))
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
-        raise RigError("everybody is absent at that time: there is nothing to write")
+        raise RigError("nobody is present at that time: there is nothing to write")
     files = [file for actor in actors for file in files_written(places[actor])]
     check_targets(files, inputs_of(arguments, scene), arguments.force)
     lines = []

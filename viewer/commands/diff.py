@@ -15,11 +15,12 @@ from viewer.commands._diff.inputs import input_files
 from viewer.commands._diff.pairs import Pairing, pair_actors
 from viewer.commands._diff.picture import Heat, heat_of, save_heat
 from viewer.commands._diff.report import Compared, json_text, lines_of, table_of
-from viewer.commands._frame_numbers import parse_range
 from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
+from viewer.commands._sequence.frame_numbers import parse_range
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
@@ -129,8 +130,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets([output], inputs, arguments.force)
     _print(arguments, rows, stream)
     if output is not None:
-        said = save_heat(heats, output, skinning)
-        print(said, file=sys.stderr if arguments.json else stream)
+        summary = save_heat(heats, output, skinning)
+        print(summary, file=sys.stderr if arguments.json else stream)
     if any(row.error for row in rows):
         return _UNREADABLE
     exceeds = tolerance is not None and any(row.exceeds(tolerance) for row in rows)
@@ -138,7 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _checked_output(arguments: argparse.Namespace) -> Path | None:
-    """Refuse an invalid output picture before anything is compared."""
+    """Check the output picture before anything is compared."""
     if arguments.output is None:
         return None
     output = Path(arguments.output)
@@ -201,7 +202,7 @@ def _compared(
             posed = first.copy()
             difference = compare(posed, second, skinning, n_poses, frames, report)
         if is_choice and first.figure.name != second.figure.name:
-            note = f"compared with {printable(second.name, 60)}"
+            note = Diagnostic("D002.partner", values={"name": second.name})
             difference = replace(difference, notes=(note, *difference.notes))
         found.append((posed, difference))
     differences = tuple((actor.name, difference) for actor, difference in found)
@@ -209,10 +210,14 @@ def _compared(
     return row, heat_of(name, found)
 
 
-def _lone(name: str, pairing: Pairing) -> tuple[str, ...]:
+def _lone(name: str, pairing: Pairing) -> tuple[Diagnostic, ...]:
     """Return messages about actors and motions on one side only."""
-    sides = (("the reference", pairing.first), (printable(name, 300), pairing.second))
-    return tuple(f"only in {side}: {printable(one, 60)}" for side, lone in sides for one in lone)
+    sides = ((Phrase("the-reference"), pairing.first), (name, pairing.second))
+    return tuple(
+        Diagnostic("D001.actor", values={"side": side, "actor": one})
+        for side, lone in sides
+        for one in lone
+    )
 
 
 def _print(arguments: argparse.Namespace, rows: Sequence[Compared], stream: TextIO) -> None:

@@ -1,4 +1,4 @@
-"""Report on this machine: packages, OpenGL, EGL and display, with cures for what is missing."""
+"""Report on this machine: packages, OpenGL, EGL and display, with remedies."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report: subject, state, what was found, and a cure."""
+    """One line of the report: subject, state, details and a remedy."""
 
     subject: str
     state: str  # "ok", "note" or "missing"
@@ -161,8 +161,8 @@ def _examine_window() -> Finding:
         return Finding("window", "missing", f"none within {_WINDOW_SECONDS} s", cure)
     if result.returncode == 0:
         return Finding("window", "ok", result.stdout.strip())
-    words = (result.stderr or result.stdout).strip().splitlines() or ["it crashed"]
-    return Finding("window", "missing", words[-1].removeprefix("viewer.errors.RenderError: "), cure)
+    lines = (result.stderr or result.stdout).strip().splitlines() or ["it crashed"]
+    return Finding("window", "missing", lines[-1].removeprefix("viewer.errors.RenderError: "), cure)
 
 
 def _examine_state_folder() -> Finding:

@@ -61,7 +61,7 @@ def _print_page(text: str) -> None:
     from rich.markdown import Markdown
     from rich.theme import Theme
 
-    # The default style has a black background, which is ugly on light terminals.
+    # The default style has a black background, which is hard to read on light terminals.
     console = Console(theme=Theme({"markdown.code": "bold cyan"}))
     with console.capture() as page:
         console.print(Markdown(text, hyperlinks=False))

@@ -167,7 +167,7 @@ def _describe_skin(skin: Skin) -> dict[str, Any]:
 
 
 def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
-    """Return the morph targets, and how many vertices each of them moves."""
+    """Return the morph targets with the number of vertices that each one moves."""
     rows = [row for row, group in enumerate(shapes.groups) if group == MORPH_GROUP]
     counts = shapes.direction_values()[rows].any(axis=2).sum(axis=1)
     return [

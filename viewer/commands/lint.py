@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from viewer.commands._frame_numbers import rate
 from viewer.commands._numbers import number
 from viewer.commands._printing import print_line, table_lines
 from viewer.commands._progress import Progress
@@ -19,11 +18,12 @@ from viewer.commands._scene import (
     scene_files,
     size_limit,
 )
+from viewer.commands._sequence.frame_numbers import rate
 from viewer.commands._usage import require_files
 from viewer.errors import ViewerError
 from viewer.lint import (
     CODES,
-    MAX_TURN,
+    MAX_ROTATION,
     SEVERITIES,
     LintOptions,
     describe,
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_limits(group: argparse._ArgumentGroup) -> None:
-    """Add the limits of motions that files cannot tell."""
+    """Add the limits of motions that depend on the user's purpose."""
     group.add_argument(
         "--max-speed",
         type=number,
@@ -72,11 +72,11 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
         help="speed limit of joints and keypoints, in figure units per second (default: 15 sizes)",
     )
     group.add_argument(
-        "--max-turn",
+        "--max-rotation",
         type=number,
-        default=MAX_TURN,
+        default=MAX_ROTATION,
         metavar="DEGREES",
-        help=f"speed limit of joint rotations, per second (default: {MAX_TURN:g})",
+        help=f"speed limit of joint rotations, per second (default: {MAX_ROTATION:g})",
     )
     group.add_argument(
         "--confidence",
@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
     ignored = _ignored(arguments.ignore)
     options = LintOptions(
         max_speed=arguments.max_speed,
-        max_turn=float(np.radians(arguments.max_turn)),
+        max_rotation=float(np.radians(arguments.max_rotation)),
         confidence=arguments.confidence,
         frame_rate=arguments.fps or DEFAULT_RATE,
         ground=arguments.ground,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
 from viewer.commands._scalar import choose_subject, scalar_text
@@ -15,7 +14,8 @@ from viewer.commands._scene import (
     open_scene,
     print_warnings,
 )
-from viewer.commands._sequence import add_sequence_arguments, draw_sequence, request_of
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
@@ -92,15 +92,15 @@ def run(arguments: argparse.Namespace) -> int:
     print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
     if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
-        said = draw_sequence(request, arguments, scene, options, size)
-        print(said, file=summary_stream(output))
+        line = draw_sequence(request, arguments, scene, options, size)
+        print(line, file=summary_stream(output))
     else:
         _draw_still(arguments, scene, options, size)
     return 0
 
 
 def _check_device(device: int | None) -> None:
-    """Refuse a missing graphics device before anything is read."""
+    """Check the graphics device before anything is read."""
     if device is not None:
         from viewer.rendering.gpu.context import check_device
 
@@ -125,12 +125,12 @@ def _draw_still(
     save_image(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
     colors = scalar_text(scene, options)
-    said = f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}"
-    print(said, file=summary_stream(output))
+    line = f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}"
+    print(line, file=summary_stream(output))
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
-    """Refuse a suffix of neither pictures nor videos."""
+    """Check that the suffix is that of a picture or video."""
     suffix = output.suffix.lower()
     try:
         is_ours = output.is_file() or not output.exists()
@@ -162,8 +162,8 @@ def draw_scene(
         if options.joint_names:
             left_out, n_seen = offscreen.renderer.names_left_out
             if left_out:
-                words = "would cover others" if left_out > 1 else "would cover another"
-                print_warnings([f"{left_out} of {n_seen} names of joints left out: they {words}"])
+                reason = "would cover others" if left_out > 1 else "would cover another"
+                print_warnings([f"{left_out} of {n_seen} joint names omitted: they {reason}"])
         return pixels
 
 

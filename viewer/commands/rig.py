@@ -18,12 +18,12 @@ from viewer.autorig.pipeline import transfer
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import JOINTS, METHODS, TransferSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._landmarks import read_landmarks
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, apply_pose, pose_files
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError
@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="a frame of the template's motion, numbered as for --frame",
     )
-    parser.set_defaults(fill_gaps=False)
+    parser.set_defaults(interpolate_gaps=False)
 
 
 def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
@@ -119,8 +119,8 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--joints",
         choices=JOINTS,
-        default="carried",
-        help="joints follow the surface around them, or the alignment only (default: carried)",
+        default="surface",
+        help="joints follow the surface around them, or only the alignment (default: surface)",
     )
     group.add_argument(
         "--no-fit",
@@ -174,7 +174,7 @@ def run(arguments: argparse.Namespace) -> int:
             template.require_pose(),
             target.require_mesh(),
             settings,
-            lambda share, what: progress.show(round(100.0 * share)),
+            lambda fraction, what: progress.show(round(100.0 * fraction)),
             name=target.name,
         )
     stream = sys.stdout if output is None else summary_stream(output)
@@ -230,7 +230,7 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
 
 
 def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:
-    """Apply --template-frame, and refuse a frame or time for a template without motion.
+    """Apply --template-frame, and check that the template of a frame or time has a motion.
 
     Raises ViewerError if the template has no motion, or two frames are given.
     """
@@ -317,7 +317,7 @@ def _print_report(rigged: Rigged, stream: TextIO) -> None:
 
 
 def _show(rigged: Rigged, target: Figure) -> None:
-    """Open the result in a window, with the target hidden in the same place."""
+    """Open the result in a window, with the hidden target at the same position."""
     from viewer.app.window import show
 
     result = Actor(rigged.figure, rigged.pose.copy(), placement=np.array(rigged.placement))

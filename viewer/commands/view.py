@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from viewer.commands._frame_numbers import add_frame_arguments
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, apply_pose
 from viewer.commands._scene import (
@@ -17,6 +16,7 @@ from viewer.commands._scene import (
     print_warnings,
     scene_files,
 )
+from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 __all__ = ["SEVERITIES", "Code"]
 
 SEVERITIES = ("note", "warning", "error")
-"""In ascending order."""
+"""Severities in ascending order."""
 
 
 @dataclass(frozen=True, slots=True)

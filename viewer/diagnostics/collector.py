@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 from viewer.diagnostics.diagnostic import Diagnostic
 
-_MOST = 100  # warnings of one file; more would not be read
+_MOST = 100  # warnings kept per file, as nobody reads more
 
 
 class Collector:
     """Collects the diagnostics of readers and operations.
 
-    Repeated warnings are dropped, and so are those after the first hundred; errors are all kept.
+    Repeated warnings are dropped, and so are those after the first hundred; all errors are kept.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Collector:
         return len(self._found)
 
     def add(self, found: Diagnostic) -> None:
-        """Keep an error, or a warning that is not kept yet."""
+        """Record an error, or a warning that has not been recorded yet."""
         if found.is_refusal:
             self._found.append(found)
             return

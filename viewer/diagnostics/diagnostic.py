@@ -50,14 +50,14 @@ class Diagnostic:
     values : mapping of str to object
         Values of the template.
     count : int
-        Number of faults it stands for; 0 if it only adds places to a fault reported by another
+        Number of faults that it represents; 0 if it only adds places to a fault reported by another
         diagnostic.
     level : str
         Severity, if it differs from that of the code.
     is_refusal : bool
         Whether ``load`` refuses the file because of it.
     is_final : bool
-        Whether it ended the reading of its file.
+        Whether reading of the file stopped at it.
     """
 
     key: str

@@ -15,7 +15,7 @@ from viewer.diagnostics.phrase import Phrase
 def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return diagnostics in order, each kind merged into its first.
 
-    Two are of one kind if they have the same message, file, part and names: values of type ``str``
+    Two are of the same kind if message, file, part and names are equal: values of type ``str``
     are names, while numbers and text of a file (``bytes``) may differ.
     """
     kinds: dict[tuple[object, ...], list[Diagnostic]] = {}
@@ -28,7 +28,7 @@ def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
 
 def _names(values: Mapping[str, Any]) -> Iterator[tuple[object, ...]]:
     for name, value in sorted(values.items()):
-        if isinstance(value, Phrase):
+        if isinstance(value, Phrase | Diagnostic):
             yield (name, value.key, *_names(value.values))
         elif isinstance(value, str):
             yield name, value

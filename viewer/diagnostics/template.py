@@ -45,7 +45,7 @@ def fields(template: str) -> dict[str, str]:
     for _, name, spec, _ in Formatter().parse(template):
         if name:
             found[name] = spec or ""
-            found |= dict.fromkeys(fields(found[name]), "d")  # totals of counts
+            found |= dict.fromkeys(fields(found[name]), "d")  # totals that counts refer to
     return found
 
 

@@ -90,7 +90,7 @@ def exporter_for(path: str | Path) -> str:
     Raises
     ------
     UnsupportedFormatError
-        If none does; the message lists those there are.
+        If there is none; the message lists the known suffixes.
     """
     suffix = Path(path).suffix.lower()
     kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_pose}
@@ -116,14 +116,14 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     Returns
     -------
     list of str
-        What was written, then what the format cannot hold and by how much that is off.
+        Messages: the written files, then the data that the format cannot hold, with errors.
 
     Raises
     ------
     UnsupportedFormatError
         If no exporter has this suffix.
     RigError
-    If the figure lacks the data that the format needs.
+        If the figure lacks the data that the format needs.
     OutputError
         If a file cannot be written.
     """
@@ -138,7 +138,7 @@ def motion_exporters(path: str | Path) -> list[str]:
     Raises
     ------
     UnsupportedFormatError
-        If none does; the message lists those there are.
+        If there is none; the message lists the known suffixes.
     """
     suffix = Path(path).suffix.lower() or "/"
     kinds = {key: kind for key, kind in EXPORTERS.items() if kind.writes_motion}
@@ -186,7 +186,7 @@ def export_animation(
     Returns
     -------
     list of str
-        What was written, then what the format cannot hold and by how much that is off.
+        Messages: the written files, then the data that the format cannot hold, with errors.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def files_written(path: str | Path) -> list[Path]:
 
 
 def require_mesh(actor: Actor, what: str) -> None:
-    """Refuse a figure without a mesh; the message names the format."""
+    """Raise RigError for a figure without a mesh; the message names the format."""
     if actor.figure.mesh is None:
         raise RigError(f"figure {actor.figure.name} has no mesh to write as {what}")
 

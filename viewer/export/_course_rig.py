@@ -1,4 +1,4 @@
-"""Skeleton in ``.skel`` form: depth-first joints with three rotations each, a moving root."""
+"""Skeletons in ``.skel`` form: joints in depth-first order, three rotations each, a moving root."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.hierarchy import depth_first
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, joint_label
 
-_CUBE = 0.01  # of the skeleton's size: half a side of boxes where a file has none
+_CUBE = 0.01  # half the side of default boxes, relative to the skeleton's size
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
@@ -19,7 +19,7 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
 
     ``skeleton``: without rest rotations and scales; its lengths already include the figure's
       scale.
-    ``pose``: becomes the file's pose; the figure's translation goes to the roots' offsets.
+    ``pose``: becomes the file's pose; the figure's translation is added to the roots' offsets.
     Returns ``skeleton``: joints in depth-first order.
     Returns ``order`` (J,) int32: the old index of each new joint.
     Raises RigError if a joint has properties that the format cannot hold.
@@ -52,9 +52,9 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
 
 
 def _check(skeleton: Skeleton, pose: Pose) -> None:
-    turned = quaternion_to_matrix(pose.rotations) - np.eye(3)
+    rotated = quaternion_to_matrix(pose.rotations) - np.eye(3)
     for what, off in (
-        ("rest rotation", np.abs(turned).max(axis=(1, 2))),
+        ("rest rotation", np.abs(rotated).max(axis=(1, 2))),
         ("scale", np.abs(pose.scales - 1.0).max(axis=1)),
     ):
         worst = int(off.argmax())
@@ -65,20 +65,20 @@ def _check(skeleton: Skeleton, pose: Pose) -> None:
 def _rotation_rows(skeleton: Skeleton) -> Ints:
     """Return each joint's DOF rows about x, y and z, -1 if missing: (J, 3)."""
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
-    turns = np.flatnonzero(skeleton.dof_kinds >= 3)
-    for row in turns.tolist():
+    rotation_rows = np.flatnonzero(skeleton.dof_kinds >= 3)
+    for row in rotation_rows.tolist():
         joint, axis = int(skeleton.dof_joints[row]), int(skeleton.dof_kinds[row]) - 3
         if rows[joint, axis:].max() >= 0:
             raise RigError(
-                f".skel turns joints about x, then y, then z; joint "
-                f"{joint_label(skeleton, joint)} turns otherwise"
+                f".skel rotates joints about x, then y, then z; joint "
+                f"{joint_label(skeleton, joint)} has another rotation order"
             )
         rows[joint, axis] = row
     return rows
 
 
 def _root_shift(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return the translation of the first joint by DOFs; other joints must not translate."""
+    """Return the translation of the first joint by its DOFs; others must not translate."""
     shift = np.zeros(3)
     for row in np.flatnonzero(skeleton.dof_kinds < 3).tolist():
         joint = int(skeleton.dof_joints[row])

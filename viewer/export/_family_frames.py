@@ -1,4 +1,4 @@
-"""Animations of bodies of the SMPL family, as the family's own parameters."""
+"""Conversion of animations to the parameters of the SMPL family."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.number_text import number_text
 from viewer.rig.smpl_family import FAMILY, Member
-from viewer.rig.units import METRES, WORDS
+from viewer.rig.units import METRES, UNIT_NAMES
 
-_OWN_SHAPE = "stature"  # SMPL's shapes are numbered, those of the bundled body are named
-_NEGLIGIBLE = 1e-6  # metres, and parts of a scale of 1
+_OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's are numbered
+_NEGLIGIBLE = 1e-6  # metres, and relative deviation of a scale from 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class FamilyFrames:
     roots : (F, 3) or (1, 3)
         J0, the rest position of the root, metres.
     shape, expression : (F, S) or (1, S)
-        Coefficients; one row if they never change.
+        Coefficients; one row if they are constant.
     """
 
     member: Member
@@ -55,21 +55,21 @@ class FamilyFrames:
 
     def about_origin(self) -> Floats:
         """Return T of V = R X + T: T = t + J0 - R J0, (F, 3)."""
-        turned = np.einsum(
+        rotated_root = np.einsum(
             "fab,fb->fa",
             rotation_vector_to_matrix(self.vectors[:, 0]),
             self.roots + 0.0 * self.translations,
         )
-        return self.translations + self.roots - turned
+        return self.translations + self.roots - rotated_root
 
 
 def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Member:
-    """Return the member of the family whose joints a figure has.
+    """Return the member of the family that has the same joints as a figure.
 
     ``figure``: with a skeleton.
     ``what``: name of the output, for the message.
     ``roots``: allowed names of the root: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
-    Raises RigError if its joints are those of no member, or if its unit is unknown.
+    Raises RigError if no member has these joints, or if the figure's unit is unknown.
     """
     names = () if figure.skeleton is None else figure.skeleton.names
     member = FAMILY.get(len(names))
@@ -81,25 +81,25 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
         )
     if figure.unit not in METRES:
         raise RigError(
-            f"{figure.name} cannot be written as {what}, which is in metres: its unit is not known "
-            "(of a BVH, --unit says it)"
+            f"{figure.name} cannot be written as {what}, which is in metres: its unit is unknown "
+            "(for a BVH, --unit sets it)"
         )
     return member
 
 
 def check_unit(options: MotionOptions, title: str) -> None:
-    """Refuse units other than metres.
+    """Check the requested unit.
 
-    Raises RigError if another unit is requested.
+    Raises RigError for units other than metres.
     """
     if options.unit not in ("", "m"):
         raise RigError(f'unit of {title}: expected m, found "{options.unit}"')
 
 
 def up_axis(options: MotionOptions) -> str:
-    """Return the up axis of the file: that of the scene unless another is requested.
+    """Return the up axis of the file, by default that of the scene.
 
-    Raises RigError if it is neither y nor z; that of the scene may point down.
+    Raises RigError if the requested one is neither y nor z; the scene's axis may be negative.
     """
     if options.up not in ("", "y", "z"):
         raise RigError(f'up axis: expected y or z, found "{options.up}"')
@@ -114,16 +114,16 @@ def family_frames(
 ) -> tuple[FamilyFrames, list[str]]:
     """Return an animation as parameters of the family.
 
-    The root joint is at t + J0, so t is its displacement from the rest position. A different up
-    axis rotates the world by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
+    The root joint is at t + J0, so t is its displacement from the rest position. For a different up
+    axis the world is rotated by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
 
-    ``animation``: gives the figure, whose unit is known.
-    ``frames``: its frames; rows that are not present are undefined.
+    ``animation``: an animation of a figure whose unit is known.
+    ``frames``: its frames; rows of missing frames are undefined.
     ``member``: from ``member_of_figure``.
-    ``options``: only the up axes are used.
+    ``options``: options, of which only the up axes are used.
     Returns ``frames``: one row per frame.
-    Returns ``notes``: messages about what the family has no parameters for, and how large it is.
-    Raises RigError if a number of a present frame is not finite.
+    Returns ``notes``: messages about data without a parameter in the family, with its size.
+    Raises RigError if a value of a present frame is not finite.
     """
     figure, skeleton = animation.figure, animation.figure.require_skeleton()
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
@@ -135,11 +135,11 @@ def family_frames(
     roots = metres * root_positions(figure, frames.shape_weights)
     if up_axis(options) != options.world_up:
         angle = np.pi / 2 if up_axis(options) == "z" else -np.pi / 2
-        turn = np.array([angle, 0.0, 0.0])
+        rotation = np.array([angle, 0.0, 0.0])
         rotations = rotations.copy()
-        rotations[:, 0] = multiply(rotation_vector_to_quaternion(turn), rotations[:, 0])
+        rotations[:, 0] = multiply(rotation_vector_to_quaternion(rotation), rotations[:, 0])
         matrix = np.round(
-            rotation_vector_to_matrix(turn)
+            rotation_vector_to_matrix(rotation)
         )  # a rotation by 90 degrees has integer entries
         translations = (translations + roots) @ matrix.T - roots
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
@@ -164,7 +164,7 @@ def family_frames(
 
 
 def _vectors(quaternions: Floats) -> Floats:
-    """Return axis times angle, the angle from 0 to pi, of unit quaternions: (..., 3)."""
+    """Return rotation vectors with angles from 0 to pi of unit quaternions: (..., 3)."""
     halves = np.where(quaternions[..., 3:] < 0.0, -quaternions, quaternions)
     sines = np.linalg.norm(halves[..., :3], axis=-1, keepdims=True)
     angles = 2.0 * np.arctan2(sines, halves[..., 3:])
@@ -175,25 +175,25 @@ def _vectors(quaternions: Floats) -> Floats:
 
 
 def _own_shapes(figure: Figure) -> list[str]:
-    """Return a message if shapes and rest pelvis are those of the bundled body."""
+    """Return a message if the figure is the bundled body, which is not an SMPL model."""
     if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
         return []
     return [
-        f"shape and translation are meant for {figure.name}, which is no SMPL body: other models "
-        "stand elsewhere with them, by the distance of their rest pelvises"
+        f"shape and translation are those of {figure.name}, which is not an SMPL model: other "
+        "models are offset by the distance between the rest positions of the pelvis"
     ]
 
 
 def _bare_skeleton(figure: Figure, root: Floats) -> list[str]:
-    """Return messages about a skeleton's unit, and about its root, which differs from a model's."""
+    """Return messages about a skeleton's unit, and a rest root that differs from a model's."""
     notes = []
     if figure.unit != "m":
-        notes.append(f"lengths were {WORDS[figure.unit]}, and are written as metres")
+        notes.append(f"lengths were converted from {UNIT_NAMES[figure.unit]} to metres")
     if figure.mesh is None:
         place = ", ".join(number_text(number, ".4g") for number in root.tolist())
         notes.append(
-            f"places count from the skeleton's own root at rest, ({place}) m: a model whose root "
-            "rests elsewhere stands off by the difference (--model drives one, and is exact)"
+            f"translations are relative to the skeleton's root at rest, ({place}) m: a model with "
+            "another rest root is offset by the difference (use --model for exact translations)"
         )
     return notes
 
@@ -203,9 +203,9 @@ def _losses(frames: Frames, moved: Floats) -> list[str]:
     present = frames.present
     farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
     if farthest > _NEGLIGIBLE:
-        notes.append(f"joints that move within their parents are left out (up to {farthest:.3g} m)")
+        notes.append(f"translations of joints are omitted (up to {farthest:.3g} m)")
     scales = frames.figure_scales[present]
     if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
         low, high = scales.min(), scales.max()
-        notes.append(f"the figure's scale is left out ({low:.6g} to {high:.6g})")
+        notes.append(f"the figure's scale is omitted ({low:.6g} to {high:.6g})")
     return notes

@@ -22,11 +22,11 @@ from viewer.rig.units import METRES
 
 
 def read_frames(motion: BodyMotion, animation: SampledAnimation, options: MotionOptions) -> Frames:
-    """Return the poses that a file holds for an animation's figure, in its own world and unit.
+    """Return the poses in a file for an animation's figure, in the animation's world and unit.
 
     ``motion``: the read motion, in metres.
     ``animation``: the written animation.
-    ``options``: gives the up axes of the animation and the file.
+    ``options``: define the up axes of the animation and the file.
     """
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
@@ -40,14 +40,14 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Motion
 
 
 def _rotated(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
-    """Return frames with the world rotated: R' = Q R, T' = Q (p + T) - p, the root at rest at p."""
+    """Return frames in a rotated world: R' = Q R, T' = Q (p + T) - p with the rest root at p."""
     rotations = frames.rotations.copy()
     rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
     root = rest_translations_of(animation.figure, frames.shape_weights)[:, 0]
-    turned = np.round(
+    rotation = np.round(
         rotation_vector_to_matrix(vector)
     )  # a rotation by 90 degrees has integer entries
-    places = (root + frames.figure_translations) @ turned.T - root
+    places = (root + frames.figure_translations) @ rotation.T - root
     return replace(frames, rotations=rotations, figure_translations=places)
 
 
@@ -63,14 +63,14 @@ class Records:
 
     def motion(self, rate: float) -> BodyMotion:
         """Return the motion of all added frames."""
-        turned = self._array("poses").reshape(len(self._rows), -1, 3)
-        turned[:, 0] = self._array("Rh")
+        rotation = self._array("poses").reshape(len(self._rows), -1, 3)
+        rotation[:, 0] = self._array("Rh")
         has_expression = "expression" in self._rows[0]
         return BodyMotion(
             "again",
             Timing(rate, np.arange(len(self._rows), dtype=np.int32)),
             self._member.names,
-            turned,
+            rotation,
             self._array("Th"),
             about_origin=True,
             shape=self._array("shapes"),

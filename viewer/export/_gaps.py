@@ -15,7 +15,7 @@ from viewer.rig.motion.evaluation import Frames
 
 Indices = NDArray[np.intp]
 
-_LISTED = 6  # gaps in a note
+_LISTED = 6  # maximum number of gaps listed in a message
 _FILLING = {
     "hold": "the last pose is held",
     "interpolate": "interpolated, held at both ends",
@@ -23,7 +23,7 @@ _FILLING = {
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:
-    """Return the runs of True: first index, and the one after the last."""
+    """Return the runs of True as half-open ranges of indices."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -55,26 +55,30 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
     before = there[np.clip(place - 1, 0, len(there) - 1)]
     after = there[np.clip(place, 0, len(there) - 1)] if interpolate else before
     span = after - before
-    share = np.divide(every - before, span, out=np.zeros(len(every)), where=span > 0).clip(0.0, 1.0)
-    moves = np.flatnonzero(share > 0.0)
+    fraction = np.divide(every - before, span, out=np.zeros(len(every)), where=span > 0).clip(
+        0.0, 1.0
+    )
+    moves = np.flatnonzero(fraction > 0.0)
     rotations = frames.rotations[before]
-    rotations[moves] = slerp(rotations[moves], frames.rotations[after[moves]], share[moves, None])
+    rotations[moves] = slerp(
+        rotations[moves], frames.rotations[after[moves]], fraction[moves, None]
+    )
     weights = frames.shape_weights
     return replace(
         frames,
         present=np.ones(len(every), dtype=np.bool_),
         rotations=rotations,
-        translations=_line(frames.translations, before, after, share),
-        shape_weights=weights if len(weights) == 1 else _line(weights, before, after, share),
-        figure_translations=_line(frames.figure_translations, before, after, share),
-        figure_scales=_line(frames.figure_scales, before, after, share),
+        translations=_line(frames.translations, before, after, fraction),
+        shape_weights=weights if len(weights) == 1 else _line(weights, before, after, fraction),
+        figure_translations=_line(frames.figure_translations, before, after, fraction),
+        figure_scales=_line(frames.figure_scales, before, after, fraction),
     )
 
 
 def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]:
     """Return the frames for formats that allow gaps: interpolated or held only on request.
 
-    ``frames``: with gaps or without.
+    ``frames``: frames with or without gaps.
     ``gaps``: a key of ``GAPS``, or empty. If every frame has its own file, ``split`` keeps the
       gaps.
     ``first_frame``: number of the first frame.
@@ -84,7 +88,7 @@ def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]
     Raises RigError if ``gaps`` is not a key of ``GAPS``.
     """
     if gaps not in ("", *GAPS):
-        raise RigError(f'way to close gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
+        raise RigError(f'handling of gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
     present = frames.present
     if gaps not in _FILLING or present.all() or not present.any():
         return frames, ""
@@ -92,6 +96,6 @@ def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]
     return filled(frames, gaps == "interpolate"), note
 
 
-def _line(rows: Floats, before: Indices, after: Indices, share: Floats) -> Floats:
-    weight = share.reshape(-1, *[1] * (rows.ndim - 1))
+def _line(rows: Floats, before: Indices, after: Indices, fraction: Floats) -> Floats:
+    weight = fraction.reshape(-1, *[1] * (rows.ndim - 1))
     return rows[before] + weight * (rows[after] - rows[before])

@@ -1,4 +1,4 @@
-"""File names of exported motions: of several actors, of parts, of single frames."""
+"""File names of exported motions: one per actor, per part or per frame."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _WITHOUT_SPLITS = ("npz",)  # exporters that write one file despite gaps
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
-    """Return the file of each actor: people by their number, others counted from 2 on.
+    """Return the file of each actor: people by number, other actors numbered from the second.
 
     ``output``: the requested file; its suffix is kept. A single actor gets this file.
-    ``actors``: in the order of the scene.
+    ``actors``: actors in the order of the scene.
     Returns: one path per actor, all different.
     """
     if len(actors) == 1:
@@ -64,10 +64,10 @@ def animation_files(
 ) -> list[Path]:
     """Return all files that ``export_animation`` writes for a requested name.
 
-    ``animation``: a motion.
-    ``path``: a file, for numbered ones with ``{frame}``.
-    ``key``: of ``EXPORTERS``, but not of one that writes a folder.
-    ``options``: how.
+    ``animation``: the motion.
+    ``path``: the requested file, with ``{frame}`` for numbered files.
+    ``key``: a key of ``EXPORTERS``, except those that write a folder.
+    ``options``: options of the export.
     """
     if isinstance(animation, SampledPoints) or key in _WITHOUT_SPLITS:
         return [path]

@@ -11,12 +11,12 @@ ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 
 GAPS = {
     "hold": "hold the last pose",
-    "interpolate": "rotations on the shorter arc between the frames around",
+    "interpolate": "interpolate between the frames around the gap, rotations along the shorter arc",
     "split": "one file for each run of frames",
 }
 """Handling of missing frames."""
 
-_CLOSED = "hold"  # the default of formats without missing frames
+_CLOSED = "hold"  # default of formats that do not support missing frames
 
 
 @dataclass(slots=True)
@@ -28,7 +28,7 @@ class MotionOptions:
     unit : str
         A key of ``viewer.rig.units.METRES``; empty for the format's default.
     up : "y", "z" or ""
-        The axis that points up in the file; empty for the format's default.
+        Up axis of the file; empty for the format's default.
     rotation_order : str
         One of ``ROTATION_ORDERS``.
     gaps : str
@@ -56,5 +56,5 @@ class MotionOptions:
 
     @property
     def closing(self) -> str:
-        """Handling of gaps in formats without missing frames: a key of ``GAPS``."""
+        """Handling of gaps in formats that do not support missing frames, a key of ``GAPS``."""
         return self.gaps or _CLOSED

@@ -70,14 +70,14 @@ def write_rigged(rigged: Rigged, output: Path) -> list[str]:
     lines[-1] += ", the target's pose"
     if rigged.figure.correctives is not None:
         lines.append(
-            "pose correctives have no place in .skel and .skin: the rest mesh is the one that "
-            "gives the target without them"
+            "pose correctives cannot be stored in .skel and .skin: the rest mesh is adjusted to "
+            "match the target without them"
         )
     return lines
 
 
 def without_correctives(rigged: Rigged) -> Figure:
-    """Return the figure without pose correctives that still matches the target in its pose.
+    """Return the figure without pose correctives, adjusted to match the target in its pose.
 
     Their offsets in that pose are added to the rest mesh: V + B(pose).
     """
@@ -85,8 +85,8 @@ def without_correctives(rigged: Rigged) -> Figure:
     correctives, mesh, skeleton = figure.correctives, figure.mesh, figure.skeleton
     if correctives is None or mesh is None or skeleton is None:
         return figure
-    turned = joint_rotations(skeleton, rigged.pose)
-    rest = mesh.positions + correctives.displacement(corrective_weights(turned))
+    rotations = joint_rotations(skeleton, rigged.pose)
+    rest = mesh.positions + correctives.displacement(corrective_weights(rotations))
     plain = replace(mesh, positions=rest, normals=vertex_normals(rest, mesh.triangles))
     return replace(figure, mesh=plain, correctives=None)
 

@@ -1,12 +1,12 @@
-"""Exporter of AMASS files: motions of bodies of the SMPL family.
+"""Exporter of AMASS files: motions of SMPL-family bodies.
 
 ::
 
     poses (N, 3 J)   trans (N, 3)   betas (S,) or (N, S)   expressions (N, E)   gender "neutral"
     surface_model_type   num_betas   mocap_framerate   mocap_frame_rate   up   present (N,)
 
-``trans`` is transl of V = R (X - J0) + J0 + transl, ``poses`` are rotation vectors in the model's
-own order. ``up`` and ``present``, which is present if frames are missing, are extensions.
+``trans`` is transl of V = R (X - J0) + J0 + transl; ``poses`` are rotation vectors in the model's
+own order. ``up``, and ``present`` if frames are missing, are extensions.
 """
 
 from __future__ import annotations
@@ -49,21 +49,21 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     Parameters
     ----------
     animation : SampledAnimation
-        Of a body with the joints of SMPL, SMPL+H or SMPL-X.
+        Animation of a body with the joints of SMPL, SMPL+H or SMPL-X.
     path : Path
-        With ``gaps="split"`` and gaps, files are called ``name-1.npz``, ``name-2.npz`` ….
+        The file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
     options : MotionOptions
         Up axis (that of the scene if empty) and gaps.
 
     Returns
     -------
     list of str
-        What was written, then what the format cannot hold.
+        Messages: the written files, then the data that the format cannot hold.
 
     Raises
     ------
     RigError
-        If the figure has other joints or an unknown unit, another unit than metres is asked for,
+        If the figure has other joints or an unknown unit, a unit other than metres is requested,
         or no frame is present.
     OutputError
         If a file cannot be written.
@@ -72,7 +72,9 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     member = member_of_figure(animation.figure, "an AMASS motion", ("pelvis",))
     present = animation.frames.present
     if options.closing not in GAPS:
-        raise RigError(f'gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"')
+        raise RigError(
+            f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
+        )
     if not present.any():
         raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
     frames = filled(animation.frames, options.closing == "interpolate")
@@ -91,7 +93,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             length = "1 frame" if stop - start == 1 else f"{stop - start} frames"
             written.append(
                 f"{printable(file, 300)}: {length} of {member.title} at "
-                f"{animation.frame_rate:g} per second, {up} up"
+                f"{animation.frame_rate:g} fps, {up} up"
             )
     lost = []
     for file, span in zip(paths, spans, strict=True):
@@ -122,7 +124,7 @@ def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, 
 
 
 def _padded(shape: Floats) -> Floats:
-    """Return as many shape numbers as are needed, and no fewer than is usual."""
+    """Return shape coefficients padded to the usual number, without trailing zeros beyond it."""
     used = np.flatnonzero(shape.any(axis=0))
     count = max(_FEWEST, int(used[-1]) + 1 if len(used) else 0)
     padded = np.zeros((len(shape), count))
@@ -135,13 +137,13 @@ def _remarks(
 ) -> list[str]:
     notes = []
     if len(body.shape) > 1:
-        notes.append("the shape changes: betas has one row a frame, which few programs read")
+        notes.append("the shape changes: betas has one row per frame, which few programs support")
     if not present.all():
         missing = gaps_text(present, animation.first_frame)
         how = {
-            "hold": "filled with the last pose, and marked in present",
-            "interpolate": "bridged on the shorter arc, and marked in present",
-            "split": "left out between the files",
+            "hold": "the last pose is held, and the frames are marked in present",
+            "interpolate": "interpolated along the shorter arc, and marked in present",
+            "split": "omitted between the files",
         }[options.closing]
         notes.append(f"{missing} missing: {how}")
     return notes

@@ -1,4 +1,4 @@
-"""Exporter of ``.anim`` files: motions of course rigs, as their own keys or a key per frame."""
+"""Exporter of ``.anim`` files: motions of course rigs, with original keys or a key per frame."""
 
 from __future__ import annotations
 
@@ -32,34 +32,34 @@ __all__ = ["export_animation"]
 
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
 _BLOCK = 4096  # frames measured at a time
-_SAME = 1e-9  # of a frame, or of a length: smaller differences are ignored
+_SAME = 1e-9  # tolerance, in frames or length units
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
     """Write a motion as a clip of keys, see ``viewer.export.export_animation``.
 
-    A keyframed clip whose frames are all requested is written exactly, with its own keys. Any
-    other motion gets a key per frame, with linear or smooth tangents, whichever keep the joints
-    nearer to the motion.
+    A keyframed clip that is requested as a whole is written exactly, with its own keys. Any other
+    motion gets a key per frame, with linear or smooth tangents, whichever have the smaller joint
+    error.
 
     Parameters
     ----------
     animation : SampledAnimation
-        Of a figure that moves as ``.skel`` files do.
+        Animation of a figure with the DOFs of a ``.skel`` file.
     path : Path
-        With ``gaps="split"`` and gaps, files are called ``name-1.anim``, ``name-2.anim`` ….
+        The file; ``gaps="split"`` writes ``name-1.anim``, ``name-2.anim`` … if there are gaps.
     options : MotionOptions
-        Only ``gaps`` counts.
+        Options, of which only ``gaps`` is used.
 
     Returns
     -------
     list of str
-        What was written, how far joints are off, and what the format cannot hold.
+        Messages: the written files, joint errors, and the data that the format cannot hold.
 
     Raises
     ------
     RigError
-        If the figure moves in another way, or no frame is present.
+        If the figure has other DOFs, or no frame is present.
     OutputError
         If a file cannot be written.
     """
@@ -67,12 +67,12 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     skeleton = figure.require_skeleton()
     if not is_course_rig(skeleton):
         raise RigError(
-            f".anim moves a root and three angles of each joint, as .skel files do; "
-            f"{figure.name} moves otherwise"
+            f".anim needs a root translation and three angles per joint, as in .skel files; "
+            f"{figure.name} has other DOFs"
         )
     if options.closing not in GAPS:
         raise RigError(
-            f'way to close gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
+            f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not frames.present.any():
         raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
@@ -83,7 +83,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
         notes = [f"{_summary(path, animation.motion)}{own}"]
         notes += _losses(animation, Source(path, saved[path]), (0, frames.n_frames), options)
         if frames.figure_translations.any():
-            notes.append("the place of the whole figure is no part of its clip: it is left out")
+            notes.append("the placement of the whole figure is not part of its clip and is omitted")
         return notes + _left_out(figure, frames)
     return _export_frames(animation, skeleton, path, options)
 
@@ -124,12 +124,12 @@ def _export_frames(
 def _losses(
     animation: SampledAnimation, source: Source, span: tuple[int, int], options: MotionOptions
 ) -> list[str]:
-    """Read a file back and return messages about its errors on the frames and between them.
+    """Read a file back and return messages about its errors on and between the frames.
 
-    Between them captures are compared half-way, and on frames of their own.
+    Between frames, captures are compared at the midpoints and on their own frames.
     """
     clip, path = read(source), source.path
-    assert isinstance(clip, Clip)  # as was written
+    assert isinstance(clip, Clip)  # the file was written from one
     figure, how, part = animation.figure, options.skinning, slice(*span)
     times = animation.frames.times[part]
     on_frames = frames_of(figure, clip, times)
@@ -157,7 +157,7 @@ def _remarks(animation: SampledAnimation, options: MotionOptions) -> list[str]:
 
 
 def _is_whole(animation: SampledAnimation, clip: Clip) -> bool:
-    """Return whether the frames are all of a clip, which has a channel for every DOF."""
+    """Return whether the frames span a whole clip that has a channel for every DOF."""
     skeleton, times = animation.figure.require_skeleton(), animation.frames.times
     targets = [channel.target for channel in clip.channels]
     step = 1.0 / animation.frame_rate
@@ -188,7 +188,7 @@ def _dofs(animation: SampledAnimation, skeleton: Skeleton, frames: Frames) -> Fl
 
 
 def _distance(animation: SampledAnimation, clip: Clip, times: Floats) -> float:
-    """Return how far joints are off at most, the figure's scale left out."""
+    """Return the largest joint error, without the figure's scale."""
     figure, worst = animation.figure, 0.0
     for start in range(0, len(times), _BLOCK):
         block = times[start : start + _BLOCK]
@@ -218,13 +218,13 @@ def _left_out(figure: Figure, frames: Frames) -> list[str]:
     notes, there = [], frames.present
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:
-        notes.append(f".anim cannot hold the figure's scale of {scales.max():g}: it is left out")
+        notes.append(f".anim cannot hold the figure's scale of {scales.max():g}, which is omitted")
     moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
     if moved > _SAME:
         notes.append(
-            ".anim moves the root alone: translations of other joints, up to "
-            f"{length_text(figure, float(moved))}, are left out"
+            ".anim translates only the root: translations of other joints, up to "
+            f"{length_text(figure, float(moved))}, are omitted"
         )
     if frames.shape_weights.any():
-        notes.append(".anim holds no shape: the weights of shapes and morphs are left out")
+        notes.append(".anim holds no shape: the weights of blend shapes are omitted")
     return notes

@@ -28,32 +28,32 @@ from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.retargeting.joint_names import plain_names
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
-from viewer.rig.units import METRES, WORDS
+from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["export_animation"]
 
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
 _MOST_DIGITS = 15
-_LISTED = 8  # joints in a note
+_LISTED = 8  # maximum number of joints listed in a message
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
     """Write a motion, read it back, and report the errors of its joints and of a skin on them.
 
-    Offsets are those of the shape in the first frame that is present. The root has offset 0 and
-    its place in its channels, so that readers that add and readers that replace offsets agree.
-    Angles are unwrapped.
+    Offsets are those of the shape in the first present frame. The root has offset 0 and its
+    position in its channels, so that readers which add offsets and readers which replace them
+    agree. Angles are unwrapped.
 
-    A file holds no mesh. The reported error of vertices is the distance between the figure's skin
-    and the same skin, in the shape of the bones, driven by the file's joints; both use LBS.
+    A file holds no mesh. The reported vertex error is the distance between the figure's mesh and
+    the same mesh, in the shape of the bones, skinned with the file's joints; both use LBS.
 
     Parameters
     ----------
     animation : SampledAnimation
         A figure in many poses.
     path : Path
-        With ``gaps="split"`` and gaps, files are called ``name-1.bvh``, ``name-2.bvh`` ….
+        The file; ``gaps="split"`` writes ``name-1.bvh``, ``name-2.bvh`` … if there are gaps.
     options : MotionOptions
         Unit (centimetres if empty), up axis (y if empty), rotation order, gaps, rest frame,
         digits.
@@ -61,7 +61,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     Returns
     -------
     list of str
-        What was written, the largest differences where there are any, and what the format cannot
+        Messages: the written files, the largest errors if any, and the data that the format cannot
         hold.
 
     Raises
@@ -108,7 +108,7 @@ def _check(options: MotionOptions) -> None:
         ("up axis", options.up, ("", "y", "z")),
         ("up axis of the scene", options.world_up, ("y", "z")),
         ("rotation order", options.rotation_order, ROTATION_ORDERS),
-        ("way to close gaps", options.closing, tuple(GAPS)),
+        ("handling of gaps", options.closing, tuple(GAPS)),
     ):
         if value not in known:
             listed = ", ".join(filter(None, known))
@@ -122,18 +122,18 @@ def _space(figure: Figure, options: MotionOptions) -> Space:
     factor = 1.0
     if figure.unit in METRES:
         factor = METRES[figure.unit] / METRES[options.unit or _DEFAULT_UNIT]
-    return Space(_turn(figure.up, up), _turn(options.world_up, up), factor)
+    return Space(_up_rotation(figure.up, up), _up_rotation(options.world_up, up), factor)
 
 
-def _turn(start: str, end: str) -> Floats:
-    """Return the exact quarter turn about x that carries one up axis into the other."""
+def _up_rotation(start: str, end: str) -> Floats:
+    """Return the exact 90-degree rotation about x that maps one up axis to the other."""
     if start == end:
         return np.eye(3)
     return np.round(axis_rotations(0, np.asarray(np.pi / 2 if end == "z" else -np.pi / 2)))
 
 
 def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
-    """Return a figure whose roots, if there are several, hang from a joint at its origin."""
+    """Return a figure with one root: several roots become children of a joint at its origin."""
     skeleton = figure.require_skeleton()
     if int((skeleton.parents < 0).sum()) == 1:
         return figure, frames
@@ -152,10 +152,10 @@ def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, F
         boxes=None,
     )
     count = frames.n_frames
-    turns = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1, 1))
+    identity = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1, 1))
     return Figure(figure.name, skeleton=joined, up=figure.up, unit=figure.unit), replace(
         frames,
-        rotations=np.concatenate([turns, frames.rotations], axis=1),
+        rotations=np.concatenate([identity, frames.rotations], axis=1),
         translations=np.concatenate([np.zeros((count, 1, 3)), frames.translations], axis=1),
         shape_weights=np.zeros((1, 0)),
     )
@@ -164,7 +164,7 @@ def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, F
 def _ends(
     animation: SampledAnimation, figure: Figure, space: Space, reference: int
 ) -> dict[int, Floats]:
-    """Return the End Sites in the file's space, by joint of the figure that is written."""
+    """Return the End Site of each leaf joint of the written figure, in the file's space."""
     weights = shape_at(animation.frames, reference)
     own = shaped(animation.figure, weights[0])
     skeleton = animation.figure.require_skeleton()
@@ -180,7 +180,7 @@ def _ends(
 
 @dataclass(frozen=True, slots=True)
 class _Writer:
-    """All files of one animation."""
+    """Writer of all files of one animation."""
 
     animation: SampledAnimation
     figure: Figure  # with one root
@@ -196,11 +196,11 @@ class _Writer:
 
     @property
     def parents(self) -> Ints:
-        """Of the joints."""
+        """Parent indices of the joints."""
         return self.figure.require_skeleton().parents
 
     def text(self, start: int, stop: int) -> bytes:
-        """Return the file of some frames."""
+        """Return the file contents for a range of frames."""
         angles = np.degrees(unrolled(self.body.angles[start:stop], self.options.rotation_order))
         positions = self.body.positions[start:stop]
         if self.options.rest_frame:
@@ -230,16 +230,16 @@ class _Writer:
         return driven_losses(path, animation, written, how, span, shape)
 
     def summary(self, path: Path, start: int, stop: int) -> str:
-        """Return what a file holds."""
-        unit = WORDS[self.options.unit or _DEFAULT_UNIT]
-        unit = unit if self.figure.unit in METRES else "the figure's own unit"
+        """Return a message about the contents of a file."""
+        unit = UNIT_NAMES[self.options.unit or _DEFAULT_UNIT]
+        unit = unit if self.figure.unit in METRES else "the figure's unit"
         first = self.animation.first_frame + start
         rest = "the rest pose and " * self.options.rest_frame
         span = f"{stop - start} frames ({first} to {first + stop - start - 1})"
         span = span if stop - start > 1 else f"1 frame ({first})"
         return (
             f"{printable(path, 300)}: {counted(len(self.names), 'joint')}, {rest}{span} at "
-            f"{self.animation.frame_rate:g} per second, "
+            f"{self.animation.frame_rate:g} fps, "
             f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
         )
 
@@ -247,11 +247,11 @@ class _Writer:
 def _remarks(
     animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
 ) -> list[str]:
-    """Return messages about everything changed or omitted."""
+    """Return messages about changed or omitted data."""
     frames, notes = animation.frames, []
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:
-        notes.append(f"several roots: they hang from a joint {skeleton.names[0]}, which was added")
+        notes.append(f"several roots: a common parent joint {skeleton.names[0]} was added")
     if not frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
         text = gaps_text(frames.present, animation.first_frame)
@@ -259,24 +259,24 @@ def _remarks(
             f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
         )
     if figure.unit not in METRES and options.unit:
-        notes.append(f"lengths stay as they are: {animation.figure.name} does not say its unit")
+        notes.append(f"lengths are unchanged: the unit of {animation.figure.name} is unknown")
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
     if moving:
         more = f" and {len(moving) - _LISTED} more" * (len(moving) > _LISTED)
         moved = counted(
             len(moving),
             "joint",
-            "below the root moves within its parent and has position channels",
-            "below the root move within their parents and have position channels",
+            "below the root translates and has position channels",
+            "below the root translate and have position channels",
         )
         notes.append(f"{moved}: {', '.join(moving[:_LISTED])}{more}")
     if shape_changes(frames):
         first = reference + animation.first_frame
-        notes.append(f"the shape changes over time: bones are written as in frame {first}")
+        notes.append(f"the shape changes over time: bone lengths are those of frame {first}")
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:
         notes.append(
-            f"the figure's scale changes from {scales.min():g} to {scales.max():g}: bones are "
-            f"written at {scales[0]:g}"
+            f"the figure's scale changes from {scales.min():g} to {scales.max():g}: bone lengths "
+            f"are written with {scales[0]:g}"
         )
     return notes

@@ -1,12 +1,12 @@
-"""Exporter of EasyMocap folders: motions of bodies of the SMPL family.
+"""Exporter of EasyMocap folders: motions of SMPL-family bodies.
 
 ::
 
     out/smpl/000000.json    [{"id", "Rh" [[3]], "Th" [[3]], "poses" [[3 J]], "shapes" [[S]],
                               "expression" [[E]]}, …]
 
-``Rh`` and ``Th`` place the body about the model's origin, so the first three ``poses`` are 0. A
-person absent from a frame is absent from its file.
+``Rh`` and ``Th`` rotate and translate the body about the model's origin, so the first three
+``poses`` are 0. A person absent from a frame has no record in its file.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ __all__ = ["export_animation", "export_animations"]
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")
-_DIGITS = 7  # as EasyMocap's newer writer has them
-_SHAPES = 10  # of which EasyMocap's layers take that many
+_DIGITS = 7  # decimals, as in EasyMocap's newer writer
+_SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
-    """Write one person, called 0; see ``export_animations``."""
+    """Write one person with the number 0; see ``export_animations``."""
     return export_animations([animation], path, options)
 
 
@@ -61,34 +61,34 @@ def export_animations(
     options: MotionOptions,
     persons: Sequence[int] | None = None,
 ) -> list[str]:
-    """Write several people into one folder, seven decimals.
+    """Write several people into one folder, with seven decimals.
 
-    Frames are numbered as the animations number them. Frames without anybody hold an empty list.
+    Frames keep the numbers of the animations. Frames without people hold an empty list.
 
     Parameters
     ----------
     animations : sequence of SampledAnimation
-        At least one, of bodies of the SMPL family, all at one frame rate.
+        At least one animation of an SMPL-family body, all with the same frame rate.
     path : Path
-        The folder; ``smpl`` in it is replaced if it holds nothing but numbered frames.
+        The folder; its subfolder ``smpl`` is replaced if it holds only numbered frames.
     options : MotionOptions
-        Up axis (that of the scene if empty), and gaps: they stay gaps unless it is asked to hold
-        or to interpolate.
+        Up axis (that of the scene if empty), and handling of gaps, which are kept unless the
+        options request holding or interpolation.
     persons : sequence of int, optional
-        What each is called; 0, 1, 2 … if omitted, below 0 for people without a track.
+        Number of each person; 0, 1, 2 … if omitted, negative for untracked people.
 
     Returns
     -------
     list of str
-        What was written, then what the format cannot hold.
+        Messages: the written folder, then the data that the format cannot hold.
 
     Raises
     ------
     RigError
-        If a figure has other joints or an unknown unit, another unit than metres is asked for,
-        frame rates differ, two people have one number, or no frame is present.
+        If a figure has other joints or an unknown unit, a unit other than metres is requested,
+        frame rates differ, two people have the same number, or no frame is present.
     OutputError
-        If the folder cannot be written, or holds something else.
+        If the folder cannot be written, or holds other files.
     """
     persons = range(len(animations)) if persons is None else persons
     check_unit(options, "EasyMocap")
@@ -106,7 +106,7 @@ def export_animations(
             notes.append(f"{who}{filling}")
         if not animation.frames.present.all():
             missing = gaps_text(animation.frames.present, animation.first_frame)
-            notes.append(f"{who}{missing} missing, as in the motion")
+            notes.append(f"{who}{missing} missing, as in the original motion")
     first = min(animation.first_frame for animation in animations)
     stop = max(animation.first_frame + animation.frames.n_frames for animation in animations)
     with _new_folder(path) as folder:
@@ -119,7 +119,7 @@ def export_animations(
     count = "1 frame" if stop - first == 1 else f"{stop - first} frames"
     return [
         f"{printable(path / _FOLDER, 300)}: {count} of {who}, {up_axis(options)} up; "
-        f"EasyMocap keeps no frame rate: it is {animations[0].frame_rate:g} per second",
+        f"EasyMocap stores no frame rate: it is {animations[0].frame_rate:g} fps",
         *(line for person in people for line in person.losses(path / _FOLDER, options)),
         *notes,
     ]
@@ -127,9 +127,9 @@ def export_animations(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """Somebody who is written: the motion, with its gaps closed as asked, as text, as text says."""
+    """One written person: original animation, animation with closed gaps, records, read-back."""
 
-    meant: SampledAnimation
+    original: SampledAnimation
     animation: SampledAnimation
     records: _Records
     again: Records
@@ -140,23 +140,23 @@ class _Person:
         return 0 <= row < len(present) and bool(present[row])
 
     def text(self, frame: int) -> str:
-        """Return the record of a frame, and keep what it says."""
+        """Return the record of a frame, and store it for reading back."""
         text = self.records.text(frame - self.animation.first_frame)
         self.again.add(text)
         return text
 
     def losses(self, path: Path, options: MotionOptions) -> list[str]:
-        """Return a line with the largest differences, or none."""
+        """Return messages with the largest errors, if there are any."""
         place = np.maximum(np.cumsum(self.animation.frames.present) - 1, 0)
-        found = read_frames(self.again.motion(self.animation.frame_rate), self.meant, options)
+        found = read_frames(self.again.motion(self.animation.frame_rate), self.original, options)
         how = options.skinning
-        lines = frames_losses(path, self.meant, frames_between(found, place), how)
-        return lines + resampling_losses(path, self.meant, how)
+        lines = frames_losses(path, self.original, frames_between(found, place), how)
+        return lines + resampling_losses(path, self.original, how)
 
 
 def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> None:
     if not animations:
-        raise RigError("expected somebody to write, found nobody")
+        raise RigError("expected at least one person to write, found none")
     if len(set(persons)) < len(animations) or len(persons) != len(animations):
         raise RigError(
             f"expected a number for each of {len(animations)} people, found {list(persons)}"
@@ -175,13 +175,13 @@ def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> No
 
 
 class _Records:
-    """The records of one person, made into text frame by frame."""
+    """The records of one person, formatted frame by frame."""
 
     def __init__(self, person: int, body: FamilyFrames) -> None:
         count = len(body.vectors)
         poses = body.vectors.reshape(count, -1).copy()
         poses[:, :3] = 0.0
-        self.head = f'    {{\n        "id": {max(person, -1)}'  # all who have no track are -1
+        self.head = f'    {{\n        "id": {max(person, -1)}'  # -1 for all untracked people
         self.parts: list[tuple[str, Floats]] = [
             ("Rh", body.vectors[:, 0]),
             ("Th", body.about_origin()),
@@ -203,7 +203,7 @@ class _Records:
 
 
 def _used(rows: Floats, count: int) -> Floats:
-    """Return coefficients for every frame: ten, or all up to the last one that is not 0."""
+    """Return the coefficients of every frame: ten, or all up to the last nonzero one."""
     used = np.flatnonzero(rows.any(axis=0))
     width = max(_SHAPES, int(used[-1]) + 1 if len(used) else 0)
     padded = np.zeros((count, width))
@@ -213,8 +213,8 @@ def _used(rows: Floats, count: int) -> Floats:
 
 @contextlib.contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
-    """Give a folder to fill beside ``path/smpl``, and put it there when the block succeeds."""
-    hold()  # also for the folder that is filled, which must not stay behind
+    """Yield a temporary folder next to ``path/smpl``, and move it there if the block succeeds."""
+    hold()  # also protects the temporary folder, which must not be left behind
     target = path / _FOLDER
     made = None
     try:
@@ -233,7 +233,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
             if old.exists():
                 old.replace(target)
             raise
-    except BaseException as problem:  # also Ctrl-C: nothing half written may stay behind
+    except BaseException as problem:  # also Ctrl-C: no partial output may be left behind
         if made is not None:
             shutil.rmtree(made, ignore_errors=True)
             if is_new:
@@ -247,7 +247,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
 
 
 def _refuse_others(path: Path, target: Path) -> None:
-    """Refuse to replace a folder that holds anything but numbered frames."""
+    """Raise OutputError for a folder that holds anything but numbered frames."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"{printable(path, 300)}: expected a folder, found a file")
     if not target.exists():
@@ -256,6 +256,6 @@ def _refuse_others(path: Path, target: Path) -> None:
         other = next((entry.name for entry in entries if not _FRAME.fullmatch(entry.name)), None)
     if other is not None:
         raise OutputError(
-            f"{printable(target, 300)}: holds other files than frames ({printable(other, 60)}), "
+            f"{printable(target, 300)}: holds files other than frames ({printable(other, 60)}) "
             "and is not replaced"
         )

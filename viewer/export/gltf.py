@@ -1,8 +1,8 @@
 """Exporter of glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
 
-Facts are those of the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are
-metres, y is up. Data stay as they are: a node above the figure turns what has z up, and scales
-what is in another unit.
+It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are in
+metres, y is up. Data are not converted: a node above the figure rotates it if z is up, and scales
+it if it is in another unit.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning, skin_used
-from viewer.rig.units import METRES, WORDS
+from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["export", "export_animation"]
 
-_LISTED = 8  # joints in a note
+_LISTED = 8  # maximum number of joints listed in a message
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
-    """Write a figure, its joints as they are posed; see ``viewer.export.export``."""
+    """Write a figure in its current pose; see ``viewer.export.export``."""
     figure, pose = actor.figure, actor.pose
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
     body = _body_of(figure, shape_of(figure, weights), skinning)
@@ -66,21 +66,21 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
     """Write a figure at rest and its motion; see ``viewer.export.export_animation``.
 
-    Of a shape that is baked in and changes, that of the first frame that is present is written.
+    A changing shape that has to be baked into the mesh is that of the first present frame.
 
     Parameters
     ----------
     animation : SampledAnimation
         A figure in many poses.
     path : Path
-        With ``gaps="split"`` and gaps, files are called ``name-1.glb``, ``name-2.glb`` ….
+        The file; ``gaps="split"`` writes ``name-1.glb``, ``name-2.glb`` … if there are gaps.
     options : MotionOptions
-        Gaps, skinning, and what is up in the frames' world.
+        Handling of gaps, skinning, and up axis of the world.
 
     Returns
     -------
     list of str
-        What was written, then what the format cannot hold and by how much that is off.
+        Messages: the written files, then the data that the format cannot hold, with errors.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     saved = _files(list(zip(paths, documents, strict=True)))
     for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
         motion = _frames_text(animation.first_frame + start, stop - start)
-        rate = f"at {animation.frame_rate:g} per second"
+        rate = f"at {animation.frame_rate:g} fps"
         size = f"{len(data[file])} bytes"
         notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]
         notes += _beside(data, file)
@@ -140,7 +140,7 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
         ("unit", options.unit, ("", "m")),
         ("up axis", options.up, ("", "y")),
         ("up axis of the scene", options.world_up, ("y", "z")),
-        ("way to close gaps", options.closing, tuple(GAPS)),
+        ("handling of gaps", options.closing, tuple(GAPS)),
     ):
         if value not in known:
             listed = ", ".join(filter(None, known))
@@ -152,20 +152,20 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Body:
-    """What is the same in all files of an export."""
+    """Data shared by all files of an export."""
 
     shape: Shape
-    influences: Influences | None  # None if no joint moves the mesh
+    influences: Influences | None  # None if the mesh is not skinned
 
     @property
     def figure(self) -> Figure:
-        """As it is written."""
+        """The figure as written."""
         return self.shape.figure
 
 
 @dataclass(frozen=True, slots=True)
 class _Built:
-    """What one file was given."""
+    """Indices and summary of one file's contents."""
 
     tree: Tree
     mesh_node: int | None
@@ -188,7 +188,7 @@ def _add_body(
     still: Locals | None,
     color: Color | None = None,
 ) -> _Built:
-    """Add nodes, mesh and skin of a figure; return their indices and how many there are."""
+    """Add nodes, mesh and skin of a figure; return their indices and counts."""
     figure, influences = body.figure, body.influences
     fixes = influences is not None and influences.n_fixed > 0
     tree = add_nodes(document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes)
@@ -203,7 +203,7 @@ def _add_body(
             joints = tree.joints + tree.fixed
             skin = {"name": text_of(figure.name), "joints": joints, "inverseBindMatrices": bound}
             item["skin"] = document.add("skins", skin)
-            scene.append(node)  # what is above a skinned mesh moves its joints, never itself
+            scene.append(node)  # glTF ignores the transform of a skinned mesh's own node
         else:
             document.root["nodes"][tree.place].setdefault("children", []).append(node)
         split = f" ({figure.mesh.n_vertices} before they were split along texture seams)"
@@ -223,7 +223,7 @@ def _add_animation(
     span: tuple[int, int],
     up: str,
 ) -> _Built:
-    """Add a figure at rest, and some of the frames as an animation."""
+    """Add a figure at rest, and a range of frames as an animation."""
     skeleton = body.figure.require_skeleton()
     part = frames_between(frames, slice(*span))
     pose = figure_pose(animation.figure)
@@ -244,7 +244,7 @@ def _add_animation(
 
 
 def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
-    """Write all files, or none; return what is in them."""
+    """Write all files or none; return their contents."""
     saved: list[dict[Path, bytes]] = []
     for path, document in documents:
         if path.suffix.lower() == ".gltf":
@@ -262,37 +262,37 @@ def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
 
 def _beside(data: dict[Path, bytes], path: Path) -> list[str]:
     others = {file: len(content) for file, content in data.items() if file != path}
-    return [f"{printable(file, 300)}: its arrays, {n} bytes" for file, n in others.items()]
+    return [f"{printable(file, 300)}: array data, {n} bytes" for file, n in others.items()]
 
 
 def _remarks(body: _Body, up: str) -> list[str]:
-    """Say what readers of the file should know of space and shape."""
+    """Return messages about coordinate space and shape for users of the file."""
     figure, notes = body.figure, []
     if up == "z":
-        notes.append("z is up: a node above the figure turns it by -90 degrees about x")
+        notes.append("z is up: a node above the figure rotates it by -90 degrees about x")
     if METRES.get(figure.unit, 1.0) != 1.0:
         notes.append(
-            f"lengths are {WORDS[figure.unit]}: a node above the figure scales them to metres, by "
-            f"{METRES[figure.unit]:g}"
+            f"lengths are in {UNIT_NAMES[figure.unit]}: a node above the figure scales them to "
+            f"metres by {METRES[figure.unit]:g}"
         )
     elif figure.unit not in METRES:
         notes.append(
-            f"lengths stay as they are: {printable(figure.name, 100)} does not say its unit, and "
-            "programs take glTF's for metres"
+            f"lengths are unchanged: the unit of {printable(figure.name, 100)} is unknown, and "
+            "programs interpret glTF lengths as metres"
         )
     if figure.mesh is not None and figure.mesh.n_vertices == 0:
-        notes.append("the mesh has no vertices, and is left out")
+        notes.append("the mesh has no vertices and is omitted")
     if body.shape.baked is not None:
-        notes.append("the shape is baked in: mesh and joints are written as it has them")
+        notes.append("the shape is baked into mesh and joints")
     if len(body.shape.targets):
         notes.append(f"{len(body.shape.targets)} blend shapes are morph targets")
         shapes = figure.blend_shapes
         if shapes is not None and shapes.normal_offsets is None:
-            notes.append("normals do not follow these: glTF has no rule for it")
+            notes.append("normals are not affected by these: glTF does not define it")
     if body.influences is not None and body.influences.n_fixed:
         notes.append(
-            f"{vertices_text(body.influences.n_fixed)} without influence: bound to a node that "
-            "never moves, fixed"
+            f"{vertices_text(body.influences.n_fixed)} without influence: bound to the node "
+            '"fixed", which never moves'
         )
     return notes
 
@@ -300,7 +300,7 @@ def _remarks(body: _Body, up: str) -> list[str]:
 def _motion_remarks(
     animation: SampledAnimation, body: _Body, frames: Frames, options: MotionOptions
 ) -> list[str]:
-    """Say what was done with gaps, and which joints move within their parents."""
+    """Return messages about gaps, and about joints with translations."""
     notes, skeleton = [], animation.figure.require_skeleton()
     if not animation.frames.present.all():
         done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
@@ -316,8 +316,8 @@ def _motion_remarks(
         moved = counted(
             len(moves),
             "joint",
-            "below the root moves within its parent",
-            "below the root move within their parents",
+            "below the root translates",
+            "below the root translate",
         )
         notes.append(f"{moved}: {printable(names, 300)}{more}")
     return notes

@@ -6,14 +6,14 @@
     joints (J, 3)     world (J, 4, 4)  joint_names (J,)   parents (J,)
     own_numbers (N,)  shape_weights (S,)   up   unit   name
 
-Of a motion, F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (F, J, 4, 4),
-``rotations`` (F, J, 4) within the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
-``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``; where a frame is not present its
-rows are NaN, unless it is asked to fill them: then ``present`` is true throughout.
+For a motion of F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (F, J, 4, 4),
+``rotations`` (F, J, 4) relative to the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
+``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``. Rows of missing frames are NaN,
+unless gaps are held or interpolated: then ``present`` is true throughout.
 
-Of K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not seen, ``confidences``
-(K,) or (F, K), ``joint_names`` (K,), ``limbs`` (L, 2), ``sides`` (K,) -1 for right, 1 for left,
-``layout``.
+For K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not visible,
+``confidences`` (K,) or (F, K), ``joint_names`` (K,), ``limbs`` (L, 2), ``sides`` (K,) -1 for right,
+1 for left, ``layout``.
 """
 
 from __future__ import annotations
@@ -118,21 +118,21 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
     Parameters
     ----------
     animation : SampledPoints
-        One person's.
+        Points of one person.
     path : Path
-        Replaced if it exists.
+        The file; replaced if it exists.
     options : MotionOptions
-        ``world_up``, which is written beside.
+        Options, of which ``world_up`` is written to the file.
 
     Returns
     -------
     list of str
-        What was written.
+        Messages about the written file.
 
     Raises
     ------
     RigError
-        If another unit or up axis is asked for, or no frame is present.
+        If another unit or up axis is requested, or no frame is present.
     OutputError
         If the file cannot be written.
     """
@@ -152,14 +152,14 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
 
 
 def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None:
-    """Refuse what arrays in the scene's own numbers cannot do."""
-    for what, asked, own in (
+    """Raise RigError for options that need a conversion, or if no frame is present."""
+    for what, requested, own in (
         ("unit", options.unit, unit),
         ("up axis", options.up, options.world_up),
     ):
-        if asked not in ("", own):
+        if requested not in ("", own):
             raise RigError(
-                f'{what} of arrays: expected {own or "none"}, as in the scene, found "{asked}"'
+                f'{what} of arrays: expected {own or "none"}, as in the scene, found "{requested}"'
             )
     if not present.any():
         raise RigError(f"{name}: every frame is missing, there is nothing to write")
@@ -181,4 +181,4 @@ def _point_arrays(
 def _count(present: Bools, rate: float) -> str:
     missing = int((~present).sum())
     gaps = f"; {missing} of them missing, NaN" if missing else ""
-    return f"{len(present)} frames at {rate:g} per second{gaps}"
+    return f"{len(present)} frames at {rate:g} fps{gaps}"

@@ -1,6 +1,6 @@
 """Exporter of Wavefront ``.obj`` files, with a ``.mtl`` and image if the mesh is textured.
 
-Vertices keep the file's numbering: along seams a face refers to several ``vt`` for one ``v``.
+Vertices keep their numbering: along seams faces refer to several ``vt`` for one ``v``.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from viewer.rig.motion.evaluation import pose_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
-from viewer.rig.units import WORDS
+from viewer.rig.units import UNIT_NAMES
 
 __all__ = ["export", "export_animation"]
 
-_PLAIN = "plain"  # the material of triangles that have none
+_PLAIN = "plain"  # material of triangles without one
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
@@ -36,7 +36,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     positions, normals = deform(actor.figure, actor.pose, skinning)
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
     beside = _materials(mesh, path)
-    unit = f", {WORDS[actor.figure.unit]}" if actor.figure.unit in WORDS else ""
+    unit = f", {UNIT_NAMES[actor.figure.unit]}" if actor.figure.unit in UNIT_NAMES else ""
     parts = [f"# {name}: {actor.figure.up} up{unit}\n"]
     if beside:
         parts.append(f"mtllib {list(beside)[-1].name}\n")
@@ -45,7 +45,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         parts.append(_rows("vt", mesh.uvs))
     parts.append(_rows("vn", normals))
     parts += _faces(mesh, bool(beside))
-    # Others hold the same already.
+    # The other files exist with the same content.
     missing = [file for file in beside if not os.path.lexists(file)]
     with all_or_none(missing):
         for file in missing:
@@ -57,10 +57,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 
 
 def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
-    """Write one numbered file a frame; see ``viewer.export.export_animation``.
+    """Write one numbered file per frame; see ``viewer.export.export_animation``.
 
-    ``{frame}`` in the name becomes the frame's number, as in ``walk_{frame:05}.obj``. Missing
-    frames have no file unless ``options.gaps`` asks to hold or to interpolate.
+    ``{frame}`` in the name stands for the frame's number, as in ``walk_{frame:05}.obj``. Missing
+    frames have no file unless ``options.gaps`` requests holding or interpolation.
     """
     poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     frames = np.flatnonzero(poses.present)
@@ -72,22 +72,24 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             written += export(Actor(animation.figure, pose), file, options.skinning)
     missing = poses.n_frames - len(files)
     if not files:
-        return [f"{printable(path, 300)}: everybody is absent in these frames, nothing was written"]
+        return [
+            f"{printable(path, 300)}: no person is present in these frames, nothing was written"
+        ]
     name = printable(path, 300)
-    gaps = f"; {missing} frames are missing in the motion, and have no file" if missing else ""
+    gaps = f"; {missing} frames are missing in the motion and have no file" if missing else ""
     span = f"{len(files)} files, {files[0].name} to {files[-1].name}"
     span = span if len(files) > 1 else f"1 file, {files[0].name}"
     return [f"{name}: {span}{gaps}", *[filling] * bool(filling)]
 
 
 def _rows(keyword: str, rows: Floats) -> str:
-    # One format for all rows: many times faster than one call a row.
+    # One format string for all rows is many times faster than one call per row.
     line = f"{keyword}{' %.9g' * rows.shape[1]}\n"
     return line * len(rows) % tuple((rows + 0.0).ravel().tolist())
 
 
 def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
-    """Write triangles, ``usemtl`` before each run of a material."""
+    """Return the lines of triangles, with ``usemtl`` before each run of a material."""
     corners = [mesh.triangles + 1]
     if mesh.uvs is not None:
         uv = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
@@ -108,7 +110,7 @@ def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
 
 
 def _materials(mesh: Mesh, path: Path) -> dict[Path, bytes]:
-    """Return the pictures and, last, the ``.mtl`` that names them; nothing without a picture."""
+    """Return the pictures and finally their ``.mtl``; empty if there is no picture."""
     files: dict[Path, bytes] = {}
     parts = [f"newmtl {_PLAIN}\nKd 1 1 1\n"]
     stem = path.stem[:80]  # longer names would be truncated after the number

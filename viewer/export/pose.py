@@ -18,6 +18,6 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     """Write a pose that ``--pose`` and the window read; see ``viewer.export.export``."""
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
-        raise RigError(f"figure {figure.name} has no skeleton, and so no pose")
+        raise RigError(f"figure {figure.name} has no skeleton and therefore no pose")
     write(record_of(figure, pose), path)
     return [f"{printable(path, 300)}: {figure.skeleton.n_dofs} DOFs"]

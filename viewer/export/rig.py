@@ -29,8 +29,8 @@ __all__ = ["export"]
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     """Write skeleton and skin, read them back, and report the error of the posed mesh.
 
-    The shape becomes the rest mesh, the pose the skeleton's own; the figure's translation goes
-    to the root's offset.
+    The shape is applied to the rest mesh, the pose becomes the file's pose, and the figure's
+    translation is added to the root's offset.
     """
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
@@ -56,7 +56,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
-    """Return all written files, including images, which the writer puts where they are named."""
+    """Return all written files, including images under the names that the mesh gives them."""
     if rig.mesh is None:
         return [skel]
     pictures = [material.texture for material in rig.mesh.materials if material.image is not None]
@@ -64,7 +64,7 @@ def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
 
 
 def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.ndarray | None]:
-    """Return the figure as the two files hold it, and the original vertex of each split one."""
+    """Return the figure in the form of the files, and the original vertex of each split vertex."""
     skeleton, mesh, skin = figure.require_skeleton(), figure.mesh, figure.skin
     posed, order = course_skeleton(skeleton, pose)
     if mesh is None:
@@ -87,7 +87,7 @@ def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.
 
 
 def scaled(figure: Figure, factor: float) -> Figure:
-    """Return a figure with all its lengths scaled about its origin: mesh, joints, bindings."""
+    """Return a figure with mesh, joints and bindings scaled about its origin."""
     if factor == 1.0:
         return figure
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
@@ -105,14 +105,14 @@ def scaled(figure: Figure, factor: float) -> Figure:
 
 
 def _lost(figure: Figure, pose: Pose) -> list[str]:
-    """Return a message about everything that the formats cannot hold."""
+    """Return a message that lists the data that the formats cannot hold."""
     lost = []
     if figure.blend_shapes is not None:
-        lost.append(f"{figure.n_shapes} shape directions (the present shape is kept)")
+        lost.append(f"{figure.n_shapes} blend shapes (the current shape is kept)")
     if figure.correctives is not None:
         lost.append("pose correctives")
     if figure.up != "y":
-        lost.append(f"that {figure.up} is up")
+        lost.append(f"the up axis {figure.up}")
     extras = {
         "body parts": figure.body_parts,
         "keypoints": figure.keypoints,
@@ -127,7 +127,7 @@ def _lost(figure: Figure, pose: Pose) -> list[str]:
 def _error(
     actor: Actor, files: list[Source], sources: np.ndarray | None, skinning: Skinning
 ) -> list[str]:
-    """Read the files back, and compare their pose with the posed figure."""
+    """Read the files back and compare their pose with the posed figure."""
     figure, pose = actor.figure, actor.require_pose()
     skeleton = read(files[0])
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None

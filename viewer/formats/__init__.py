@@ -1,4 +1,4 @@
-"""File formats: one module each, found by content first and by suffix second."""
+"""File formats: one module each, detected by content first and by suffix second."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ __all__ = [
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy")
-_ANY_TEXT = (".txt",)  # says nothing about the content
+_ANY_TEXT = (".txt",)  # does not identify the content
 _HEAD = 1 << 16  # bytes that must identify a file
 
 
@@ -213,10 +213,11 @@ def detect(source: Source) -> str:
                 source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
             return key
     if suffix in _ARCHIVES:
-        return _detect_archive(source)  # its error names the kind of archive
+        # Opening it again raises an error that names the kind of archive.
+        return _detect_archive(source)
     looks = source.looks_like()
     if by_suffix and looks is None:
-        return by_suffix  # its reader knows best what is missing
+        return by_suffix  # its reader reports what is missing
     wanted = FORMATS[by_suffix].suffixes[0] if by_suffix else KNOWN
     if looks is None:
         raise source.fault("F002.unknown-kind", wanted=wanted)
@@ -256,7 +257,7 @@ def _detect_folder(source: Source) -> str:
 def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
     if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
-        return False  # most text files, before the module for archives is loaded
+        return False  # returns early for most text files, without importing the module for archives
     from viewer.formats._archive.opening import is_archive
 
     return is_archive(head)
@@ -289,7 +290,7 @@ def _pose_or_motion(archive: Archive) -> str:
 
 
 def read(source: Source) -> Content:
-    """Read whatever the file holds; see the format modules for what they raise."""
+    """Read a file of any format; see the format modules for the errors that they raise."""
     return import_module(f"{__name__}.{detect(source)}").read(source)
 
 

@@ -19,8 +19,8 @@ MAX_SIZE = 2 << 30
 FOLDER = "a folder"
 """Name of a folder in the result of ``kind_of``."""
 
-_MOST_FILES = 2000  # in a folder that are compared with the name of a missing file
-_ALIKE = 0.8  # high, because file names have suffixes in common, and often more
+_MOST_FILES = 2000  # files in a folder that are compared with the name of a missing file
+_ALIKE = 0.8  # similarity; high, because file names share suffixes and often more
 _KINDS = {
     stat.S_IFDIR: FOLDER,
     stat.S_IFIFO: "a pipe",
@@ -95,7 +95,7 @@ def _near_files(path: Path) -> str:
     try:
         with os.scandir(path.parent) as entries:
             names = [entry.name for entry in islice(entries, _MOST_FILES)]
-    except OSError:  # the folder is missing too, or cannot be listed
+    except OSError:  # the folder is missing as well, or cannot be listed
         return ""
-    # A dangling link has this very name.
+    # A dangling link has exactly this name.
     return did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)

@@ -40,7 +40,7 @@ _NOT_FINITE = re.compile(
     rb"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|1\.?#(?:q?nan|snan|ind|inf)\w*)", re.IGNORECASE
 )
 _NOT_ZERO = re.compile(rb"[+-]?[0.]*[1-9]")
-_SMALLEST = float(np.nextafter(0.0, 1.0))  # above 0 in float64
+_SMALLEST = float(np.nextafter(0.0, 1.0))  # smallest float64 above 0
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes; temporaries stay inside the processor's cache
 _PAD = 16  # bytes before a chunk, so that the first words can be read as 16 characters

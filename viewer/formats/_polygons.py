@@ -118,7 +118,7 @@ def _ears(points: Floats) -> Picks:
         corners = [points[rows[:, None], index] for index in (before, left, after)]
         areas = _cross(corners[1] - corners[0], corners[2] - corners[0])
         is_ear = (areas > 0.0) & ~_has_inside(corners, corners[1])
-        # A self-intersecting polygon may have no ear left; then the largest corner is clipped.
+        # A self-intersecting polygon may have no ear left; the largest corner is clipped instead.
         chosen = np.where(is_ear.any(axis=1), is_ear.argmax(axis=1), areas.argmax(axis=1))
         found.append(np.stack([part[rows, chosen] for part in (before, left, after)], axis=1))
         keeps = np.ones(left.shape, dtype=np.bool_)

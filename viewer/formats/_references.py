@@ -39,7 +39,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     try:
         # Unlike Path.resolve(), this does not raise for circular links; reading reports them.
         inside, base = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
-    except ValueError:  # a name with a NUL, which no file can have
+    except ValueError:  # a NUL in the name, which is invalid in any path
         return path
     return path if inside != base and inside.is_relative_to(base) else None
 

@@ -22,8 +22,8 @@ __all__ = ["MAX_SIZE", "Source", "read_bytes"]
 Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_CONTROL_Z = b"\x1a"  # ends a text file written under CP/M or DOS
-_ANY_END = (b"ply\n", b"ply\r")  # binary numbers follow, which may end with any byte
+_CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
+_ANY_END = (b"ply\n", b"ply\r")  # binary data follows, which may end with any byte
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
@@ -144,7 +144,7 @@ class Source:
     def line(self, offset: int) -> int:
         """Return the line of an offset, counted from 1; slow, for errors only.
 
-        CR CR LF, seen in real files, is one line ending; so is a CR alone.
+        CR CR LF, which occurs in real files, is one line ending, and so is a single CR.
         """
         start, line = self._counted
         if offset < start:

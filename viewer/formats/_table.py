@@ -52,7 +52,7 @@ def read_table(
 
 
 def read_numbers(source: Source) -> Floats:
-    """Read all numbers of a text, no matter how they are spread over lines: (N,).
+    """Read all numbers of a text, regardless of line breaks: (N,).
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _is_regular(source: Source, columns: int, count: int) -> bool:
     if count % columns:
         return False
     letters = np.frombuffer(source.data, dtype=np.uint8)
-    is_space = letters <= 32  # control characters were refused with the numbers
+    is_space = letters <= 32  # control characters have been refused with the numbers
     begins = np.flatnonzero(~is_space & np.concatenate([[True], is_space[:-1]]))
     # Each run of `columns` words must lie on a line of its own.
     ends = np.flatnonzero((letters == 10) | (letters == 13))

@@ -1,4 +1,4 @@
-"""Words of a text that should be numbers, their places, and the faults of those that are not."""
+"""Words of a text that should be numbers, their positions, and faults of those that are not."""
 
 from __future__ import annotations
 

@@ -207,7 +207,7 @@ def _compare_parts(
         usual = () if part in _HANDS else next(iter(joints.values()))
         turned = joints.get(len(numbers) // len(vectors), usual)
         if not turned or not set(turned) <= set(names):
-            continue  # hand components, or joints that are not in the poses
+            continue  # hand components, or joints missing from the poses
         columns = [names.index(name) for name in turned]
         if not _are_same(vectors[:, columns].ravel(), numbers):
             odd.append(part)
@@ -355,17 +355,17 @@ def _up(archive: Archive, is_aist: bool) -> str:
         return said
     if is_aist:
         return "y"
-    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE is y up, unstated
+    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE is y up without stating it
     return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
 
 
 def _text(archive: Archive, key: str) -> str:
-    """Return a text, including bytes converted by ``str``; empty if there is none."""
+    """Return a string, including bytes converted by ``str``; empty if there is none."""
     if not archive.has(key):
         return ""
     try:
         text = archive.text(key)
-    except FormatError:  # an object array, whose content is not needed
+    except FormatError:  # an object array, whose contents are not needed
         return ""
     return text[2:-1] if text.startswith("b'") and text.endswith("'") else text
 

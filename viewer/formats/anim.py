@@ -46,7 +46,7 @@ _RULES: dict[bytes, Tangent] = {rule.encode(): rule for rule in TANGENT_RULES}
 _WORDS_PER_KEY = 4
 
 Word = re.Match[bytes]
-_Key = tuple[float, float, Tangent, Tangent, int]  # the last is its offset
+_Key = tuple[float, float, Tangent, Tangent, int]  # the last item is the key's offset
 
 
 def read(source: Source) -> Clip:
@@ -80,7 +80,7 @@ class _Parser:
         # The channel and the key that contain the current word.
         self.channel: int | None = None
         self.key: int | None = None
-        self.starts: list[int] = []  # of all channels
+        self.starts: list[int] = []  # offsets of all channels
 
     def clip(self) -> Clip:
         """Return the whole file as a clip."""

@@ -39,11 +39,12 @@ from viewer.rig.skeleton import Skeleton, ball_skeleton
 
 __all__ = ["read"]
 
-_LARGEST_RATIO = 8  # rotations per number of the file; files with more are refused
-_SMALL_CLIP = 1 << 24  # rotations that are always accepted
+_LARGEST_RATIO = 8  # maximum ratio of rotations to numbers in the file
+_SMALL_CLIP = 1 << 24  # number of rotations up to which any ratio is accepted
 _CHUNK = 256  # frames at a time, so that their numbers fit into the processor's cache
-_THICKNESS = 0.1  # of a joint's box, relative to the length of the bone
-_THINNEST, _THICKEST = 0.05, 0.3  # its limits, relative to the length of a typical bone
+_THICKNESS = 0.1  # thickness of a joint's box, relative to the length of the bone
+# Limits of the thickness, relative to the length of a typical bone.
+_THINNEST, _THICKEST = 0.05, 0.3
 
 
 def read(source: Source) -> SkeletonMotion:
@@ -52,7 +53,7 @@ def read(source: Source) -> SkeletonMotion:
     Parameters
     ----------
     source : Source
-        The file; what is odd but readable is added to its warnings.
+        The file; recoverable faults are added to its warnings.
 
     Returns
     -------
@@ -84,7 +85,7 @@ def read(source: Source) -> SkeletonMotion:
     unit, facts, unit_note = guess_unit(points)
     figure = Figure(source.path.stem, skeleton=skeleton, unit=unit)
     up, more, up_notes = guess_up(figure, clip, points)
-    facts += (*more, ("frames", f"{len(motion.values)} at {rate:g} a second"))
+    facts += (*more, ("frames", f"{len(motion.values)} at {rate:g} fps"))
     return SkeletonMotion(replace(figure, up=up, facts=facts), clip, unit_note, up_notes)
 
 
@@ -143,7 +144,7 @@ def _table(source: Source, joints: list[BvhJoint]) -> _Table:
 
 
 def _refuse_empty_joints(source: Source, table: _Table, motion: Motion) -> None:
-    """Refuse files that would exhaust memory: many frames of many joints without channels."""
+    """Refuse files that would exhaust memory: many frames for many joints without channels."""
     rotations = len(motion.values) * len(table.names)
     if rotations > max(_SMALL_CLIP, _LARGEST_RATIO * motion.values.size):
         raise source.fault(
@@ -226,7 +227,7 @@ def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> Non
 
 
 def _keep_signs(rotations: Floats) -> None:
-    """Choose between q and -q, the same rotation, the one nearer to the frame before; in place."""
+    """Replace q by -q, the same rotation, where that is nearer to the previous frame; in place."""
     products = np.einsum("nja,nja->nj", rotations[1:], rotations[:-1])
     turned = np.logical_xor.accumulate(products < 0.0, axis=0)
     if turned.any():
@@ -257,7 +258,7 @@ def _translations(source: Source, table: _Table, values: Floats) -> Floats | Non
 
 
 def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
-    """Refuse frames that translate a joint beyond the limit, and repeat the one before them.
+    """Refuse frames that translate a joint beyond the limit, and repeat the frame before them.
 
     ``names`` are the axis and joint of each column.
     """

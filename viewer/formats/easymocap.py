@@ -33,7 +33,7 @@ _LEVELS = 3  # folders that may contain the cameras, from that of the frames upw
 
 
 def read(source: Source) -> Capture:
-    """Open a recording, with defaults for everything that its files do not state.
+    """Open a recording with default options.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def open_capture(
     source : Source
         Output folder of EasyMocap, one of its subfolders, or a single frame file.
     frame_rate : float
-        Frames a second.
+        Frames per second.
     flat_hands : bool, optional
         Whether hand components exclude the mean hand; by default they do for SMPL-X and MANO, and
         do not for SMPL+H.
@@ -113,7 +113,7 @@ def open_capture(
 
 
 def _name(source: Source) -> str:
-    """Return a recording's name: not that of its folder ``smpl``, which all have."""
+    """Return a recording's name: not that of its folder ``smpl``, as every recording has one."""
     return folder_name(source.path) if source.is_folder else source.path.stem
 
 

@@ -25,7 +25,7 @@ from viewer.rig.morph_target import MorphTarget
 
 __all__ = ["read"]
 
-_WIDTH = 4  # an index, x, y, z
+_WIDTH = 4  # index, x, y, z
 _SECTIONS = (b"positions", b"normals")
 
 

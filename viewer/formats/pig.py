@@ -42,8 +42,8 @@ __all__ = ["read"]
 
 Indices = NDArray[np.int64]
 
-_JOINT, _VERTEX = "noun-joint", "noun-vertex"  # phrases
-_ODD_SUM = 0.01  # well above the authors' rounding error
+_JOINT, _VERTEX = "noun-joint", "noun-vertex"  # keys of phrases
+_ODD_SUM = 0.01  # well above the rounding error of the authors' files
 
 
 def read(source: Source) -> Figure:

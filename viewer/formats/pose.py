@@ -8,7 +8,7 @@
             "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …], "up": "y",
             "dof_layout": word}
     .npz   the same arrays, dof_names and dofs apart
-    .txt   the model's own numbers, separated by blanks: 190 for PIG, 72 for SMPL …
+    .txt   the model's own numbers, separated by white space: 190 for PIG, 72 for SMPL …
 
 ``joint_turns`` are rotations as quaternions in the figure's axes, for figures with other DOFs than
 ``dof_layout`` names. Figures with the same DOFs use ``dofs``, edited or not, and the transforms
@@ -67,7 +67,8 @@ _BESIDES = (
     "markers_latent latent_labels markers_latent_vids"
 )
 _NOT_NEEDED = _BESIDES.split()  # keys of pose and motion files that posing does not need
-_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)  # here J x 3 numbers are one pose, not J frames
+# Keys whose J x 3 numbers are one pose rather than J frames.
+_PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _VERSION = 1
 
 
@@ -148,7 +149,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         scale=_single(named, "scale"),
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
-        turns=read_rotations(named),
+        joint_rotations=read_rotations(named),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
@@ -181,7 +182,11 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
         where = [odd] if odd else []
         near = did_you_mean(odd, known)
         raise named.fault("F002.pose-keys", *where, keys=list(named.values), near=near)
-    used = (*_KNOWN, *_NOT_NEEDED) if record.turns is None else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+    used = (
+        (*_KNOWN, *_NOT_NEEDED)
+        if record.joint_rotations is None
+        else (*_KNOWN, *_NOT_NEEDED, *KEYS)
+    )
     unread = [key for key in named.values if key not in used]
     if unread:
         named.warn("F007.pose-keys", unread[0], keys=[*map(_with_hint, unread)])
@@ -275,7 +280,9 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     ):
         if single is not None:
             named[name] = single
-    return named if record.turns is None else named | named_rotations(record.turns)
+    return (
+        named if record.joint_rotations is None else named | named_rotations(record.joint_rotations)
+    )
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:

@@ -5,8 +5,8 @@ r"""Reader of ``.rig`` files (UCSD course CSE169): the names of files that belon
     rig   = "rig" name? "{" item* "}"
     item  = "skeleton" file | "skin" file | "morphs" n "{" file*n "}"
 
-Files are relative to the folder of the ``.rig``, and must lie below it. A name in double
-quotes may contain blanks.
+Files are relative to the folder of the ``.rig``, and must lie below it. A name in double quotes may
+contain spaces.
 """
 
 from __future__ import annotations

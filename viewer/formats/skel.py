@@ -42,7 +42,7 @@ Word = re.Match[bytes]
 
 @dataclass(slots=True)
 class _Joint:
-    """A joint being read; items come in any order, and the last of a kind wins."""
+    """A joint being read; items come in any order, and the last of each kind counts."""
 
     name: str
     parent: int
@@ -203,7 +203,7 @@ class _Parser:
         self._skip_item()
 
     def _skip_item(self, on_line: bool = True) -> None:
-        """Skip the rest of an item: that of its line, and numbers on the lines below."""
+        """Skip the rest of an item: the rest of its line, and numbers on the lines below."""
         while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
             last = self.word
             if not (on_line or is_number(last.group()) or is_infinite(last.group())):
@@ -297,7 +297,7 @@ def _skeleton(source: Source, joints: list[_Joint]) -> tuple[Skeleton, Floats]:
         dof_kinds=kinds,
         rest_dofs=np.clip(dofs, limits[:, 0], limits[:, 1]),
         dof_limits=limits,
-        # Corners may be swapped on an axis, which would turn the faces inside out.
+        # The file may swap minimum and maximum along an axis, which would turn the box inside out.
         boxes=np.sort(corners, axis=1),
     )
     return skeleton, dofs

@@ -50,7 +50,7 @@ from viewer.rig.skin import Skin
 
 __all__ = ["read", "write"]
 
-_SHORTEST = 1e-15  # normal; the square of a shorter one is 0 in float32
+_SHORTEST = 1e-15  # length of a normal; the square of a shorter one is 0 in float32
 
 
 def read(source: Source) -> Figure:
@@ -160,7 +160,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     inverse_bind = invert_bindings(source, sections)
     joints, weights = checked_influences(source, sections, len(inverse_bind))
     skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
-    if not source.diagnostics.errors:  # errors make warnings about weights redundant
+    if not source.diagnostics.errors:  # after errors, warnings about weights are redundant
         check_weights(source, skin)
     return skin
 

@@ -49,7 +49,7 @@ KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 
 _ODD_SUM = 0.05  # deviation of a joint regressor's sum from 1, which would displace the joint
 _ROUNDED = 1e-3  # largest deviation from 1 of weight sums that are normalised
-_ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and that through float32
+_ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and as uint32 converted to float32
 
 
 def read(source: Source) -> Figure:

@@ -10,7 +10,7 @@ from viewer.diagnostics import CODES as ALL_CODES
 from viewer.diagnostics import SEVERITIES, Code
 from viewer.lint._again import Again, lint_again
 from viewer.lint._aim import Places, places_of, points_of
-from viewer.lint._finding import MAX_TURN, Finding, LintOptions, Subject
+from viewer.lint._finding import MAX_ROTATION, Finding, LintOptions, Subject
 from viewer.lint._report import describe, finding_text, summary, worst_first
 from viewer.lint._running import CHECKS, Check, Progress, lint_scene
 from viewer.rig.scene import Scene
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CHECKS",
     "CODES",
-    "MAX_TURN",
+    "MAX_ROTATION",
     "SEVERITIES",
     "Again",
     "Check",

@@ -81,10 +81,10 @@ def places_of(
 def _facing(normals: Floats, actor: Actor) -> Floats:
     """Return the mean of unit normals, rotated with the actor: (3,)."""
     mean = normals.mean(axis=0)
-    turned = actor.placement[:3, :3] @ mean
-    length = float(np.linalg.norm(turned))
+    rotated = actor.placement[:3, :3] @ mean
+    length = float(np.linalg.norm(rotated))
     # A placement's scale must not lengthen it; a broken rig may have no finite normals.
-    return turned * (np.linalg.norm(mean) / length) if 0.0 < length < np.inf else np.zeros(3)
+    return rotated * (np.linalg.norm(mean) / length) if 0.0 < length < np.inf else np.zeros(3)
 
 
 def _names_places(finding: Finding) -> bool:

@@ -21,15 +21,15 @@ from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
 from viewer.rig.units import METRES
 
-__all__ = ["MAX_TURN", "Finding", "LintOptions", "Subject"]
+__all__ = ["MAX_ROTATION", "Finding", "LintOptions", "Subject"]
 
-MAX_TURN = 3400.0
+MAX_ROTATION = 3400.0
 """Default limit of a joint's rotation relative to its parent, degrees per second."""
 
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
 _STRAYS = 0.02  # fraction of vertices that may be strays, at each end of an axis
-_FAR = 10.0  # a box this many times that of the others indicates strays
+_FAR = 10.0  # ratio of bounding boxes, with and without strays, from which these are ignored
 
 Indices = NDArray[np.int64] | Ints | list[int]
 
@@ -42,8 +42,8 @@ class LintOptions:
     ----------
     max_speed : float or None
         Of a joint or keypoint, figure units per second; None for 15 times the figure's size.
-    max_turn : float
-        Rotation of a joint relative to its parent, radians per second; default ``MAX_TURN``.
+    max_rotation : float
+        Rotation of a joint relative to its parent, radians per second; default ``MAX_ROTATION``.
     confidence : float
         Captured keypoints below this have low confidence.
     rate : float
@@ -56,7 +56,7 @@ class LintOptions:
     """
 
     max_speed: float | None = None
-    max_turn: float = float(np.radians(MAX_TURN))
+    max_rotation: float = float(np.radians(MAX_ROTATION))
     confidence: float = 0.3
     rate: float = 60.0
     frame_rate: float = DEFAULT_RATE
@@ -211,7 +211,7 @@ class Subject:
         unit = self.actor.figure.unit
         if unit in METRES:
             return f"{speed * METRES[unit]:.3g} m/s"
-        return f"{speed:.3g} units a second" + self._relative(speed)
+        return f"{speed:.3g} units per second" + self._relative(speed)
 
     def size(self) -> float:
         """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.

@@ -243,7 +243,7 @@ def with_files(
     """
     if looked_at is None:
         actors = opened.scene.actors
-        everything = [dict.fromkeys(_SPOILED, index) for index in range(len(actors))]
+        everything = [dict.fromkeys(_INVALID, index) for index in range(len(actors))]
         looked_at = opened.scene, everything
     placed = [_placed(finding, opened, looked_at[1]) for finding in findings]
     remarks: list[Finding] = []
@@ -296,7 +296,7 @@ def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Findi
     aimed = []
     for remark in opened.findings:
         found: Finding | None = None
-        for part in _SPOILED:
+        for part in _INVALID:
             index = known.get((remark.file or Path(), part))
             if found is None and index is not None:
                 found = aimed_at(remark, scene.actors[index], part)
@@ -329,7 +329,7 @@ def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
     ]
 
 
-_SPOILED = {"mesh": ("positions", "weights", "triangles", "bindings"),
+_INVALID = {"mesh": ("positions", "weights", "triangles", "bindings"),
             "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
 """Parts of a fault for each part of an actor."""
 
@@ -341,7 +341,7 @@ def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
 
 def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
     lost: dict[str, Ints] = {}
-    for part, keys in _SPOILED.items():
+    for part, keys in _INVALID.items():
         for path in _files_of(actor, part, opened.contents):
             for fault in opened.sources[path].diagnostics.errors:
                 if fault.part in keys and fault.places is not None:

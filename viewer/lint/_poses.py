@@ -37,10 +37,10 @@ def some_poses(actor: Actor) -> list[Pose]:
             pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
         ]
     rng = np.random.default_rng(_SEED)
-    turns = figure.skeleton.dof_kinds >= _FIRST_ROTATION
+    is_rotation = figure.skeleton.dof_kinds >= _FIRST_ROTATION
     for _ in range(_COUNT):
         pose = actor.pose.copy()
-        pose.dofs[turns] += rng.uniform(-_SWING, _SWING, int(turns.sum()))
+        pose.dofs[is_rotation] += rng.uniform(-_SWING, _SWING, int(is_rotation.sum()))
         pose.dofs[:] = clamp_dofs(figure.skeleton, pose.dofs)
         poses.append(pose)
     return poses

@@ -100,8 +100,8 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
 
 def _data(found: Diagnostic) -> dict[str, Any]:
     """Return a diagnostic's data besides its code, severity, message and file location."""
-    told = described(found)
-    return {key: told[key] for key in ("key", "part", "places", "n_places", "count", "values")}
+    data = described(found)
+    return {key: data[key] for key in ("key", "part", "places", "n_places", "count", "values")}
 
 
 def _joint_names(finding: Finding, scene: Scene) -> list[str]:

@@ -18,7 +18,7 @@ __all__ = ["Soles", "extent", "soles_of"]
 
 _STRAYS = 0.001  # fraction of vertices at either end that are excluded from the height
 _TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot in steps and on tiptoe
-_WAYS = 8  # directions of a tilt
+_N_SIDES = 8  # number of horizontal directions of tilts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,10 +148,10 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 def _directions(axis: int) -> Floats:
     """Return directions down and tilted from there to all sides: (D, 3)."""
-    turns = np.arange(_WAYS) * 2.0 * np.pi / _WAYS
-    sides = np.zeros((_WAYS, 3))
+    angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
+    sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]
-    sides[:, flat] = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    sides[:, flat] = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     down = -np.eye(3)[axis]
     tilted = [np.cos(tilt) * down + np.sin(tilt) * sides for tilt in _TILTS]
     return np.concatenate([down[None], *tilted])

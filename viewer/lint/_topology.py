@@ -130,9 +130,9 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
         Triangles of components that are not orientable.
     """
     a, b = edges.pairs[:, 0], edges.pairs[:, 1]
-    turned = np.where(edges.agree, 0, count)
+    flip = np.where(edges.agree, 0, count)
     nodes = np.concatenate(
-        [np.stack([a, b + turned], axis=1), np.stack([a + count, b + count - turned], axis=1)]
+        [np.stack([a, b + flip], axis=1), np.stack([a + count, b + count - flip], axis=1)]
     )
     labels = components(2 * count, nodes)
     plain, reverse = labels[:count], labels[count:]

@@ -49,12 +49,12 @@ def check(subject: Subject) -> list[Finding]:
     flat = are_singular(linear)
     conditions = np.zeros(len(linear))
     conditions[~flat] = np.linalg.cond(linear[~flat])
-    mirrors = (determinants < 0.0) & ~flat
+    reflected = (determinants < 0.0) & ~flat
     off = np.abs(skin.inverse_bind[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) * known
     findings = [
         *_about(subject, "B002.singular", flat, determinants),
         *_about(subject, "B003.ill-conditioned", conditions > _NEARLY, conditions),
-        *_about(subject, "B005.reflected", mirrors, determinants),
+        *_about(subject, "B005.reflected", reflected, determinants),
         *_about(subject, "B006.not-affine", off > _AFFINE, off),
     ]
     usable = known & ~flat & (off <= _AFFINE)

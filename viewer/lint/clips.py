@@ -23,7 +23,7 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 __all__ = ["check", "missing_frames"]
 
 _SIZES = 15.0  # figure sizes that a joint may move per second: about 30 m/s for a person
-_ALIKE = 1e-9  # share by which speeds of joints that move together differ
+_ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # radians or lengths beyond a limit
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
 
@@ -162,7 +162,7 @@ def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[
     rates = np.zeros((len(track.times), skeleton.n_joints))
     cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
     rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
-    fast = _too_fast(track, rates, subject.options.max_turn)
+    fast = _too_fast(track, rates, subject.options.max_rotation)
     if fast is None:
         return []
     return [
@@ -172,7 +172,7 @@ def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[
             all=track.n_frames,
             joint=joint_labels(skeleton)[fast.joints[0]],
             rate=math.degrees(fast.rate),
-            limit=math.degrees(subject.options.max_turn),
+            limit=math.degrees(subject.options.max_rotation),
             frame=int(track.numbers[fast.worst]),
             time=float(track.times[fast.worst]),
             part="clip",

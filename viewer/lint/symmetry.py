@@ -108,7 +108,7 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
     """
     whole = normalized(skin)
     vertices, joints = owners(whole), whole.joints
-    # Each influence, and the mirrored influence of the partner with a minus sign.
+    # Each influence, and the reflected influence of the partner with a minus sign.
     return row_norms(
         skin.n_vertices,
         np.concatenate([vertices, symmetry[vertices]]),

@@ -31,14 +31,15 @@ def load(
 ) -> Scene:
     """Open files as one scene; without files, the bundled figure.
 
-    Files are recognised by content. A skeleton takes the first skin with its number of
-    joints, preferably one of the same name. A figure without a partner opens alone; several
-    actors stand side by side. A clip goes to the first actor without one that has its number of
-    channels. A BVH drives the requested model if given, else the first figure whose joints it
-    names; otherwise it is a separate skeleton: in metres beside others, else in its file's unit.
+    Files are recognised by content. A skeleton is combined with the first skin that has its number
+    of joints, preferably one of the same name. A figure without a partner opens alone; several
+    actors are placed side by side. A clip is assigned to the first actor without a clip that has
+    its number of channels. A BVH drives the requested model if given, else the first figure whose
+    joints it names; otherwise it is a separate skeleton, in metres if there are other actors, else
+    in its file's unit.
     Captured bodies are drawn with the first body model among the files, or the bundled body. All
-    actors are posed at the start of their motions. A pose goes to the first actor that it
-    fits, a picture to the first with texture coordinates but no texture.
+    actors are posed at the start of their motions. A pose is applied to the first actor that it
+    fits, a picture to the first one with texture coordinates but no texture.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -150,8 +151,8 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
         else:
             if problem is None:
                 raise RigError(Diagnostic("F004.morph-alone", path))
-            values = {"problem": str(problem)}
-            raise RigError(Diagnostic("F004.morph", path, values=values))
+            found = problem.diagnostic
+            raise problem if found is None else RigError(replace(found, path=path))
 
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
@@ -214,7 +215,7 @@ def _place_side_by_side(cast: Cast) -> None:
     placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
     if len(cast.actors) < 2 or not loose:
         return
-    # A stray vertex far outside must not displace the next actor.
+    # Bounds of the drawn scene exclude stray vertices, which would displace the next actor.
     spans = [scene_box(Scene([actor]))[:, 0] for actor in loose]
     if placed:
         before = scene_box(Scene(placed))[:, 0]

@@ -208,7 +208,7 @@ class Builder:
 
     def refusal(self, problem: RigError) -> RigError:
         """Return an error extended by the model that would fit."""
-        values = {"problem": str(problem), "member": self.capture.model}
+        values = {"problem": problem.cause, "member": self.capture.model}
         key = "F004.capture-of-member" if self.capture.model else "F004.capture"
         return RigError(Diagnostic(key, self.path, values=values))
 

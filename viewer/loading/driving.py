@@ -1,4 +1,4 @@
-"""Assignment of motions to actors: clips by channels, captured bodies a model, BVH by joints."""
+"""Assignment of motions to actors: clips by channels, BVH by joints, captures with a model."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def _give_body_motion(
     try:
         clip, notes = body_clip(motion, model)
     except RigError as problem:
-        values = {"problem": str(problem)}
+        values = {"problem": problem.cause}
         raise RigError(Diagnostic("F004.model", path, values=values)) from None
     cast.diagnostics += [replace(note, path=path) for note in notes]
     actor = Actor(model, clip=clip, called=cast.free_title(motion.name))

@@ -82,7 +82,7 @@ def give_skeleton_motion(
         try:
             clip, notes = retarget(motion, model)
         except RigError as problem:
-            values = {"problem": str(problem)}
+            values = {"problem": problem.cause}
             raise RigError(Diagnostic("F004.model", path, values=values)) from None
         cast.diagnostics += [replace(note, path=path) for note in notes]
         called = cast.free_title(motion.figure.name)
@@ -122,14 +122,14 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 
 def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
     """Assign a motion to the first figure with a mesh and no clip that it fits, if any."""
-    refusal = ""
+    refusal: str | Diagnostic = ""
     for actor in cast.actors:
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:
             actor.clip, notes = retarget(motion, actor.figure)
         except RigError as problem:
-            refusal = refusal or str(problem)
+            refusal = refusal or problem.cause
             continue
         actor.placement = placement @ actor.placement
         cast.diagnostics += [replace(note, path=path) for note in notes]
@@ -140,7 +140,7 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: 
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale skeletons to metres that stand beside others of another unit; record the guesses.
+    """Scale separate skeletons to metres if other actors have another unit; record the guesses.
 
     A lone skeleton, or one among others in its own unit, keeps the numbers of its file.
 

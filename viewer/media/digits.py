@@ -1,4 +1,4 @@
-"""Whole numbers drawn into pictures without a font: digits of 5 x 7 dots."""
+"""Rendering of integers into pictures without a font, with digits of 5 x 7 dots."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PAPER_OPACITY = 0.55  # opacity of the dark background behind a number
 
 
 def digits(number: int) -> Bools:
-    """Return the dots of a whole number of 0 or more: (7, 6 n - 1), True is ink.
+    """Return the dots of a non-negative integer: (7, 6 n - 1), True for ink.
 
     >>> digits(17).shape
     (7, 11)

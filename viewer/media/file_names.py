@@ -1,4 +1,4 @@
-"""Names derived from the files and folders that were opened."""
+"""Names derived from the paths of opened files and folders."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 
 __all__ = ["file_stem", "folder_name", "opened_text"]
 
-_LONGEST = 100  # letters of a stem
+_LONGEST = 100  # characters of a stem
 _INSIDE = ("smpl_full", "smplfull", "smpl", "keypoints3d", "core_txt_files")
 """Folders with the same name in every EasyMocap recording or copy of the PIG model."""
 
 
 def folder_name(path: Path) -> str:
-    """Return a name for a folder's content: that of the nearest folder which the user named.
+    """Return a name for a folder's content: the nearest folder with a name chosen by the user.
 
     >>> folder_name(Path("/takes/dance.v2/smpl")), folder_name(Path("/models/hog"))
     ('dance.v2', 'hog')

@@ -1,8 +1,8 @@
 """The 256-colour palette of a GIF: chosen from a few frames, used for all with ordered dither.
 
-With one palette for the whole video, static regions stay identical from frame to frame and are not
-stored again: the file has a fifth of the size that it has with a palette for each frame. The dither
-is ordered (a fixed pattern) for the same reason.
+With one palette for the whole video, static regions are identical from frame to frame and are not
+stored again, which makes the file five times smaller than with a palette per frame. The dither is
+ordered (a fixed pattern) for the same reason.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class PaletteChooser:
     def palette(self) -> VideoFrame:
         """Return the palette; called once, after at least one frame."""
         self._graph.push(None)
-        palette: VideoFrame = self._graph.pull()  # type: ignore[assignment]  # no sound in here
+        palette: VideoFrame = self._graph.pull()  # type: ignore[assignment]  # a video frame: the graph has no audio
         return palette
 
 
@@ -70,7 +70,7 @@ class PaletteUser:
     time_base : Fraction
         Duration of a frame in seconds.
     palette : VideoFrame
-        Of a ``PaletteChooser``.
+        Result of a ``PaletteChooser``.
     """
 
     def __init__(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["decode_picture", "encode_png", "is_picture", "save_image"]
 
 _MAX_PIXELS = 16384 * 16384
-_REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # what Pillow raises
+_REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # raised by Pillow
 _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
 
@@ -116,7 +116,7 @@ def _encoded(path: Path, pixels: Bytes) -> bytes:
         picture = picture.convert("RGB")
     try:
         picture.save(stream, kind)
-    except (KeyError, ValueError, OSError):  # what Pillow raises
+    except (KeyError, ValueError, OSError):  # raised by Pillow
         name = printable(path, 300)
         raise OutputError(f"{name}: pictures cannot be written as this") from None
     return stream.getvalue()

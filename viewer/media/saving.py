@@ -37,7 +37,7 @@ __all__ = [
 
 
 def as_words(name: str) -> list[bytes] | None:
-    """Return the words that are read back as ``name``, or None if there are none.
+    """Return the words of a name, or None if joining them would not give the same name.
 
     >>> as_words("left leg"), as_words(" leg")
     ([b'left', b'leg'], None)

@@ -49,8 +49,8 @@ class VideoSink:
         Width and height of the frames. If they must be even and are not, the last column or row is
         repeated.
     rate : float
-        Frames a second. A GIF counts time in 1/100 s, so its delays are rounded in turn and their
-        mean is right.
+        Frames per second. A GIF counts time in 1/100 s; the delays are rounded so that their mean
+        is exact.
     quality : float
         0 to 100; GIFs have one quality.
     transparent : bool
@@ -119,7 +119,7 @@ class VideoSink:
             low = int(100 / rate)
             self.notes.append(
                 f"{name}: GIFs count time in 1/100 s; frames last {low} or {low + 1} of them, "
-                f"{rate:g} frames a second on average"
+                f"{rate:g} frames per second on average"
             )
 
     def look(self, pixels: Bytes) -> None:
@@ -236,8 +236,8 @@ class VideoSink:
         rgba[:height, width:] = pixels[:, -1:]
         rgba[height:] = rgba[height - 1]
         if self._may_blend and (pixels[..., 3] < 255).any():
-            shares = rgba[..., 3:].astype(np.uint16)
-            rgba[..., :3] = (rgba[..., :3] * shares + 127) // 255
+            alpha = rgba[..., 3:].astype(np.uint16)
+            rgba[..., :3] = (rgba[..., :3] * alpha + 127) // 255
             rgba[..., 3] = 255
         return picture
 
@@ -289,7 +289,7 @@ def _check_numbers(path: Path, rate: float, quality: float) -> None:
     most = MOST_GIF_RATE if path.suffix.lower() == ".gif" else 1000.0
     if not 0.01 <= rate <= most:
         raise ViewerError(
-            f"{printable(path, 300)}: expected 0.01 to {most:g} frames a second, found {rate:g}"
+            f"{printable(path, 300)}: expected 0.01 to {most:g} frames per second, found {rate:g}"
         )
 
 
@@ -308,5 +308,5 @@ def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
 
 
 def _bit_rate(size: tuple[int, int], rate: float, quality: float) -> int:
-    """Return bits a second for encoders without a quality setting: 0.02 to 0.6 bits a pixel."""
+    """Return bits per second for encoders without a quality setting: 0.02 to 0.6 per pixel."""
     return int(size[0] * size[1] * rate * 0.02 * 30.0 ** (quality / 100.0))

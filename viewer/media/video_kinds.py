@@ -10,7 +10,7 @@ from viewer.errors import UnsupportedFormatError
 __all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoKind", "video_kind"]
 
 MOST_GIF_RATE = 50.0
-"""Frames a second: viewers show delays below 2/100 s as 10/100 s."""
+"""Frames per second; browsers play delays below 2/100 s as 10/100 s."""
 
 
 @dataclass(frozen=True, slots=True)

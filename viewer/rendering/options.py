@@ -10,6 +10,7 @@ __all__ = [
     "BACKGROUNDS",
     "BONES",
     "OPACITIES",
+    "QUALITIES",
     "SHOWN",
     "Color",
     "DisplayOptions",
@@ -43,6 +44,14 @@ BACKGROUNDS = ("gradient", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
 
 
+QUALITIES = {
+    "draft": "Draft, no shadows",
+    "normal": "Normal, shadows",
+    "final": "Final, soft shadows and occlusion",
+}
+"""Qualities of a picture, with labels for menus."""
+
+
 @dataclass(slots=True)
 class Light:
     """A directional light.
@@ -74,15 +83,19 @@ class Lights:
         Warm light from the front; cool light from behind on the opposite side.
     ambient : float
         Strength of the ambient light.
+    sky, ground : (r, g, b)
+        Colours of the ambient light on surfaces that face up and down, linear.
     specular, shininess : float
         Strength and exponent of the Blinn-Phong highlight.
     follow_camera : bool
         Whether the directions rotate with the camera.
     """
 
-    key: Light = field(default_factory=lambda: Light(-38.0, 38.0, (1.0, 0.80, 0.56), 1.0))
-    rim: Light = field(default_factory=lambda: Light(106.0, 14.0, (0.22, 0.46, 1.0), 1.6))
-    ambient: float = 0.16
+    key: Light = field(default_factory=lambda: Light(-42.0, 40.0, (1.0, 0.86, 0.68), 1.05))
+    rim: Light = field(default_factory=lambda: Light(114.0, 16.0, (0.30, 0.54, 1.0), 1.15))
+    ambient: float = 0.26
+    sky: Color = (0.76, 0.88, 1.0)
+    ground: Color = (0.44, 0.36, 0.31)
     specular: float = 0.18
     shininess: float = 32.0
     follow_camera: bool = True
@@ -112,6 +125,13 @@ class DisplayOptions:
         Opacity of the skeleton over the skin; None for ``OPACITIES`` by style.
     samples : int
         Samples per pixel, limited by the driver's maximum.
+    quality : str
+        A key of ``QUALITIES``: draft is fastest; normal draws shadows; final averages ``passes``
+        pictures, for soft shadows, ambient occlusion and smooth edges.
+    shadows : bool
+        Draw shadows, unless the quality is draft.
+    passes : int
+        Pictures that are averaged in final quality.
     lights : Lights
         The two lights.
     skinning : Skinning
@@ -160,6 +180,9 @@ class DisplayOptions:
     bones: str = "auto"
     skeleton_opacity: float | None = None
     samples: int = 4
+    quality: str = "draft"
+    shadows: bool = True
+    passes: int = 8
     lights: Lights = field(default_factory=Lights)
     skinning: Skinning = field(default_factory=Skinning)
     scalar: str = "weight"
@@ -176,3 +199,8 @@ class DisplayOptions:
     joint_names: bool = False
     joint_axes: bool = False
     outline: bool = False
+
+    @property
+    def has_shadows(self) -> bool:
+        """Whether shadows are drawn."""
+        return self.shadows and self.quality != "draft"

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
+from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
@@ -20,6 +23,7 @@ from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.see_through import draw_layer
 from viewer.rendering.passes.skin_pass import PosedMesh
+from viewer.rendering.sampling import jittered, n_passes, sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.shown import (
     Meshes,
@@ -42,7 +46,6 @@ if TYPE_CHECKING:
     from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.overlay.marks import Marks
     from viewer.rendering.passes.ghost_pass import Ghost
-    from viewer.rendering.passes.outline_pass import Outlined
     from viewer.rendering.picking import Pick
 
 __all__ = ["Renderer"]
@@ -93,6 +96,7 @@ class Renderer:
         self.ghost: Ghost | None = None
         self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
+        self.lighting = Lighting(context, self.programs)
         self.late = LatePasses(
             context, self.programs, self.mesh_pass, self.joint_pass, self.buffers
         )
@@ -115,6 +119,8 @@ class Renderer:
         target: Target,
         box: Floats,
         selected: tuple[int, int] = (0, -1),
+        passes: range | None = None,
+        strength: float = 1.0,
     ) -> None:
         """Draw a scene.
 
@@ -134,13 +140,50 @@ class Renderer:
         selected : (int, int)
             Index of an actor and of its highlighted joint, which also is the joint of a scalar
             quantity that needs one and does not name it; -1 for none.
+        passes : range, optional
+            Which passes of final quality to draw now, from 0 in order; all if omitted. The target
+            shows the average of those drawn so far.
+        strength : float
+            0 to 1: how much of shadows and occlusion counts.
         """
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
         view = view_of(camera, target.size, box)
-        has_meshes = self._draw_meshes(scene, view, options, target, selected)
-        update_skeletons(self.buffers, scene.actors, options)
+        meshes = self._update(scene, view, options, selected)
+        casters = Casters(
+            self.programs, self.mesh_pass, self.late, self.buffers, meshes, scene.actors, options
+        )
+        self.lighting.begin(casters, camera.up, box)
+        count = n_passes(options)
+        for index in range(count) if passes is None else passes:
+            one = sample(index, count)
+            shifted = jittered(view, one.shift, target.size)
+            lit = self.lighting.light(casters, shifted, one, strength)
+            self._prepare(target)
+            self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
+            if count > 1:
+                self._accumulate(target, index == 0)
+        self._draw_marks(scene, view, options, target.size, selected)
+        if self.outlines or options.outline:
+            outlined = self.outlines or [Outlined(*selected)]
+            self.late.outline_pass.draw(outlined, scene, view, options, target)
+        if options.legend and options.shading == "scalar" and meshes:
+            self._draw_legend(target.size)
+
+    def _draw_layers(
+        self,
+        scene: Scene,
+        meshes: Meshes,
+        view: View,
+        options: DisplayOptions,
+        target: Target,
+        box: Floats,
+        selected: tuple[int, int],
+        strength: float,
+    ) -> None:
+        """Draw everything that is part of the scene, from the background on."""
+        self._draw_meshes(meshes, view, options)
         skeletons = [
             (actor, selected[1] if index == selected[0] else -1)
             for index, actor in enumerate(scene.actors)
@@ -149,12 +192,13 @@ class Renderer:
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
                 self._draw_skeleton(actor, view, options, joint, 1.0)
+        if options.has_shadows:
+            self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
-            points.update(actor, actor.placement, view, options.min_confidence)
-            self.late.point_pass.draw(points, actor.placement, view, options, has_meshes)
+            self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self._draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
@@ -163,10 +207,15 @@ class Renderer:
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
-        self._draw_marks(scene, view, options, target.size, selected)
-        self._draw_outlines(scene, view, options, target, selected)
-        if options.legend and options.shading == "scalar" and has_meshes:
-            self._draw_legend(target.size)
+
+    def _accumulate(self, target: Target, is_first: bool) -> None:
+        """Add the pass that a target shows, and show the average of all so far."""
+        summed = self.late.accumulation(target.size)
+        if is_first:
+            summed.clear()
+        summed.add(target)
+        summed.show(target)
+        self._set_state(target)
 
     def pick(
         self,
@@ -211,27 +260,28 @@ class Renderer:
             if actor.figure.skeleton is not None:
                 self.buffers.skeleton(actor)
 
-    def _draw_meshes(
-        self,
-        scene: Scene,
-        view: View,
-        options: DisplayOptions,
-        target: Target,
-        selected: tuple[int, int],
-    ) -> bool:
-        """Skin changed meshes, clear the picture, and draw background and surfaces."""
+    def _update(
+        self, scene: Scene, view: View, options: DisplayOptions, selected: tuple[int, int]
+    ) -> Meshes:
+        """Skin changed meshes, and upload what else changed."""
         meshes = update_meshes(self.buffers, scene.actors, options)
         if options.shading == "scalar" and meshes.singles:
             index, joint = selected
             whose = scene.actors[index] if 0 <= index < len(scene.actors) else None
             figures = [actor.figure for actor in scene.actors if actor.figure.mesh is not None]
             self.scalars.update(meshes.singles, options, (whose, joint), figures)
-        self._prepare(target)
+        update_skeletons(self.buffers, scene.actors, options)
+        for actor in filter(has_points, scene.actors):
+            points = self.buffers.points_of(actor)
+            points.update(actor, actor.placement, view, options.min_confidence)
+        return meshes
+
+    def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        """Draw background and surfaces."""
         self.ground_pass.draw_background(options.background)
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
         for actor, mesh in meshes.singles:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
-        return bool(meshes)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         if options.cull:
@@ -243,9 +293,15 @@ class Renderer:
         self.context.disable(moderngl.CULL_FACE)
 
     def _prepare(self, target: Target) -> None:
+        """Bind and clear a target."""
+        self._set_state(target)
+        target.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+
+    def _set_state(self, target: Target) -> None:
+        """Bind a target with the state that all passes expect."""
+        target.framebuffer.use()
         context = self.context
         context.viewport = (0, 0, *target.size)
-        target.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         context.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         context.depth_func = "<"
@@ -299,22 +355,6 @@ class Renderer:
             left_out = self.late.annotation_pass.write([*drawn, *over], view, size)
             self.names_left_out = left_out[0] if drawn else (0, 0)
 
-    def _draw_outlines(
-        self,
-        scene: Scene,
-        view: View,
-        options: DisplayOptions,
-        target: Target,
-        selected: tuple[int, int],
-    ) -> None:
-        outlined = self.outlines
-        if options.outline and not outlined:
-            from viewer.rendering.passes.outline_pass import Outlined
-
-            outlined = [Outlined(*selected)]
-        if outlined:
-            self.late.outline_pass.draw(outlined, scene, view, options, target)
-
     def _marked(self) -> list[Annotation]:
         """Return the marks as annotations."""
         if self.marks is None:
@@ -351,5 +391,6 @@ class Renderer:
     def release(self) -> None:
         """Free everything."""
         self.buffers.keep_only([])
-        for item in (self.mesh_pass, self.joint_pass, self.ground_pass, self.late, self.programs):
+        passes = self.mesh_pass, self.joint_pass, self.ground_pass, self.late, self.lighting
+        for item in (*passes, self.programs):
             item.release()

@@ -9,22 +9,27 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.camera import Camera, camera_axes
+from viewer.rendering.effects import NO_EFFECTS, Effects
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.options import Light, Lights
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
 
-__all__ = ["View", "in_front", "set_lights", "set_model", "view_of"]
+__all__ = ["View", "in_front", "key_direction", "set_lights", "set_model", "view_of"]
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A camera's matrices for one picture, (4, 4) for column vectors, and the camera itself."""
+    """A camera's matrices for one picture, (4, 4) for column vectors, and the camera itself.
+
+    Effects change the light on what is drawn with this view.
+    """
 
     matrix: Floats
     projection: Floats
     camera: Camera
+    effects: Effects = NO_EFFECTS
 
 
 def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
@@ -55,18 +60,26 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 
 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
-    """Set the uniforms of ``shade/phong.glsl`` that the program uses."""
+    """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program uses."""
     pair = (lights.key, lights.rim)
     directions = [_direction(light, lights.follow_camera, view) for light in pair]
     colors = [[light.strength * channel for channel in light.color] for light in pair]
     values = {
         "u_light_directions": np.array(directions, dtype="f4").tobytes(),
         "u_light_colors": np.array(colors, dtype="f4").tobytes(),
-        "u_ambient": lights.ambient,
+        "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)]),
+        "u_sky": tuple(lights.ambient * channel for channel in lights.sky),
+        "u_ground": tuple(lights.ambient * channel for channel in lights.ground),
         "u_specular": lights.specular,
         "u_shininess": max(lights.shininess, 1.0),
     }
     set_uniforms(program, values)
+    view.effects.bind(program, view.matrix)
+
+
+def key_direction(view: View, lights: Lights) -> Floats:
+    """Return the unit vector towards the key light in scene space: (3,)."""
+    return _direction(lights.key, lights.follow_camera, view) @ view.matrix[:3, :3]
 
 
 def _direction(light: Light, follows: bool, view: View) -> Floats:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes
@@ -79,11 +81,11 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
         return figure
     mesh, shapes = figure.mesh, figure.blend_shapes
     if mesh is None:
-        raise RigError(f"morph {targets[0].name}: {figure.name} has no mesh to change")
+        raise _refusal("F004.morph-mesh", targets[0], figure)
     if shapes is not None and shapes.normal_offsets is None:
-        raise RigError(f"morph {targets[0].name}: {figure.name} has shapes of its own")
+        raise _refusal("F004.morph-shapes", targets[0], figure)
     for target in targets:
-        _check_vertices(target, figure.name, mesh.n_vertices)
+        _check_vertices(target, figure, mesh.n_vertices)
     count = len(targets)
     offsets = np.zeros((2, count, mesh.n_vertices, 3))
     for row, target in enumerate(targets):
@@ -133,11 +135,14 @@ def on_one_joint(figure: Figure) -> Figure:
     return replace(figure, skeleton=skeleton, skin=skin)
 
 
-def _check_vertices(target: MorphTarget, figure_name: str, count: int) -> None:
+def _check_vertices(target: MorphTarget, figure: Figure, count: int) -> None:
     """Raise RigError if a target refers to a vertex that the mesh does not have."""
     wrong = np.flatnonzero((target.vertices < 0) | (target.vertices >= count))
     if len(wrong):
-        raise RigError(
-            f"morph {target.name}: vertex index {target.vertices[wrong[0]]} is outside "
-            f"{figure_name}, which has {count} vertices"
-        )
+        found = int(target.vertices[wrong[0]])
+        raise _refusal("F004.morph-vertex", target, figure, found=found, n=count)
+
+
+def _refusal(key: str, target: MorphTarget, figure: Figure, **values: Any) -> RigError:
+    """Return the error that a target does not match a figure."""
+    return RigError(Diagnostic(key, values={"morph": target.name, "figure": figure.name, **values}))

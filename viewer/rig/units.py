@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["METRES", "SIZES", "WORDS", "is_metres", "unit_of_scaled"]
+__all__ = ["METRES", "SIZES", "UNIT_NAMES", "is_metres", "unit_of_scaled"]
 
 _ALIKE = 2.5  # largest plausible ratio of the sizes of two similar figures: a giant and a child
 
@@ -13,7 +13,7 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 177.8
 """
 
-WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
+UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
 """Names of the units in messages."""
 
 SIZES = {"m": (0.3, 3.5), "cm": (50.0, 350.0), "mm": (500.0, 3500.0)}

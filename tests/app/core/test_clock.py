@@ -206,7 +206,7 @@ def test_actors_are_posed_once_until_time_clips_or_gaps_change():
     playback.seek(1.0)
     assert playback.posed_for.time == 0.0  # edits still belong to the poses of before
     assert playback.pose() and playback.posed_for.time == 1.0 and not playback.pose()
-    playback.fill_gaps = True
+    playback.interpolate_gaps = True
     assert playback.pose() and not playback.pose()
     scene.actors[0].offset = 0.5
     assert playback.pose() and playback.whole == (0.5, 2.5)

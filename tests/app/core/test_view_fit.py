@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from app import box_body
 from app.captured import people, walk
-from app.curves.test_curves_panel import clip_text
+from app.curves.plotted import clip_text
 from app.hand_made_figures import bar, sided_skel
 from app.playback import test_timeline
 from app.playback.test_timeline import capture, finish

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 from app.captured import dots, people
-from app.curves import test_curves_panel
-from app.curves.test_curves_panel import ARM_X, SIZE, _at, _center, clip_text
+from app.curves.plotted import ARM_X, SIZE, _at, _center, clip_text
 from numpy.testing import assert_allclose
 
 import viewer
@@ -30,9 +29,6 @@ from viewer.rig.motion.follow import followed_point
 from viewer.rig.scene import Actor, Scene
 
 KEY = (ARM_X, 1)  # at 1 s: 0.6
-
-
-curves = test_curves_panel.curves  # the fixture
 
 
 def go(hand, time):

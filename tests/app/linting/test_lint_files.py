@@ -114,7 +114,7 @@ def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, t
     texts.clear()
     hand.move(row)
     hand.step(60)
-    words = "it is in the file, not in the figure shown: click to copy its path and line"
+    words = "this finding is about the file, not the figure shown: click to copy its path and line"
     assert words in texts and f"{files[1]}:3" in texts
     target = hand.state.camera.target.copy()
     hand.click(row)
@@ -158,7 +158,7 @@ def test_a_gap_leads_to_the_frame_before_it(lint):
     # Its root is marked, and all of it is seen.
     assert view.marks.points.tolist() == [[7.0, 0.0, 0.0]]
     assert hand.state.camera.target == pytest.approx([7.0, 2.0, 0.0])
-    assert hand.says("The last frame before the gap: the person is absent in the next one")
+    assert hand.says("Last frame before the gap: the person is absent in the next frame")
 
 
 def test_a_gap_of_captured_points_marks_their_middle(lint):

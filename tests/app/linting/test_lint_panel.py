@@ -7,25 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from app.linting.checked_scenes import LIGHT, PINK, SIZE, codes, finish, jump, marked, row_of
 from imgui_bundle import imgui
-from lint.sound import FRAMES, RATE, column, keypoints, scene_of, standing
-from lint.test_planted_faults import weighted
+from lint.planted import weighted
+from lint.sound import RATE, column, keypoints, scene_of
 
-from viewer.app.linting.actions import check_rig, start_check
 from viewer.app.linting.marks import marks_of
 from viewer.app.linting.state import Linting
 from viewer.app.shown_panels import ShownPanels
 from viewer.lint import CODES, Places, describe, lint_scene
 from viewer.rendering.camera import camera_axes
-from viewer.rendering.overlay.marks import MARK_COLOR
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
-
-PINK = np.array([round(255 * channel) for channel in MARK_COLOR])
-SIZE = (1000, 700)
-# Vertex 5, at (-1, 1, 1), is bound to the foot at the origin, and joint 1 is the knee at y = 2:
-# a weight of 0.9 takes it to (-0.9, 0.9, 0.9).
-LIGHT = weighted({5: [(0, 0.9)]})
 
 
 def several() -> Figure:
@@ -40,42 +33,6 @@ def several() -> Figure:
     matrices = figure.skin.inverse_bind.copy()
     matrices[1, 3] = 0.0, 0.0, 0.5, 1.0
     return replace(figure, skin=replace(figure.skin, inverse_bind=matrices))
-
-
-@pytest.fixture
-def lint(drive):
-    """Open an app that shows a figure or scene, its Lint panel open and the check done."""
-
-    def open_panel(shown, **settings):
-        scene = shown if isinstance(shown, Scene) else scene_of(shown)
-        hand = drive(scene=scene, size=SIZE, samples=1, **settings)
-        hand.menu("menu Edit", "Check the rig")
-        finish(hand)
-        return hand
-
-    return open_panel
-
-
-def finish(hand):
-    """Run frames until the check has ended and is shown."""
-    running = hand.state.of(Linting).running
-    if running is not None:
-        running.job.wait()
-    hand.step(3)
-
-
-def codes(hand):
-    return [finding.code for finding in hand.state.of(Linting).checked.findings]
-
-
-def row_of(hand, code):
-    return f"finding {codes(hand).index(code)}"
-
-
-def marked(hand):
-    """Return how many pixels of the view have the colour of marks."""
-    pixels = hand.scene_picture()[..., :3].astype(int)
-    return int((np.abs(pixels - PINK).max(axis=-1) <= 6).sum())
 
 
 def test_menu_entry_opens_the_panel_and_checks(lint):
@@ -224,15 +181,6 @@ def test_finding_of_another_actor_chooses_it(lint):
     assert hand.state.camera.target == pytest.approx([9.1, 0.9, 0.9])
 
 
-def jump() -> Scene:
-    """Return a column that is 40 m away for one frame, file frame 130."""
-    figure = column()
-    clip = standing(figure)
-    places = np.zeros((FRAMES, figure.skeleton.n_joints, 3))
-    places[30, 0, 0] = 40.0
-    return scene_of(figure, replace(clip, translations=places))
-
-
 def test_finding_of_a_clip_goes_to_its_time(lint):
     hand = lint(jump())
     hand.state.clock.playing = True
@@ -270,54 +218,12 @@ def test_camera_turns_to_the_side_that_faces_it(lint):
     assert camera.azimuth == before + 40.0
 
 
-def stale(hand, texts):
-    texts.clear()
-    hand.step(2)
-    return any(text.startswith("The figure, pose or limits have changed") for text in texts)
-
-
-def test_findings_are_stale_while_the_pose_is_another(lint, texts):
-    hand = lint(LIGHT)
-    assert not stale(hand, texts)
-    hand.state.actor.pose.dofs[4] = 0.3
-    hand.step()
-    assert stale(hand, texts)
-    hand.key("z", "ctrl")
-    assert not stale(hand, texts)
-
-
-def test_time_makes_nothing_stale_but_posing_does(lint, texts):
-    hand = lint(jump())
-    hand.state.clock.playing = True
-    hand.step(20)
-    hand.state.clock.playing = False
-    assert not stale(hand, texts)
-    hand.click(row_of(hand, "C003"))
-    assert not stale(hand, texts)
-    hand.state.actor.pose.dofs[4] = 0.3
-    assert stale(hand, texts)
-    hand.click("Recheck")
-    finish(hand)
-    assert not stale(hand, texts)
-
-
-def test_recheck_sees_the_pose_and_other_limits(lint, texts):
-    hand = lint(column())
-    assert codes(hand) == []
-    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_turn=1.0)
-    assert stale(hand, texts)
-    hand.state.actor.pose.dofs[4] = 3.5  # its limits are -3 and 3
-    hand.click("Recheck")
-    finish(hand)
-    assert codes(hand) == ["S004"] and not stale(hand, texts)
-
-
 def test_limits_are_set_in_their_window(lint):
     hand = lint(column())
     hand.click("Limits…")
     hand.step(2)
     hand.enter_value("Largest rotation", "180")
-    assert hand.state.of(Linting).options.max_turn == pytest.approx(np.pi)
+    assert hand.state.of(Linting).options.max_rotation == pytest.approx(np.pi)
     hand.enter_value("Low confidence", "0.5")
     assert hand.state.of(Linting).options.confidence == pytest.approx(0.5)
     hand.enter_value("Largest speed", "2.5")
@@ -326,7 +232,7 @@ def test_limits_are_set_in_their_window(lint):
     assert hand.state.of(Linting).options.max_speed is None
     for text in ("nan", "-5", "1e39"):
         hand.enter_value("Largest rotation", text)
-        assert 0.0 <= hand.state.of(Linting).options.max_turn < np.inf
+        assert 0.0 <= hand.state.of(Linting).options.max_rotation < np.inf
     hand.click("Default limits")
     assert hand.state.of(Linting).options == type(hand.state.of(Linting).options)()
 
@@ -347,97 +253,6 @@ def test_all_are_copied_as_text_and_json(lint, monkeypatch):
     scene = scene_of(LIGHT)
     assert json.loads(copied[-1]) == describe(lint_scene(scene), scene)
     assert hand.says("1 finding copied as JSON")
-
-
-def test_another_scene_has_not_been_checked(lint, rig, texts):
-    hand = lint(LIGHT)
-    hand.click(row_of(hand, "W001"))
-    hand.open(*rig)
-    texts.clear()
-    hand.step(2)
-    assert hand.state.of(Linting).checked is None and hand.state.of(Linting).marks is None
-    assert "This scene has not been checked yet." in texts
-    assert not marked(hand)
-    hand.click("Check")
-    finish(hand)
-    assert hand.state.of(Linting).checked.source is hand.state.scene
-
-
-def test_marks_go_with_the_figure_they_are_on(lint, texts):
-    hand = lint(LIGHT)
-    hand.click(row_of(hand, "W001"))
-    hand.state.scene.actors[0] = Actor(column())
-    assert stale(hand, texts)
-    assert hand.state.of(Linting).marks is None and not marked(hand)
-
-
-def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
-    hand = drive(scene=scene_of(column()), size=SIZE, samples=1)
-    started, seen, is_held = hold_checks(monkeypatch)
-    check_rig(hand.state)
-    assert is_held.wait(30)
-    hand.step(2)
-    assert hand.state.job is not None and hand.state.job.progress == (3, 8)
-    hand.state.actor.pose.dofs[4] = 3.5
-    hand.step()
-    started.set()
-    finish(hand)
-    assert seen and hand.state.of(Linting).checked.findings == ()
-    assert hand.state.of(Linting).checked.scene.actors[0].pose.dofs[4] == 0.0
-
-
-def hold_checks(monkeypatch):
-    """Let checks wait after their third step for an event; return it, what came after, and when."""
-    import threading
-
-    go, seen, is_held = threading.Event(), [], threading.Event()
-
-    def held(scene, options, report):
-        report(3, 8, "column: mesh")
-        is_held.set()
-        go.wait(30)
-        report(4, 8, "column: symmetry")
-        seen.append(scene)
-        return lint_scene(scene, options)
-
-    monkeypatch.setattr("viewer.lint._again.lint_scene", held)
-    return go, seen, is_held
-
-
-@pytest.mark.parametrize("how", ["Cancel check", "escape"])
-def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
-    hand = drive(scene=scene_of(LIGHT), size=SIZE, samples=1)
-    go, seen, is_held = hold_checks(monkeypatch)
-    check_rig(hand.state)
-    assert is_held.wait(30)
-    hand.step(3)
-    running = hand.state.of(Linting).running
-    if how == "escape":
-        hand.key("escape")
-    else:
-        hand.click(how)
-    hand.step(3)
-    assert hand.state.job is None and hand.state.of(Linting).running is None
-    go.set()
-    running.job.wait()
-    hand.step(2)
-    assert not seen and hand.state.of(Linting).checked is None
-    assert hand.says("Cancelled")
-
-
-def test_check_waits_for_other_work(lint, monkeypatch):
-    hand = lint(LIGHT)
-    go, _, is_held = hold_checks(monkeypatch)
-    first = hand.state.of(Linting).checked
-    start_check(hand.state)
-    assert is_held.wait(30)
-    hand.step(2)
-    job = hand.state.job
-    hand.click("Recheck")  # greyed out
-    assert hand.state.job is job
-    go.set()
-    finish(hand)
-    assert hand.state.of(Linting).checked is not first
 
 
 def test_too_many_marks_are_cut_and_said():

@@ -21,7 +21,7 @@ def test_the_menu_shows_a_page_and_the_list_another(drive, rig, texts) -> None:
     texts.clear()
     hand.click("page keys")
     hand.step(2)
-    assert shown(hand) == "keys" and "reset every DOF to the file's pose" in texts
+    assert shown(hand) == "keys" and "reset the pose to that of the file" in texts
 
 
 @pytest.mark.parametrize("size", [(900, 640), (300, 200)])

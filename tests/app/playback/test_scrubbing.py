@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from app.captured import people
-from app.curves.test_curves_panel import SIZE, _at, _center, clip_text
+from app.curves.plotted import SIZE, _at, _center, clip_text
 
 from viewer.app.core.clock import Clock
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from driver import Driver
 from family_models import family_figure
 from numpy.testing import assert_allclose
 
@@ -14,13 +13,12 @@ from viewer.rig.scene import Actor, Scene
 
 
 @pytest.fixture
-def hand(tmp_path):
+def hand(drive, tmp_path):
     scene = Scene([Actor(family_figure("smplx", tmp_path))])
-    driver = Driver(scene=scene, size=(1280, 800))
+    driver = drive(scene=scene, size=(1280, 800))
     driver.state.of(ShownPanels).closed |= {"joints", "shape"}
     driver.step(3)
-    yield driver
-    driver.close()
+    return driver
 
 
 def vectors(driver, which):
@@ -59,8 +57,7 @@ def test_number_of_components_is_the_number_of_sliders(hand):
     assert "left component 11" in hand.state.item_rects
 
 
-def test_figures_without_hands_have_no_such_panel():
-    driver = Driver(size=(900, 640))
+def test_figures_without_hands_have_no_such_panel(drive):
+    driver = drive(size=(900, 640))
     assert not any("component" in label for label in driver.state.item_rects)
     assert np.size(driver.state.actor.figure.hands) == 0
-    driver.close()

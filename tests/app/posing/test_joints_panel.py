@@ -226,7 +226,7 @@ def test_figure_without_skeleton_says_so(drive, rig):
     assert hand.state.actor.pose is None
 
 
-@pytest.mark.parametrize("text", [chain(5000), comb(5000), comb(100_000)], ids=len)
+@pytest.mark.parametrize("text", [chain(5000), comb(5000), comb(40_000)], ids=len)
 def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
     path = tmp_path / "many.skel"
     path.write_text(text)
@@ -236,7 +236,7 @@ def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
     assert len(hand.state.item_rects) < 150  # rows out of sight are not drawn
     started = time.process_time()
     hand.step(5)
-    assert (time.process_time() - started) / 5 < 0.25
+    assert (time.process_time() - started) / 5 < 0.1
     label = next(label for label in hand.state.item_rects if label.endswith(".y"))
     index = hand.dof_index(label)
     hand.click(hand.place(label, 0.9))

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from app.curves import test_curves_panel
-from app.curves.test_curves_panel import SIZE, _center, clip_text
+from app.curves.plotted import SIZE, _center, clip_text
 from imgui_bundle import imgui
 
 from viewer.app.posing.move_tool import _shift_text
@@ -99,9 +98,6 @@ def test_own_numbers_have_no_negative_zero(box, texts):
     box.step(2)
     shown = {text for text in texts if text.startswith("file:")}
     assert shown == {"file: 0.0000  0.0000  0.0000"}
-
-
-curves = test_curves_panel.curves  # the fixture
 
 
 def test_curves_are_fitted_again_when_the_unit_changes(curves):

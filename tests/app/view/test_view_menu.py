@@ -44,7 +44,7 @@ def test_menu_shows_weights_and_lets_go_of_them(hand):
 
 def test_menu_picks_vertices(hand):
     hand.menu("menu View", "Pick vertices")
-    assert hand.state.of(Weights).picks_vertices and hand.says("Click a vertex")
+    assert hand.state.of(Weights).picks_vertices and hand.says("Clicks pin vertices")
     hand.menu("menu View", "Pick vertices")
     assert not hand.state.of(Weights).picks_vertices
 

@@ -37,7 +37,7 @@ def _posed(hand, dofs):
     hand.show_panel("Weights")
     hand.state.actor.pose.dofs[:] = dofs
     hand.state.options.skinning.max_influences = 4
-    hand.state.options.scalar = "cut"
+    hand.state.options.scalar = "pruning"
     hand.state.history.start(hand.state.scene, hand.state.options)
     hand.step(2)
     return hand

@@ -23,7 +23,7 @@ def matches(matched, inside_out=()):
 def test_match_lines_count():
     found = matches([True, True, True, False])
     assert told(match_lines(found, ~found.matched, "direct")) == [
-        ("R005.matched", {"n": 3, "all": 4, "ratio": 0.75, "filled": 1})
+        ("R005.matched", {"n": 3, "all": 4, "ratio": 0.75, "inpainted": 1})
     ]
 
 
@@ -31,7 +31,7 @@ def test_match_lines_say_what_is_out_of_the_ordinary():
     found = matches([True, False, False, False], [0, 2])
     lines = match_lines(found, ~found.matched, "harmonic")
     assert told(lines) == [
-        ("R005.matched", {"n": 1, "all": 4, "ratio": 0.25, "filled": 3}),
+        ("R005.matched", {"n": 1, "all": 4, "ratio": 0.25, "inpainted": 3}),
         ("R006.matched", {"limit": 0.75}),
         ("R005.reversed", {"n": 2}),
         ("R005.solver", {"method": "harmonic"}),

@@ -75,7 +75,7 @@ def test_transfer_onto_itself_changes_nothing():
     assert result.matched.all()
     assert not result.inpainted.any()
     assert told(result.lines) == [
-        ("R005.matched", {"n": 208, "all": 208, "ratio": 1.0, "filled": 0})
+        ("R005.matched", {"n": 208, "all": 208, "ratio": 1.0, "inpainted": 0})
     ]
     np.testing.assert_allclose(result.distances, 0.0, atol=1e-12)
 

@@ -140,6 +140,18 @@ def test_a_partner_of_another_name_is_told(tmp_path, capsys):
     ]
 
 
+def test_json_holds_mismatches_as_text_and_as_data(tmp_path, capsys):
+    reference, other = write(tmp_path / "ref"), write(tmp_path / "other")
+    (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
+    assert run(["diff", reference, other, "--json", "--poses", "0", "--tolerance", "1"]) == 1
+    (row,) = json.loads(capsys.readouterr().out)["comparisons"]
+    assert row["mismatches"] == [f"only in {other}: 0 (a skeleton)"]
+    (found,) = row["diagnostics"]
+    assert found["key"] == "D001.actor"
+    assert found["values"]["side"] == other
+    assert found["values"]["actor"] == {"text": "0 (a skeleton)", "values": {"name": "0"}}
+
+
 def test_json_holds_every_joint_and_the_place_of_the_worst(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", tip="3.5")
     assert run(["diff", first, second, "--json", "--poses", "0", "--tolerance", "1"]) == 0

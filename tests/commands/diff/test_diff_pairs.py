@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.commands._diff.pairs import pair_actors
+from viewer.diagnostics import Phrase
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -91,16 +92,20 @@ def test_people_are_paired_by_their_number() -> None:
     second = [points("a", person=2), points("a", person=3)]
     found = pair_actors(first, second)
     assert [(one.person, other.person) for one, other in found.pairs] == [(2, 2)]
-    assert found.first == (f"{first[0].name} (captured points)",)
-    assert found.second == (f"{second[1].name} (captured points)",)
+    assert found.first == (Phrase("lone-points", name=first[0].name),)
+    assert found.second == (Phrase("lone-points", name=second[1].name),)
 
 
 def test_what_is_left_is_named_on_the_side_that_has_it() -> None:
     found = pair_actors([rig("a")], [skeleton("other"), surface("skin"), rig("a"), rig("b")])
     assert found.first == ()
-    assert found.second == ("other (a skeleton)", "skin (a mesh)", "b")
+    assert found.second == (
+        Phrase("lone-skeleton", name="other"),
+        Phrase("lone-mesh", name="skin"),
+        Phrase("lone-figure", name="b"),
+    )
     found = pair_actors([rig("a"), rig("b")], [rig("b")])
-    assert found.first == ("a",) and found.second == ()
+    assert found.first == (Phrase("lone-figure", name="a"),) and found.second == ()
 
 
 def test_a_clip_that_a_stray_skeleton_was_given_is_the_partners() -> None:
@@ -110,7 +115,10 @@ def test_a_clip_that_a_stray_skeleton_was_given_is_the_partners() -> None:
         found = pair_actors(second, first) if turned else pair_actors(first, second)
         (one, other) = found.pairs[0][::-1] if turned else found.pairs[0]
         assert one.clip is walk and other.clip is mine and other.figure.name == "a"
-        assert (found.first, found.second)[:: -1 if turned else 1] == ((), ("stray (a skeleton)",))
+        assert (found.first, found.second)[:: -1 if turned else 1] == (
+            (),
+            (Phrase("lone-skeleton", name="stray"),),
+        )
     assert second[0].clip is mine and second[1].clip is None  # both are left as they are
 
 
@@ -129,4 +137,7 @@ def test_a_clip_of_another_name_is_taken_only_where_one_is_wanted() -> None:
     assert found.pairs[0][1].clip is run
     found = pair_actors([rig("a")], [skeleton("s", run), rig("a")])
     assert found.pairs[0][1].clip is None
-    assert found.second == ("s (a skeleton)", "motion run")
+    assert found.second == (
+        Phrase("lone-skeleton", name="s"),
+        Phrase("lone-motion", name="run"),
+    )

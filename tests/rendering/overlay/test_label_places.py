@@ -64,14 +64,17 @@ def room(scene):
 def by_hand(points, places):
     """Return how far the places and their lines are from points that are not alike: (M,)."""
     clear, beside = np.full((2, len(places.labels)), np.inf)
-    for row, (anchor, end) in enumerate(zip(places.anchors, places.ends, strict=True)):
+    for label in np.unique(places.labels):
+        rows = np.flatnonzero(places.labels == label)
+        anchor = places.anchors[rows[0]]
         others = points[np.abs(points - anchor).max(axis=1) >= 1.0]
-        nearest = np.clip(others, places.low[row], places.high[row])
-        clear[row] = np.linalg.norm(others - nearest, axis=1).min()
-        if places.has_line[row]:
-            share = np.clip((others - anchor) @ (end - anchor) / places.own[row] ** 2, 0, 1)
-            on_line = anchor + share[:, None] * (end - anchor)
-            beside[row] = np.linalg.norm(others - on_line, axis=1).min()
+        nearest = np.clip(others, places.low[rows, None], places.high[rows, None])
+        clear[rows] = np.linalg.norm(others - nearest, axis=2).min(axis=1)
+        rows = rows[places.has_line[rows]]
+        along = places.ends[rows] - anchor
+        fractions = (along @ (others - anchor).T) / places.own[rows, None] ** 2
+        on_line = anchor + np.clip(fractions, 0, 1)[..., None] * along[:, None]
+        beside[rows] = np.linalg.norm(others - on_line, axis=2).min(axis=1)
     return clear, beside
 
 

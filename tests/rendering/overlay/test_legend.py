@@ -76,7 +76,7 @@ def test_every_range_has_two_to_six_ticks(power, share):
 
 
 def test_lengths_are_in_millimetres():
-    found = legend("cut", [0, 0.001, 0.0123, 0, 0, 0])
+    found = legend("pruning", [0, 0.001, 0.0123, 0, 0, 0])
     assert found.heading == "Distance to 4 influences, mm"
     assert [tick.text for tick in found.ticks] == ["0", "5", "10"]
     assert found.note == "from 0 to 12.3"
@@ -104,7 +104,7 @@ def test_differences_reach_as_far_to_both_sides():
 
 
 def test_fixed_range_is_that_of_the_bar_and_the_note_says_what_there_is():
-    found = legend("cut", [0, 0.1, 0, 0, 0, 0], scalar_range=(5.0, 10.0))
+    found = legend("pruning", [0, 0.1, 0, 0, 0, 0], scalar_range=(5.0, 10.0))
     assert [tick.text for tick in found.ticks] == ["5", "6", "7", "8", "9", "10"]
     assert found.note == "from 0 to 100"
 
@@ -189,9 +189,11 @@ def test_unknown_joint_and_no_joint_are_told():
     (0, "Distance to 4 influences"), (8, "Distance to 8 influences"), (1, "Distance to 1 influence")
 ])  # fmt: skip
 def test_number_of_influences_is_named(kept, title):
-    found = legend("cut", [0, 0.1, 0, 0, 0, 0], skinning=Skinning(max_influences=kept))
+    found = legend("pruning", [0, 0.1, 0, 0, 0, 0], skinning=Skinning(max_influences=kept))
     assert found.heading == f"{title}, mm"
-    assert legend("cut", [0] * 6, figure=replace(strip(), skin=None)).title.endswith("4 influences")
+    assert legend("pruning", [0] * 6, figure=replace(strip(), skin=None)).title.endswith(
+        "4 influences"
+    )
 
 
 def test_title_is_kept_while_the_figure_that_has_the_field_is_hidden():

@@ -32,7 +32,7 @@ def rows_with(pixels, color):
 
 
 def test_bar_runs_from_the_first_to_the_last_colour():
-    pixels = legend_pixels(legend("cut", [0, 0, 0, 0, 0, 0.04]), SIZE)
+    pixels = legend_pixels(legend("pruning", [0, 0, 0, 0, 0, 0.04]), SIZE)
     colors = colormap()[:, :3]
     bar = rows_with(pixels, colors[0])
     row = pixels[bar[len(bar) // 2], :, :3].astype(int)
@@ -114,11 +114,11 @@ def test_low_and_narrow_picture_has_fewer_swatches():
 @pytest.mark.parametrize(("size", "fits"), [((640, 360), True), ((60, 360), False),
                                             ((640, 30), False)])  # fmt: skip
 def test_legend_that_does_not_fit_is_left_out(size, fits):
-    assert (legend_pixels(legend("cut", [0, 0, 0, 0, 0, 0.04]), size) is not None) == fits
+    assert (legend_pixels(legend("pruning", [0, 0, 0, 0, 0, 0.04]), size) is not None) == fits
 
 
 def test_letters_grow_with_the_picture():
-    found = legend("cut", [0, 0, 0, 0, 0, 0.04])
+    found = legend("pruning", [0, 0, 0, 0, 0, 0.04])
     heights = [legend_pixels(found, size).shape[0] for size in (SIZE, (1280, 720), (3840, 2160))]
     assert heights[0] < heights[1] < heights[2]
     assert heights[2] < 0.25 * 2160

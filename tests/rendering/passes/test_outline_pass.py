@@ -8,7 +8,7 @@ from rendering.drawn_figures import skeleton
 from rendering.front_view import PIXELS, alone, front_view, grid_figure
 
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.passes.outline_pass import Outlined
+from viewer.rendering.outlined import Outlined
 from viewer.rig.figure import Figure
 
 

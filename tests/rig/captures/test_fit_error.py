@@ -1,4 +1,4 @@
-"""Keypoints against fitted bodies: whose body it is, and distances by hand."""
+"""Keypoints against fitted bodies: assignment of bodies, and distances computed by hand."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from viewer.rig.skeleton import ball_skeleton
 
 
 def pointed(person):
-    """Return keypoints of body25, all at (1, 2, 3), only the right elbow and the nose seen."""
+    """Return keypoints of body25 at (1, 2, 3), of which only right elbow and nose are seen."""
     layout = keypoint_layout(25)
     points = np.zeros((25, 4))
     points[:, :3] = 1.0, 2.0, 3.0

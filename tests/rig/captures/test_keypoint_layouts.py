@@ -1,4 +1,4 @@
-"""Keypoint layouts: numbers, names, sides, limbs, and which joints they mean."""
+"""Keypoint layouts: counts, names, sides, limbs, and corresponding joints."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def test_sides_are_those_of_the_names_and_mirror(title):
             other = name.replace("left_", "right_") if side > 0 else name.replace("right_", "left_")
             assert other in layout.names
 
-    # What is joined on one side is joined on the other.
+    # Limbs are the same on both sides.
     def mirrored(pair):
         table = {"left": "right_", "right": "left_"}
         return frozenset(
@@ -64,7 +64,8 @@ def test_sides_are_those_of_the_names_and_mirror(title):
         )
 
     found = {frozenset(pair) for pair in limbs(layout)}
-    if not title.startswith("face") and count not in (118, 137):  # lines of the face have a start
+    # Lines of the face start somewhere.
+    if not title.startswith("face") and count not in (118, 137):
         assert {mirrored(pair) for pair in limbs(layout)} == found
 
 
@@ -83,7 +84,7 @@ def test_seventeen_are_coco_unless_someone_says_otherwise():
     h36m = keypoint_layout(17, "h36m")
     assert h36m.names[1:4] == ("left_hip", "left_knee", "left_ankle")
     assert ("head", "head_top") in limbs(h36m)
-    # The table of EasyMocap has 5-12 for 6-12, a slip.
+    # EasyMocap's table has 5-12 instead of 6-12 by mistake.
     assert ("right_shoulder", "right_hip") in limbs(keypoint_layout(17))
 
 
@@ -139,7 +140,7 @@ def test_joints_that_mean_the_same():
 
 def test_finger_joints_match_by_number_though_the_order_differs():
     matches = matching_joints(keypoint_layout(67))
-    # Ring before pinky in keypoints; the wrist's second point and the tips are no joints.
+    # Ring before pinky in keypoints; the second point of the wrist and the tips are not joints.
     assert (matches[25 + 1], matches[25 + 13], matches[25 + 17]) == (
         "left_thumb1", "left_ring1", "left_pinky1",
     )  # fmt: skip

@@ -63,7 +63,7 @@ def test_world_that_hangs_is_turned_over():
 
 
 def test_placement_between_axes_is_left_out():
-    quarter = rotation_transform(0, -np.pi / 2)  # what stands along z stands along y in the scene
+    quarter = rotation_transform(0, -np.pi / 2)  # z in the capture is y in the scene
     animation, up = sample_upright_points(*scene_of("y", placement=quarter))
     assert up == "z"
     assert_array_equal(animation.points[2], POINTS[1, :, :3])

@@ -1,4 +1,4 @@
-"""Comparison of figures and motions: against differences that were put in by hand."""
+"""Comparison of figures and motions with known differences."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MIXED = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(1, 1.0)], [(0, 1.0)]]
 
 
 def arm(second=(1.0, 0.0, 0.0), low=-1.0):
-    """Two joints; the second, ``second`` away from the first, turns about z."""
+    """Two joints; the second, at distance ``second`` from the first, rotates about z."""
     return skeleton(
         [-1, 0], [(1, "z", 0.0, low, 1.0)], ("base", "tip"), np.array([[0.0, 0, 0], second])
     )
@@ -83,24 +83,24 @@ def test_weights_differ_by_the_l1_distance_of_rows_however_they_are_listed() -> 
     weights = measures(found)["weights"]
     assert_allclose(weights.item_maxima, [0.0, 0.6, 0.0, 2.0], atol=1e-12)
     assert (weights.item, weights.step) == ("vertex 3", "")  # they are the same in every pose
-    assert measures(found)["vertices"].maximum == 0.0  # at rest nothing shows
+    assert measures(found)["vertices"].maximum == 0.0  # no difference at rest
 
 
 def test_weights_that_are_the_same_at_rest_show_in_test_poses() -> None:
     other = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)]]
     vertices = measures(compare(Actor(figure()), Actor(figure(influences=other))))["vertices"]
-    # Vertex 1 lies in the joint: it stays. With one more vertex weighted otherwise it moves.
+    # Vertex 1 is at the joint and stays there; another vertex with different weights moves.
     assert vertices.maximum < 1e-12
     other = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(0, 1.0)], [(0, 1.0)]]
     moved = measures(compare(Actor(figure()), Actor(figure(influences=other)), n_poses=20))
-    # Vertex 2 is 1 from the joint, so a turn by a moves it by 2 sin(a / 2), a <= 0.7.
+    # Vertex 2 is 1 from the joint, so a rotation by a moves it by 2 sin(a / 2), a <= 0.7.
     assert 0.1 < moved["vertices"].maximum <= 2 * np.sin(0.35) + 1e-12
     assert moved["vertices"].step.startswith("test pose ")
     assert moved["vertices"].item == "vertex 2"
 
 
 def test_meshes_with_other_triangles_are_compared_by_closest_points_both_ways() -> None:
-    # The same square as four triangles about its middle, lifted by 0.1, weights as in between.
+    # The same square as four triangles around its centre, raised by 0.1, with interpolated weights.
     positions = np.array([*CORNERS, [0.5, 0.5, 0.0]]) + np.array([0.0, 0.0, 0.1])
     fan = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
     influences = [*MIXED, [(0, 0.625), (1, 0.375)]]
@@ -110,16 +110,22 @@ def test_meshes_with_other_triangles_are_compared_by_closest_points_both_ways() 
     assert_allclose(names["surface, from the first"].item_maxima, [0.1] * 4)
     assert_allclose(names["surface, from the second"].item_maxima, [0.1] * 5)
     assert_allclose(names["weights"].item_maxima, 0.0, atol=1e-12)
-    assert found.notes == (
-        "meshes differ (4 vertices, 2 triangles; 5 vertices, 4 triangles): closest points are "
-        "compared",
-    )
+    counts = {"vertices": 4, "triangles": 2, "other_vertices": 5, "other_triangles": 4}
+    assert told(found.notes) == [("D002.meshes", counts)]
+
+
+def told(found):
+    """Keys and values of diagnostics."""
+    return [(one.key, one.values) for one in found]
 
 
 def test_what_only_one_has_is_a_mismatch_that_no_tolerance_covers() -> None:
     names = skeleton([-1, 0, 1], names=("base", "tip", "claw"))
     found = compare(Actor(Figure("a", skeleton=names)), Actor(figure()), n_poses=0)
-    assert found.mismatches == ("1 joint only in the first: claw", "only the second has a mesh")
+    assert told(found.mismatches) == [
+        ("D001.joints", {"n": 1, "side": "first", "names": ["claw"]}),
+        ("D001.mesh", {"side": "second"}),
+    ]
     assert found.exceeds(1e9)
 
 
@@ -127,7 +133,8 @@ def test_joints_without_a_name_are_told_by_number() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0], names=("base", "")))
     other = Figure("b", skeleton=skeleton([-1], names=("base",)))
     found = compare(Actor(one), Actor(other))
-    assert found.mismatches == ("1 joint only in the first: joint 1 (no name)",)
+    values = {"n": 1, "side": "first", "names": ["joint 1 (no name)"]}
+    assert told(found.mismatches) == [("D001.joints", values)]
     found = compare(Actor(one), Actor(one))
     assert measures(found)["joint positions"].items == ("base", "joint 1 (no name)")
 
@@ -136,10 +143,7 @@ def test_joints_in_another_order_are_told() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 0, 0], names=("a", "b", "c", "d")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
     found = compare(Actor(one), Actor(other))
-    assert found.notes == (
-        "joints are in a different order, which matters to .skin and .anim files: where the first "
-        "has b, the second has d",
-    )
+    assert told(found.notes) == [("D002.order", {"first": "b", "second": "d"})]
     less = Figure("c", skeleton=skeleton([-1, 0, 0], names=("a", "c", "d")))
     assert compare(Actor(one), Actor(less)).notes == ()
 
@@ -147,24 +151,24 @@ def test_joints_in_another_order_are_told() -> None:
 def test_joint_with_another_parent_is_a_mismatch() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 1], names=("a", "b", "c")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "b", "c")))
-    assert compare(Actor(one), Actor(other)).mismatches == ("different parents: c",)
+    found = compare(Actor(one), Actor(other))
+    assert told(found.mismatches) == [("D001.parents", {"names": ["c"]})]
 
 
 def test_joints_without_a_common_name_are_compared_by_number() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0], names=("a", "b")))
     other = Figure("b", skeleton=skeleton([-1, 0], names=("x", "y")))
-    assert compare(Actor(one), Actor(other)).notes == (
-        "no joint names in common: compared by index",
-    )
+    assert told(compare(Actor(one), Actor(other)).notes) == [("D002.joints-by-index", {})]
 
 
 def test_other_limits_are_told_with_both() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
-    assert found.mismatches == ("different limits of 1 DOF, such as tip.z: -1 to 1 and -0.5 to 1",)
+    limits = {"low": -1.0, "high": 1.0, "other_low": -0.5, "other_high": 1.0}
+    assert told(found.mismatches) == [("D001.limits", {"n": 1, "dof": "tip.z", **limits})]
 
 
 def walk(angles, rate=10.0, name="walk") -> SampledClip:
-    """Turn the arm's base about z."""
+    """Rotate the arm's base about z."""
     half = np.array(angles) / 2
     turns = np.zeros((len(half), 2, 4))
     turns[:, :, 3] = 1.0
@@ -191,7 +195,8 @@ def test_motions_are_compared_frame_by_frame_and_the_worst_is_named() -> None:
 
 def test_motions_of_other_length_are_a_mismatch_and_the_common_part_is_compared() -> None:
     found = compare(Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 6)))
-    assert found.mismatches == ("durations differ: 0.3 s and 0.5 s",)
+    assert [one.key for one in found.mismatches] == ["D001.durations"]
+    assert_allclose([*found.mismatches[0].values.values()], [0.3, 0.5])
     assert measures(found)["joint positions"].n_compared == 2 * 4
 
 
@@ -214,7 +219,7 @@ def test_nan_is_never_within_a_tolerance() -> None:
 
 
 def test_actors_are_left_in_the_worst_pose_also_if_that_is_their_own() -> None:
-    # The vertex is off by the same at rest and turned, so the first pose is the worst.
+    # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]
     first, second = Actor(figure()), Actor(figure(moved))

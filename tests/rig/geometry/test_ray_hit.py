@@ -1,4 +1,4 @@
-"""Lines of sight and surfaces: the nearest triangle counts, from either side."""
+"""Rays and surfaces: the nearest triangle is hit, from either side."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from viewer.rig.geometry.ray_hit import first_hit, surface_point
 
-# A unit square at z = 0, and the same at z = 1 with its corners the other way round.
+# A unit square at z = 0, and the same at z = 1 with the opposite winding.
 POSITIONS = np.array(
     [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float
 )

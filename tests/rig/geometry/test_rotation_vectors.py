@@ -31,7 +31,7 @@ AXES = [
 
 
 def about(axis, angle):
-    """Turn about any axis: carry it to z, turn there, and carry it back."""
+    """Rotate about any axis: map the axis to z, rotate about z, and map back."""
     z = np.array(axis, dtype=float) / np.linalg.norm(axis)
     x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
     x /= np.linalg.norm(x)
@@ -44,7 +44,7 @@ def unit_axis(axis):
 
 
 def random_rotations(count, seed=0):
-    """Return rotations spread over all directions and angles, as orthonormalised frames."""
+    """Return random rotations of all directions and angles, as orthonormalised frames."""
     frames, upper = np.linalg.qr(np.random.default_rng(seed).normal(size=(count, 3, 3)))
     frames *= np.sign(np.diagonal(upper, axis1=1, axis2=2))[:, None, :]
     return frames * np.sign(np.linalg.det(frames))[:, None, None]
@@ -219,7 +219,7 @@ def test_shear_turns_by_the_angle_of_its_polar_form(shear):
 
 
 def test_mirroring_matrix_gives_a_proper_rotation_and_a_mirroring_stretch():
-    # The shortest of the three axes is flipped: nothing proper is nearer.
+    # The shortest of the three axes is flipped, which gives the nearest proper rotation.
     rotation, stretch = nearest_rotations(np.diag([-1.0, 2.0, 3.0]))
     assert_allclose(rotation, np.eye(3), atol=ROUNDING)
     assert_allclose(stretch, np.diag([-1.0, 2.0, 3.0]), atol=ROUNDING)

@@ -1,4 +1,4 @@
-"""Why a vertex is where it is: an arm of two joints, every number worked out by hand."""
+"""Explanation of a vertex: an arm of two joints, with all numbers worked out by hand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
 
-# The shoulder is at the origin, the elbow at (2, 0, 0); both turn about z and x.
+# The shoulder is at the origin, the elbow at (2, 0, 0); both rotate about z and x.
 POINTS = [[3.0, 0, 0], [2.0, 1, 0], [1.0, 0, 0], [5.0, 5, 5]]
 ROWS = [[(1, 1.0)], [(0, 0.25), (1, 0.75)], [(0, 1.0)], []]
 ELBOW = matrix(move=(2.0, 0, 0))
@@ -64,7 +64,7 @@ def test_every_term_of_dual_quaternions():
     figure = arm()
     one = explain(figure, bent(figure), Skinning("dqs"), 1)
     dual, half = one.dual, np.pi / 4
-    # A turn by 90 degrees about z at (2, 0, 0): real (0, 0, sin 45, cos 45); the translation is
+    # A rotation by 90 degrees about z at (2, 0, 0): real (0, 0, sin 45, cos 45); the translation is
     # c - R c = (2, -2, 0), the dual part half of it times the real part.
     s, c = np.sin(half), np.cos(half)
     assert_allclose(dual.duals, [[0, 0, s, c, 1 * c - 1 * s, -1 * c - 1 * s, 0, 0],
@@ -74,7 +74,7 @@ def test_every_term_of_dual_quaternions():
     blended = 0.75 * dual.duals[0] + 0.25 * dual.duals[1]
     assert_allclose(dual.blended, blended, atol=1e-15)
     assert dual.length == pytest.approx(np.hypot(0.75 * s, 0.75 * c + 0.25))
-    # All joints' motions keep (2, 0, 0), so the blend turns about it, by twice this angle.
+    # The motions of all joints fix (2, 0, 0), so the blend rotates about it by twice this angle.
     angle = 2 * np.arctan2(0.75 * s, 0.75 * c + 0.25)
     assert_allclose(one.position, [2 - np.sin(angle), np.cos(angle), 0], atol=1e-15)
     assert_allclose(dual.stretched, [2, 1, 0])
@@ -83,7 +83,8 @@ def test_every_term_of_dual_quaternions():
 
 def test_quaternion_on_the_other_side_is_turned():
     figure = arm([[(0, 0.6), (1, 0.4)]] * 4)
-    # The shoulder turns by 200 degrees: its quaternion's w is below 0, or the other's sign is.
+    # The shoulder rotates by 200 degrees: either its quaternion's w or the other's sign is
+    # negative.
     pose = bent(figure, np.deg2rad(-80), np.deg2rad(200))
     one = explain(figure, pose, Skinning("dqs"), 0)
     first, second = one.dual.duals[:, :4]
@@ -135,7 +136,7 @@ def test_shape_correctives_and_placement_are_separate_steps():
     offsets = np.zeros((1, 4, 3))
     offsets[0, 0] = 0.5, 0, 0
     push = np.zeros((9, 4, 3))
-    push[0, 0] = 0, 0, 1.0  # driven by cos - 1 of the elbow's turn about z
+    push[0, 0] = 0, 0, 1.0  # driven by cos - 1 of the elbow's rotation about z
     figure = arm(blend_shapes=BlendShapes(("long",), offsets), correctives=Correctives(push))
     pose = bent(figure)
     pose.shape_weights = np.array([2.0])
@@ -144,7 +145,7 @@ def test_shape_correctives_and_placement_are_separate_steps():
     assert_allclose(one.stored, [3, 0, 0])
     assert_allclose(one.shaped, [4, 0, 0])
     assert_allclose(one.rest, [4, 0, -1], atol=1e-15)
-    # Two units behind the elbow, turned up; then twice as large and aside.
+    # Two units beyond the elbow, rotated upwards; then scaled by 2 and translated.
     assert_allclose(one.skinned, [2, 2, -1], atol=1e-15)
     assert_allclose(one.position, [14, 4, -2], atol=1e-15)
     assert_allclose(one.placement, [[2, 0, 0, 10], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]])
@@ -168,7 +169,7 @@ def test_stretch_of_a_joint_that_scales_comes_first():
     pose = bent(figure, np.pi / 2)
     pose.scales[1] = 3.0, 1.0, 1.0
     one = explain(figure, pose, Skinning("dqs"), 0)
-    # (3, 0, 0) is one unit behind the elbow: three units, then turned up.
+    # (3, 0, 0) is one unit beyond the elbow: three units, then rotated upwards.
     assert_allclose(one.dual.stretched, [5, 0, 0], atol=1e-14)
     assert_allclose(one.position, [2, 3, 0], atol=1e-14)
 
@@ -213,8 +214,8 @@ def test_text_of_linear_blending():
         "        [  0.00   0.00   0.00   1.00 ]",
         "   M2 p             (  2.00   1.00   0.00 )",
         "   w2 M2 p          (  0.50   0.25   0.00 )",
-        "sum of w = 1.00",
-        "sum of w M p        (  1.25   0.25   0.00 )",
+        "sum w = 1.00",
+        "sum w M p           (  1.25   0.25   0.00 )",
         "position            (  1.25   0.25   0.00 )",
     ]
 
@@ -225,19 +226,19 @@ def test_text_of_dual_quaternions_and_placement():
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 1, 0)
     lines = explanation_text(explain(figure, pose, Skinning("dqs"), 0), digits=2)
     # Real (0, 0, sin 45, cos 45), dual (0, -2 sin 45, 0, 0): see the test of every term.
-    assert lines[lines.index("sum of w = 1.00") :] == [
-        "sum of w = 1.00",
-        "sum of w M p        (  2.00   1.00   0.00 )",
-        "q1: relative weight 1.00",
+    assert lines[lines.index("sum w = 1.00") :] == [
+        "sum w = 1.00",
+        "sum w M p           (  2.00   1.00   0.00 )",
+        "q1: normalised weight 1.00",
         "   real [  0.00   0.00   0.71   0.71 ]",
         "   dual [  0.00  -1.41   0.00   0.00 ]",
-        "q = sum of relative weight times q, with these signs",
+        "q = sum of normalised weight times q, with these signs",
         "   real [  0.00   0.00   0.71   0.71 ]",
         "   dual [  0.00  -1.41   0.00   0.00 ]",
-        "length of its real part = 1.00",
-        "moved by q / length (  2.00   1.00   0.00 )",
-        "figure: times 2.00, plus",
-        "                    (  0.00   1.00   0.00 )",
+        "length of the real part = 1.00",
+        "moved by q          (  2.00   1.00   0.00 )",
+        "scale = 2.00",
+        "translation         (  0.00   1.00   0.00 )",
         "position            (  4.00   3.00   0.00 )",
     ]
 
@@ -253,7 +254,7 @@ def test_text_says_what_is_special():
     pose = bent(both, np.deg2rad(170), np.deg2rad(170))
     mixed = explanation_text(explain(both, pose, Skinning("mix", 0.25), 0))
     assert any(
-        line == "q2: relative weight 0.5000, negated to the hemisphere of q1" for line in mixed
+        line == "q2: normalised weight 0.5000, negated to the hemisphere of q1" for line in mixed
     )
     assert any(line.startswith("0.2500 of the way   (") for line in mixed)
 

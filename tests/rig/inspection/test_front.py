@@ -1,4 +1,4 @@
-"""The front of a figure: judged by names, feet, faces, ends, soles and travel."""
+"""The front of a figure, estimated from names, feet, faces, ends, soles and travel."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 
-# A quarter turn takes each axis to the next: about y, +z to +x; about z, -y to +x.
+# A rotation by 90 degrees maps each axis to the next: about y, +z to +x; about z, -y to +x.
 CYCLES = {"y": ("+z", "+x", "-z", "-x"), "z": ("-y", "+x", "+y", "-x")}
 TURNS = {"y": turn_y, "z": turn_z}
 
@@ -35,7 +35,7 @@ def _placed(actor: Actor, place) -> Actor:
 
 
 def fronts(scene: Scene) -> list[str]:
-    """Return the guesses for a scene and three copies that are turned by 90 degrees each."""
+    """Return the estimates for a scene and for copies rotated by 90, 180 and 270 degrees."""
     return [guess_front(turned(scene, quarters)) for quarters in range(4)]
 
 
@@ -45,7 +45,7 @@ def cycle(up: str, front: str) -> list[str]:
 
 
 def figure(joints: dict[str, tuple[int, tuple[float, float, float]]], up: str = "y") -> Figure:
-    """Build a figure from names, each with its parent and its place."""
+    """Build a figure from names, each with its parent and position."""
     parents = np.array([parent for parent, _ in joints.values()], dtype=np.int32)
     places = np.array([place for _, place in joints.values()], dtype=float)
     return Figure("made", skeleton=ball_skeleton(tuple(joints), parents, places), up=up)
@@ -123,9 +123,9 @@ def test_all_other_evidence_together_outvotes_sides_that_are_named_the_wrong_way
         "eye": (4, (0, 1, -1.1)),
     }
     assert fronts(scene(figure(joints))) == cycle("y", "-z")  # 6 to 3
-    del joints["eye"]  # 4 to 3 is not clear
+    del joints["eye"]  # 4 to 3 is inconclusive
     assert fronts(scene(figure(joints))) == ["+z"] * 4
-    del joints["head"]  # 2 to 3 either
+    del joints["head"]  # so is 2 to 3
     assert fronts(scene(figure(joints))) == ["+z"] * 4
 
 
@@ -139,8 +139,8 @@ def _walk(way, n_frames=11):
 
 def test_travel_shows_the_front_where_nothing_else_does():
     assert fronts(Scene([_walk((-3.0, 0.0, 0.2))])) == cycle("y", "-x")
-    assert guess_front(Scene([_walk((0.0, 5.0, 0.0))])) == "+z"  # up is no way to go
-    assert guess_front(Scene([_walk((-0.1, 0.0, 0.0))])) == "+z"  # nor is swaying
+    assert guess_front(Scene([_walk((0.0, 5.0, 0.0))])) == "+z"  # upward motion is no evidence
+    assert guess_front(Scene([_walk((-0.1, 0.0, 0.0))])) == "+z"  # swaying is no evidence either
 
 
 def test_travel_does_not_outvote_names():
@@ -167,7 +167,7 @@ def _grid(x, y, z):
 
 
 def _boots():
-    """Two legs up to 1, whose soles reach ahead to z = 0.3, and a trunk."""
+    """Two legs up to height 1, whose soles extend to z = 0.3 in front, and a trunk."""
     leg = _grid(np.linspace(0.1, 0.2, 3), np.linspace(0.0, 1.0, 51), np.linspace(-0.05, 0.05, 3))
     sole = _grid(np.linspace(0.1, 0.2, 3), [0.0, 0.02], np.linspace(0.05, 0.3, 11))
     trunk = _grid(np.linspace(0.0, 0.3, 7), np.linspace(1.0, 2.0, 11), np.linspace(-0.1, 0.1, 5))

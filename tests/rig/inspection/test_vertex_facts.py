@@ -1,4 +1,4 @@
-"""What is known of a vertex: figures of a few points, facts by hand."""
+"""Properties of a vertex: figures of a few points, values worked out by hand."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_position_and_normal_are_those_of_the_posed_figure():
     pose = posed(one, 2.0, np.pi / 2)
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 0, 5)
     facts = vertex_facts(one, pose, Skinning(), 1)
-    # (1, 0, 0) turns to (0, 1, 0) and slides by 2 along x; then twice as large and aside.
+    # (1, 0, 0) rotates to (0, 1, 0) and moves by 2 along x; then scaled by 2 and translated.
     assert_allclose(facts.position, [4, 2, 5], atol=1e-15)
     assert_allclose(facts.normal, [0, 0, 1])
 

@@ -8,6 +8,7 @@ import pytest
 from rig import hand_made
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.rig.motion.clip import (
     EXTRAPOLATIONS,
@@ -146,46 +147,47 @@ def test_check_fit_names_both_numbers() -> None:
 
 
 def test_check_fit_refuses_skeletons_that_move_otherwise() -> None:
-    """A body of 24 ball joints has 72 DOFs too, as the wasp's 23 joints and root have."""
+    """A body of 24 ball joints has 72 DOFs, like the wasp with 23 joints and a root."""
     skeleton = hand_made.skeleton([-1, 0], [(j, axis, 0.0) for j in (0, 1) for axis in "xyz"])
     assert not is_course_rig(skeleton)
     with pytest.raises(RigError) as caught:
         check_fit(Clip("walk", (), 0.0, 1.0), skeleton)
-    assert str(caught.value) == (
-        "clip walk: the skeleton is not a course rig, whose clips move the root along x, y, z and "
-        "rotate each joint about x, y, z: joint j0 has DOFs x, y, z"
-    )
+    assert caught.value.diagnostic.key == "C009.rig"
+    reason = Phrase("joint-with-dofs", joint="j0", kinds=["x", "y", "z"])
+    assert caught.value.diagnostic.values["misfit"] == Phrase("not-course-rig", reason=reason)
 
 
 @pytest.mark.parametrize(
     ("rows", "reason"),
     [
-        ([], "joint j0 has no DOFs"),
-        ([(0, kind) for kind in DOF_KINDS], "joint j1 has no DOFs"),
-        ([(0, kind) for kind in DOF_KINDS] + [(1, "z")], "joint j1 has DOFs z"),
+        ([], Phrase("joint-without-dofs", joint="j0")),
+        ([(0, kind) for kind in DOF_KINDS], Phrase("joint-without-dofs", joint="j1")),
+        (
+            [(0, kind) for kind in DOF_KINDS] + [(1, "z")],
+            Phrase("joint-with-dofs", joint="j1", kinds=["z"]),
+        ),
         (
             [(0, kind) for kind in DOF_KINDS] + [(1, kind) for kind in "zyx"],
-            "joint j1 has DOFs z, y, x",
+            Phrase("joint-with-dofs", joint="j1", kinds=["z", "y", "x"]),
         ),
         (
             [(1, kind) for kind in "xyz"] + [(0, kind) for kind in DOF_KINDS],
-            "its DOFs are not in the order of its joints",
+            Phrase("dofs-unordered"),
         ),
     ],
 )
 def test_misfit_names_what_is_no_course_rig(rows, reason) -> None:
     skeleton = hand_made.skeleton([-1, 0], [(*row, 0.0) for row in rows])
     found = misfit(Clip("walk", (), 0.0, 1.0), skeleton)
-    assert found.startswith("is not a course rig, ") and found.endswith(f": {reason}")
+    assert found == Phrase("not-course-rig", reason=reason)
 
 
 def test_misfit_is_empty_where_a_clip_fits() -> None:
     skeleton = hand_made.skeleton([-1], [(0, kind, 0.0) for kind in DOF_KINDS])
     still = [Channel(dof, [0.0], [0.0], (("flat", "flat"),)) for dof in range(6)]
-    assert misfit(Clip("still", tuple(still), 0.0, 1.0), skeleton) == ""
-    assert misfit(Clip("short", tuple(still[:5]), 0.0, 1.0), skeleton) == (
-        "needs 6 (3 + 3 x 1 joints)"
-    )
+    assert misfit(Clip("still", tuple(still), 0.0, 1.0), skeleton) is None
+    short = Clip("short", tuple(still[:5]), 0.0, 1.0)
+    assert misfit(short, skeleton) == Phrase("clip-needs", n=6, joints=1)
 
 
 def test_course_rigs_list_translation_then_rotations_joint_by_joint() -> None:

@@ -1,4 +1,4 @@
-"""Editing of keys: what moves, what stays, and that the old channel is never touched."""
+"""Editing of keys: which keys move, which stay, and that the old channel is unchanged."""
 
 import numpy as np
 import pytest
@@ -256,7 +256,7 @@ def test_only_changed_dofs_get_keys_if_asked() -> None:
 
 
 def test_limits_are_no_change() -> None:
-    """A curve beyond the limits is shown at the limit: the pose there is not a new one."""
+    """A curve beyond the limits is clamped, so the pose at the limit is unchanged."""
     beyond = Channel(5, np.zeros(1), np.full(1, 4.0), (("flat", "flat"),))
     clip = Clip("beyond", (beyond,), 0.0, 1.0)
     pose = rest_pose(rig())
@@ -284,7 +284,7 @@ def test_frames_become_keys_and_still_dofs_one_key() -> None:
     assert clip.channels[0].times.tolist() == [0.5, 0.75, 1.0]
     assert clip.channels[1].times.tolist() == [0.5] and clip.channels[1].values.tolist() == [7.0]
     assert_array_equal(evaluate_all(clip, times)[1], dofs)
-    # In a straight line between the frames, or smoothly, with the slope from 1 to 4 in 0.5 s.
+    # Linear between the frames, or smooth, with the slope from 1 to 4 in 0.5 s.
     middle = np.array([0.625])
     assert evaluate(clip.channels[0], middle) == 1.5
     smooth = clip_from_frames("walk", dofs, times, "smooth")

@@ -1,4 +1,4 @@
-"""Many curves at many times at once, against a plain curve that is written from the format."""
+"""Many curves at many times at once, against a plain implementation of the format."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MODE_PAIRS = tuple(itertools.product(EXTRAPOLATIONS, repeat=2))
 
 
 class PlainCurve:
-    """One curve, one time after the other: a Bezier curve by de Casteljau's construction."""
+    """One curve at one time: a Bezier curve by de Casteljau's construction."""
 
     def __init__(self, channel: Channel) -> None:
         self.times, self.values = channel.times.tolist(), channel.values.tolist()
@@ -103,7 +103,7 @@ def assert_is_the_plain_curve(channels, times):
     assert targets.tolist() == [channel.target for channel in channels]
     wanted = np.array([[PlainCurve(channel)(time) for channel in channels] for time in times])
     wanted = wanted.reshape(len(times), len(channels))
-    # A time so far away has 1e-13 s of rounding; slopes are below a hundred a second.
+    # Such distant times have rounding errors of 1e-13 s; slopes are below 100 per second.
     np.testing.assert_allclose(values, wanted, atol=1e-10, rtol=1e-11)
     for column, channel in enumerate(channels):
         np.testing.assert_array_equal(evaluate(channel, times), values[:, column])
@@ -179,7 +179,7 @@ def test_hours_of_play_do_not_drift(start) -> None:
 
 
 def test_times_an_hour_away_are_not_those_of_float32() -> None:
-    """One frame at 1000 a second moves the value after an hour, as float32 would not."""
+    """After an hour one frame at 1000 per second still changes the value, unlike in float32."""
     curve = Channel(
         0, np.array([0.0, 1.0]), np.array([0.0, 1.0]), (("linear",) * 2,) * 2, ("cycle",) * 2
     )

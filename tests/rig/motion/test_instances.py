@@ -1,4 +1,4 @@
-"""Many actors at once: the same numbers as one by one."""
+"""Many actors at once: the same results as one by one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EXACT = 1e-13  # the same products, summed in another order
 
 
 def moving_skeleton() -> Skeleton:
-    """Two roots, DOFs of all kinds in any order, limits, and a joint without any."""
+    """Two roots, DOFs of all kinds in any order, limits, and a joint without DOFs."""
     dofs = [(0, "tx", 0.3), (0, "z", 0.1), (0, "x", 0.0), (1, "y", 0.2, -0.5, 0.5)]
     dofs += [(2, "tz", 0.0), (2, "tz", 0.1), (2, "x", 0.4), (2, "y", -0.3), (2, "z", 0.0)]
     return skeleton([-1, 0, 1, -1], dofs, offsets=np.arange(12.0).reshape(4, 3))
@@ -89,7 +89,7 @@ def same(first: Actor, second: Actor) -> None:
 
 
 def both_ways(make, time: float, interpolate: bool = False) -> list[Actor]:
-    """Return actors posed together, after holding them to those posed one by one."""
+    """Return actors posed together, after comparing them with actors posed one by one."""
     together, alone = make(), make()
     pose_actors(together, time, interpolate)
     for first, second in zip(together, alone, strict=True):
@@ -149,7 +149,7 @@ def test_frames_pose_actors_together(kind, time, interpolate):
         time,
         interpolate,
     )
-    if time == 1.2 and not interpolate:  # somebody is in the gap, somebody is not
+    if time == 1.2 and not interpolate:  # some actors are in the gap, others are not
         assert {actor.is_present for actor in actors} == {True, False}
 
 

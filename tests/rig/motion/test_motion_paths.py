@@ -1,4 +1,4 @@
-"""Paths of joints and captured points: where, at which times, broken by gaps."""
+"""Paths of joints and captured points: positions, times, and gaps."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUARTER = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]  # about z
 
 
 def two_joints() -> Figure:
-    """Joint 1 is 2 along x from joint 0, which turns about z."""
+    """Joint 1 is at x = 2 from joint 0, which rotates about z."""
     return Figure("f", skeleton=skeleton([-1, 0], [(0, "z", 0.0)], offsets=[[0, 0, 0], [2, 0, 0]]))
 
 
@@ -85,7 +85,7 @@ def test_captures_are_followed_frame_by_frame():
 
 
 def test_long_captures_are_the_same_in_pieces():
-    count = 9000  # more than fit into one piece
+    count = 9000  # more than one batch
     angles = np.linspace(0.0, 20.0, count)
     turns = np.tile(STILL, (count, 2, 1))
     turns[:, 0, 2], turns[:, 0, 3] = np.sin(angles / 2), np.cos(angles / 2)
@@ -112,7 +112,7 @@ def test_points_leave_paths_where_they_were_seen():
     points, _, which = segments(path)
     assert which.tolist() == [0, 1]
     assert points.tolist() == [[[0, 2, 0], [0, 3, 0]], [[0, 0, 0], [1, 0, 0]]]
-    # What was not seen is nowhere, however little is asked for.
+    # Unseen points are absent for any minimum confidence.
     assert motion_path(figure, clip, [0]).present[2, 0] == np.False_
 
 

@@ -1,4 +1,4 @@
-"""A pose as an animation of one frame: where its joints are, what moves it, and what is up."""
+"""A pose as an animation of one frame: joint positions, motion, and up axis."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def set_dof(actor, name, kind, value):
 
 def test_joints_are_where_the_pose_has_them():
     actor = Actor(arm())
-    set_dof(actor, "elbow", 5, np.pi / 2)  # about z: the hand comes to stand above the elbow
+    set_dof(actor, "elbow", 5, np.pi / 2)  # about z: the hand is now above the elbow
     actor.pose.translations[0] = [0.0, 0.0, 3.0]
     actor.pose.figure_translation[:] = [10.0, 0.0, 0.0]
     actor.pose.figure_scale = 2.0
@@ -71,7 +71,7 @@ def test_motion_holds_the_same_frame():
 
 
 def course_rig() -> Figure:
-    """A root that moves and turns; its rotation about y runs from 1.6 to 3 radians only."""
+    """A root that translates and rotates; its rotation about y is limited to 1.6 to 3 radians."""
     limits = np.tile([-np.inf, np.inf], (6, 1))
     limits[4] = 1.6, 3.0
     skeleton = Skeleton(
@@ -89,7 +89,7 @@ def course_rig() -> Figure:
 
 
 def test_rigs_of_keys_get_their_own_numbers_as_keys():
-    # No other angles would do: those that are nearest to zero lie outside of the limits.
+    # Only these angles are possible: those nearest to zero are outside the limits.
     actor = Actor(course_rig())
     actor.pose.dofs[:] = [5.0, 0.0, 0.0, 0.25, 2.5, 0.0]
     animation = single_frame(actor, time=1.5)
@@ -136,7 +136,7 @@ def test_who_hangs_stands_up_unless_the_world_is_kept():
     actor.pose.figure_translation[:] = [0.0, 4.0, 0.5]
     scene = Scene([actor], world_up="y")
     animation, up = upright_single_frame(scene, actor)
-    # Half a turn about x carries y to -y and z to -z.
+    # A rotation by 180 degrees about x maps y to -y and z to -z.
     assert up == "y" and animation.figure is actor.figure
     assert_allclose(places(animation), [[0, -4, -0.5], [1, -4, -0.5], [1, -5, -0.5]], atol=ATOL)
     kept, up = upright_single_frame(scene, actor, keeps_world=True)

@@ -1,4 +1,4 @@
-"""Frames on a timeline: exact on frames, gaps are gaps, ends are held or not."""
+"""Frames on a timeline: exact times, gaps, and held or absent ends."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def located(timing, time, interpolate=False):
     [
         (1.0, (0, 1, 0.0)),
         (1.125, (0, 1, 0.5)),
-        (1.25, (1, 1, 0.0)),  # the next frame is missing: this one lasts until it is due
+        (1.25, (1, 1, 0.0)),  # the next frame is missing: this one is held until then
         (1.4, (1, 1, 0.0)),
         (1.5, (-1, -1, 0.0)),
         (1.99, (-1, -1, 0.0)),

@@ -1,4 +1,4 @@
-"""Which way is up: from bodies, from keypoints, and where nobody shows it."""
+"""Detection of the up axis: from bodies, from keypoints, and without evidence."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def figure(tmp_path_factory):
 
 
 def standing(figure, turns, rows=None):
-    """Return an actor whose pelvis turns in every frame; the model's own up is y."""
+    """Return an actor whose pelvis rotates in every frame; the model's own up axis is y."""
     vectors = np.zeros((len(turns), 1, 3))
     vectors[:, 0] = turns
     timing = Timing(30.0, np.arange(len(turns)) if rows is None else rows)

@@ -1,4 +1,4 @@
-"""Actors on their own, as exporters take them: what is up, and who hangs head down."""
+"""Actors in their own world, as exported: the up axis, and upside-down actors."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def standing(up, placement=None, world_up=None, **parts):
         ("y", "y", 0, ("y", False)),
         ("z", "z", 0, ("z", False)),
         ("y", "z", 0, ("z", False)),  # a body in a capture whose world has z up
-        ("y", "z", 1, ("y", False)),  # stood up beside others: (x, y, z) -> (x, -z, y)
+        ("y", "z", 1, ("y", False)),  # placed upright in the scene: (x, y, z) -> (x, -z, y)
         ("z", "y", -1, ("z", False)),
         ("y", "y", 2, ("y", True)),
         ("y", "z", 2, ("z", True)),

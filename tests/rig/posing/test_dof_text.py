@@ -1,4 +1,4 @@
-"""DOFs in words: degrees as sliders show them, and as many decimals as it takes."""
+"""DOFs as text: degrees as on sliders, with as many decimals as necessary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inverse kinematics: against the two-link arm in closed form, and finite differences."""
+"""Inverse kinematics against the closed form of a two-link arm, and finite differences."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_LIMIT = (-np.inf, np.inf)
 
 
 def arm(limits: dict[int, tuple[float, float]] | None = None) -> Skeleton:
-    """Two links of length 1 along x in the plane: each joint turns about z."""
+    """Two links of length 1 along x in the plane: each joint rotates about z."""
     chosen = limits or {}
     return Skeleton(
         names=("shoulder", "elbow", "hand"),
@@ -34,7 +34,7 @@ def arm(limits: dict[int, tuple[float, float]] | None = None) -> Skeleton:
 
 
 def hand_at(skeleton: Skeleton, dofs: np.ndarray) -> np.ndarray:
-    """Return where the hand is, by trigonometry."""
+    """Return the position of the hand by trigonometry."""
     first, second = dofs
     return np.array(
         [np.cos(first) + np.cos(first + second), np.sin(first) + np.sin(first + second), 0.0]
@@ -50,7 +50,7 @@ def test_arm_reaches_a_place_by_the_law_of_cosines() -> None:
     # |target|^2 = 2 = 2 + 2 cos(elbow), so the elbow is at a right angle.
     assert_allclose(abs(found.dofs[1]), np.pi / 2, atol=1e-5)
     assert_allclose(hand_at(skeleton, found.dofs), [1, 1, 0], atol=1e-6)
-    assert_allclose(pose.dofs, [0.3, 0.4])  # the start is left as it is
+    assert_allclose(pose.dofs, [0.3, 0.4])  # the start is unchanged
 
 
 def test_place_beyond_reach_is_pointed_at_with_a_straight_arm() -> None:
@@ -80,8 +80,8 @@ def test_limit_that_is_reached_is_reported_and_the_other_joint_makes_up_for_it()
     skeleton = arm({1: (0.0, 1.0)})
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.1, 0.5
-    # With the elbow at its limit the hand is sqrt(2 + 2 cos 1) from the shoulder: on the circle
-    # of that radius it can be anywhere, nearer to the shoulder it can't be.
+    # With the elbow at its limit the hand is sqrt(2 + 2 cos 1) from the shoulder. It can reach any
+    # point of that circle, but none nearer to the shoulder.
     radius = np.sqrt(2 + 2 * np.cos(1.0))
     found = reach(skeleton, pose, 2, np.array([0.0, 1.0, 0.0]), rounds=300)
     assert_allclose(found.distance, radius - 1.0, atol=1e-4)

@@ -1,4 +1,4 @@
-"""A joint's DOFs for a rotation: products of matrices written here, limits, and ties."""
+"""A joint's DOFs for a rotation: explicit matrix products, limits, and ties."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 
 def single(axes: str, *limits: tuple[float, float], quaternion=(0, 0, 0, 1)) -> Skeleton:
-    """Return one joint that turns about some axes, the first letter applied first."""
+    """Return one joint that rotates about some axes, the first letter applied first."""
     bounds = np.array([*limits, *([FREE] * (len(axes) - len(limits)))], float).reshape(-1, 2)
     return Skeleton(
         names=("joint",),
@@ -81,14 +81,14 @@ def test_of_two_solutions_the_one_near_the_present_values_is_taken() -> None:
     pose.dofs[:] = 0.1, 2.0, 0.2
     wanted = about(2, 0.25) @ about(1, 2.1) @ about(0, 0.05)
     assert_allclose(nearest_dofs(skeleton, pose, 0, wanted).dofs, [0.05, 2.1, 0.25], atol=1e-9)
-    # Whole turns stay too.
+    # Multiples of 360 degrees are preserved too.
     pose.dofs[:] = 0.1 + 4 * np.pi, 2.0, 0.2
     found = nearest_dofs(skeleton, pose, 0, wanted).dofs
     assert_allclose(found, [0.05 + 4 * np.pi, 2.1, 0.25], atol=1e-9)
 
 
 def test_limits_choose_the_solution_that_they_allow() -> None:
-    # Only y between 1.6 and 2.5 is allowed; the usual angles would have it below pi / 2.
+    # Only y between 1.6 and 2.5 is allowed; the usual solution has y below pi / 2.
     skeleton = single("xyz", FREE, (1.6, 2.5), FREE)
     wanted = about(2, 0.4) @ about(1, 2.2) @ about(0, -0.3)
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, wanted)

@@ -1,4 +1,4 @@
-"""A pose on its own: DOFs by name, own numbers, parts by smplx's names, shape and place."""
+"""Pose records: DOFs by name, the model's own numbers, smplx's parts, shape and placement."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def applied(figure: Figure, **words) -> tuple[np.ndarray, list[str]]:
 
 
 def refusal(figure: Figure, **words) -> str:
-    """Return why a record is refused, after a look whether the pose is as it was."""
+    """Return the refusal of a record, after checking that the pose is unchanged."""
     pose = figure_pose(figure)
     pose.dofs[:] = 0.125
     before = pose_key(pose)
@@ -95,7 +95,8 @@ def test_figure_without_skeleton_is_refused():
     figure = Figure("bust", mesh([[0, 0, 0]]))
     with pytest.raises(RigError) as caught:
         apply_record(PoseRecord(), figure, rest_pose(skeleton([-1])))
-    assert str(caught.value) == "figure bust has no skeleton to pose"
+    assert caught.value.diagnostic.key == "F004.pose"
+    assert caught.value.diagnostic.values == {"figure": "bust"}
 
 
 @pytest.mark.parametrize("kind", ["smpl", "smplh", "smplx", "mano", "flame"])
@@ -195,7 +196,7 @@ def test_body_pose_begins_after_the_root(family):
     assert not found[0].any()
     assert not found[22:].any()
     assert notes == []
-    # SMPL's own has the two hands as well.
+    # SMPL's own vector has the two hands as well.
     wanted = np.random.default_rng(3).uniform(-1, 1, (23, 3))
     assert_allclose(applied(family("smpl"), parts={"body_pose": wanted})[0][1:], wanted, atol=1e-13)
 
@@ -255,7 +256,7 @@ def test_few_numbers_are_coefficients(family, kind, side, first, flat):
     part = f"{side}_hand_pose" if side else "hand_pose"
     weights = np.array([0.5, -0.25, 0.125])
     expected = 0.5 * components[0] - 0.25 * components[1] + 0.125 * components[2]
-    if not flat:  # said so or not said
+    if not flat:  # stated or not stated
         expected = expected + mean
     found, _ = applied(family(kind), parts={part: weights}, flat_hands=flat)
     assert_allclose(found[first : first + 15].ravel(), expected, atol=1e-13)

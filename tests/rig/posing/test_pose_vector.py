@@ -1,4 +1,4 @@
-"""A model's own pose numbers: rotation vectors or z-y-x angles, to a pose and back."""
+"""A model's own pose vectors: rotation vectors or z-y-x angles, to a pose and back."""
 
 from dataclasses import replace
 
@@ -52,7 +52,7 @@ def test_pig_root_is_turned_about_x_then_y_then_z():
     vector = np.arange(16) / 10.0
     pose = posed(PIG, vector)
     found = joint_rotations(BALLS, pose)
-    # The first number turns about z: R = Rz(0.3) Ry(0.4) Rx(0.5).
+    # The first number rotates about z: R = Rz(0.3) Ry(0.4) Rx(0.5).
     assert_allclose(found[0], turn_z(0.3) @ turn_y(0.4) @ turn_x(0.5), atol=1e-15)
     for joint in (1, 2, 3):
         assert_allclose(found[joint], about(vector[3 + 3 * joint : 6 + 3 * joint]), atol=1e-13)
@@ -103,7 +103,7 @@ def test_numbers_may_be_in_another_order_than_the_joints():
 def test_model_without_layout_takes_its_dofs():
     bones = skeleton([-1, 0], [(0, "tx", 0.0), (1, "z", 0.0, -1.0, 1.0)])
     pose = posed(None, [3.0, 2.0], bones)
-    assert pose.dofs.tolist() == [3.0, 1.0]  # brought within its limits
+    assert pose.dofs.tolist() == [3.0, 1.0]  # clamped to its limits
     written = write_vector(None, bones, pose)
     assert written.tolist() == [3.0, 1.0]
     written[0] = 9.0  # the caller's own copy

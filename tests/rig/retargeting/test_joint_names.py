@@ -1,4 +1,4 @@
-"""Names of joints, from many programs, and plain names."""
+"""Joint names of many programs, and plain names."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.rig.smpl_family import FAMILY
 
 
 def tree(text: str) -> tuple[list[str], list[str], np.ndarray]:
-    """Return names, what each should mean ("-" for nothing) and parents of an indented list."""
+    """Return names, their expected meanings ("-" for none) and parents of an indented list."""
     names, meanings, parents, above = [], [], [], []
     for line in text.strip("\n").split("\n"):
         depth = len(line) - len(line.lstrip())

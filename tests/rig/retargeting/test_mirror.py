@@ -1,4 +1,4 @@
-"""Mirrored poses: what was left is right, vertex by vertex, on a figure that is symmetric."""
+"""Mirrored poses of symmetric figures: left and right are exchanged, vertex by vertex."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
 
+from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.pose import joint_rotations, rest_pose
@@ -30,7 +31,7 @@ NAMES = (
 PARENTS = np.array([-1, 0, 1, 1, 2, 3, 4, 5, 0, 0])
 PARTNERS = [0, 1, 3, 2, 5, 4, 7, 6, 9, 8]
 LEFT, RIGHT = [2, 4, 6, 8], [3, 5, 7, 9]
-# Across, up and to the front; the mirror turns the first number.
+# Across, up and to the front; mirroring negates the first number.
 PLACES = np.zeros((10, 3))
 PLACES[1] = 0.0, 1.0, 0.1
 PLACES[LEFT] = [[0.3, 1.2, 0.1], [0.8, 1.1, 0.0], [1.3, 1.1, 0.3], [0.2, -0.2, 0.0]]
@@ -46,7 +47,7 @@ def symmetric_figure(axis=0, up="y", with_map=True) -> Figure:
     influences = [[(int(j), float(w)) for j, w in rows] for rows in _rows(rng, 20)]
     mirrored = [[(PARTNERS[j], w) for j, w in pairs] for pairs in influences]
     middle = [[(0, 0.5), (1, 0.5)], [(0, 1.0)], [(2, 0.5), (3, 0.5)], [(6, 0.3), (7, 0.3)]]
-    order = [0, 1, 2] if axis == 0 else [2, 0, 1]  # where across, up and front go
+    order = [0, 1, 2] if axis == 0 else [2, 0, 1]  # axes of across, up and front
     joints = PLACES[:, order]
     bind = np.array([matrix(None, -place) for place in joints])
     return Figure(
@@ -95,10 +96,10 @@ def test_bent_left_elbow_becomes_a_bent_right_elbow():
     pose.dofs[3 * 4 : 3 * 4 + 3] = 0.3, 0.5, -0.7
     mirrored = mirror_pose(figure, pose)
     expected = np.zeros(30)
-    # In a mirror across x turns about x stay, those about y and z are reversed.
+    # Mirroring across x preserves rotations about x and reverses those about y and z.
     expected[3 * 5 : 3 * 5 + 3] = 0.3, -0.5, 0.7
     assert_allclose(mirrored.dofs, expected, atol=1e-15)
-    assert pose.dofs[12] == 0.3  # left as it was
+    assert pose.dofs[12] == 0.3  # unchanged
 
 
 @pytest.mark.parametrize(("axis", "up"), [(0, "y"), (1, "z")])
@@ -125,7 +126,7 @@ def test_mirrored_rest_pose_is_the_rest_pose():
 
 
 def turned_figure(uneven=True) -> Figure:
-    """Return the same figure with joint frames that are turned, on both sides in their own way."""
+    """Return the same figure with rotated joint frames, differently on the two sides."""
     figure = symmetric_figure()
     rng = np.random.default_rng(5)
     quaternions = rng.normal(size=(10, 4)) if uneven else np.tile([0, 0, 0, 1.0], (10, 1))
@@ -238,32 +239,33 @@ def test_asymmetry_needs_a_map():
     assert str(caught.value) == "figure twin has no symmetry map"
 
 
-def refused(figure) -> str:
+def refused(figure):
     with pytest.raises(RigError) as caught:
         mirror_pose(figure, rest_pose(figure.skeleton))
-    return str(caught.value)
+    return caught.value.diagnostic.key, caught.value.diagnostic.values["joint"]
 
 
 def test_skeleton_that_is_not_symmetric_is_refused():
     places = PLACES.copy()
     places[5, 1] += 0.2
     bones = ball_skeleton(NAMES, PARENTS, places)
-    message = " has no partner on the other side: the skeleton is not symmetric"
-    assert refused(Figure("bent", skeleton=bones)) == f"l_elbow{message}"
+    assert refused(Figure("bent", skeleton=bones)) == ("F004.asymmetric", "l_elbow")
     lone = skeleton([-1, 0], offsets=[[0, 0, 0], [1, 0, 0]], names=["hips", "l_arm"])
-    assert refused(Figure("lone", skeleton=lone)) == f"l_arm{message}"
+    assert refused(Figure("lone", skeleton=lone)) == ("F004.asymmetric", "l_arm")
 
 
 def test_two_joints_for_one_partner_are_refused():
     places = [[0.0, 0, 0], [1, 0, 0], [1.01, 0, 0], [-1, 0, 0]]
     bones = ball_skeleton(("a", "b", "c", "d"), np.array([-1, 0, 0, 0]), np.array(places))
-    assert refused(Figure("double", skeleton=bones)).endswith("the skeleton is not symmetric")
+    key, joint = refused(Figure("double", skeleton=bones))
+    assert (key, joint) == ("F004.asymmetric", Phrase("two-joints"))
 
 
 def test_figure_without_skeleton_is_refused():
     with pytest.raises(RigError) as caught:
         joint_partners(Figure("bust", mesh([[0, 0, 0]])))
-    assert str(caught.value) == "figure bust has no skeleton to mirror"
+    assert caught.value.diagnostic.key == "F004.mirror"
+    assert caught.value.diagnostic.values == {"figure": "bust"}
 
 
 def test_mirrored_turn_of_the_hips_is_the_mirror_image_of_the_turn():

@@ -1,4 +1,4 @@
-"""Poses carried between figures: other DOF orders, rest rotations, up axes, joints in between."""
+"""Transfer of poses between figures with other DOF orders, rest rotations, up axes and joints."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 
 def figure(names, orders, name="one", up="y", rest=None, limits=None, parents=None) -> Figure:
-    """Return a chain of joints; each turns about the axes of its word, the first applied first."""
+    """Return a chain of joints; each rotates about its axes, the first applied first."""
     dofs = [(joint, "xyz".index(axis)) for joint, word in enumerate(orders) for axis in word]
     count = len(names)
     bounds = np.tile([-np.inf, np.inf], (len(dofs), 1)) if limits is None else np.array(limits)
@@ -83,7 +83,7 @@ def test_other_order_of_dofs_gets_the_same_rotation() -> None:
 
 
 def test_labels_alone_would_give_another_pose() -> None:
-    # What is carried is the rotation: the numbers under the same labels differ.
+    # The rotation is transferred: the values of the DOFs of the same names differ.
     one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
     pose, _ = transfer_pose(one, posed(one, 0.5, 0.6, 0.7), other, rest_pose(other.skeleton))
     z, y, x = pose.dofs
@@ -101,7 +101,7 @@ def test_joints_that_are_missing_are_named_in_one_line_and_others_stay() -> None
 
 
 def test_joint_in_between_is_folded_in() -> None:
-    # The other's "b" hangs on an extra joint that stays turned by 0.3: b makes up for it.
+    # The other's "b" is the child of an extra joint rotated by 0.3, for which b compensates.
     one = figure(["a", "b"], ["xyz", "xyz"])
     other = figure(["a", "extra", "b"], ["xyz"] * 3, "other")
     start = posed(other, 0, 0, 0, 0, 0, 0.3, 0, 0, 0)
@@ -110,8 +110,8 @@ def test_joint_in_between_is_folded_in() -> None:
 
 
 def test_rest_rotations_may_differ() -> None:
-    # The other's joint rests a quarter turn about x: what turns about the world's y turns it
-    # about its own -z, as Rx(-90) y = -z.
+    # The other's joint has a rest rotation of 90 degrees about x: a rotation about the world's y is
+    # one about its own -z, as Rx(-90) y = -z.
     one = figure("a", ["xyz"])
     other = figure("a", ["xyz"], "other", rest=[[HALF, 0, 0, HALF]])
     pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
@@ -120,7 +120,7 @@ def test_rest_rotations_may_differ() -> None:
 
 
 def test_up_axes_may_differ() -> None:
-    # Turned about the way up: y of the one is z of the other.
+    # A rotation about the up axis: y of the one is z of the other.
     one, other = figure("a", ["xyz"]), figure("a", ["xyz"], "other", up="z")
     pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
     assert_allclose(pose.dofs, [0, 0, 0.4], atol=1e-12)
@@ -154,7 +154,8 @@ def test_nothing_in_common_is_refused() -> None:
     one, other = figure("ab", ["xyz", "x"], "cat"), figure("cd", ["x", "x"], "man")
     with pytest.raises(RigError) as caught:
         transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
-    assert str(caught.value) == "cat and man have no joint name in common"
+    assert caught.value.diagnostic.key == "F004.no-common-joint"
+    assert caught.value.diagnostic.values == {"pose": "cat", "figure": "man"}
 
 
 def test_repeated_and_empty_names_match_nothing() -> None:
@@ -184,7 +185,7 @@ def test_long_lists_are_cut() -> None:
 
 
 def test_turns_are_those_of_the_figures_axes() -> None:
-    # The second joint turns about x within a parent turned about z: in all Rz(0.5) Rx(0.3).
+    # The second joint rotates about x, its parent about z: the product is Rz(0.5) Rx(0.3).
     one = figure("ab", ["z", "x"])
     turns = relative_rotations(one, posed(one, 0.5, 0.3))
     assert_allclose(turns.relative[0], [0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-12)
@@ -194,7 +195,7 @@ def test_turns_are_those_of_the_figures_axes() -> None:
 
 
 def test_record_of_the_same_dofs_brings_back_what_lies_beneath_them() -> None:
-    # A motion turned the hinge "b" about y too, and moved it.
+    # A motion has also rotated the hinge "b" about y, and moved it.
     one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
     pose = posed(one, 0.1, 0.2, 0.3, 0.4)
     pose.rotations[1] = 0.0, np.sin(0.35), 0.0, np.cos(0.35)
@@ -228,7 +229,8 @@ def test_refused_record_leaves_the_pose() -> None:
     before = pose_key(found)
     with pytest.raises(RigError) as caught:
         apply_record(record_of(one, rest_pose(one.skeleton)), other, found)
-    assert str(caught.value) == "cat and man have no joint name in common"
+    assert caught.value.diagnostic.key == "F004.no-common-joint"
+    assert caught.value.diagnostic.values == {"pose": "cat", "figure": "man"}
     assert pose_key(found) == before
 
 
@@ -252,7 +254,7 @@ def test_edited_dofs_count_and_not_the_turns_beside_them() -> None:
     assert found.dofs.tolist() == [0.1, -0.5, 0.3, 0.25]
     assert found.rotations.tolist() == [[0, 0, 0, 1], [HALF, 0, 0, HALF]]
     assert not found.translations.any()
-    # Rx(90) Rx(0.25) within the parent: the edit is seen in full.
+    # Rx(90) Rx(0.25) relative to the parent: the edit has its full effect.
     turned = about(0, np.pi / 2 + 0.25)
     assert_allclose(joint_rotations(one.skeleton, found)[1], turned, atol=1e-12)
 
@@ -293,14 +295,14 @@ def test_part_of_a_record_brings_what_it_says_of_what_lies_beneath() -> None:
 
 
 def test_lists_that_do_not_fit_the_skeleton_go_by_name() -> None:
-    # Somebody took a joint out of the file's lists, and left the word that tells its DOFs.
+    # A joint was removed from the file's lists, but the digest of the DOFs was kept.
     one = figure("ab", ["xyz", "x"], "cat")
     record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
-    named = record.turns
+    named = record.joint_rotations
     turns = replace(named, names=("a",), relative=named.relative[:1], shifts=named.shifts[:1],
                     rotations=np.array([[0, 0, 0, 1.0]]))  # fmt: skip
     found = posed(one, 0, 0, 0, 0.3)
-    notes = apply_record(replace(record, turns=turns), one, found)
+    notes = apply_record(replace(record, joint_rotations=turns), one, found)
     assert lines(notes) == ["transferred 1 of 1 joints of cat"]
     assert_allclose(found.dofs, [0.1, 0, 0, 0.3], atol=1e-12)
 
@@ -314,7 +316,7 @@ def shaped(fig: Figure, shapes: int, expressions: int = 0) -> Figure:
 
 
 def body_pose(fig: Figure):
-    """Return a pose of a body with four shapes and two expressions, put somewhere."""
+    """Return a pose of a body with four shapes and two expressions, and a placement."""
     pose = posed(fig, 0.1, 0.2, 0.3, 0.4)
     pose.figure_translation[:] = 0, 1, 2
     pose.figure_scale = 1.2

@@ -1,4 +1,4 @@
-"""Scalar quantities of strain: a square whose corners slide, in closed form."""
+"""Scalar quantities of strain of a square whose corners slide, against closed forms."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_stretch_is_the_edge_that_changes_most():
 
 
 def test_stretch_keeps_its_sign_where_edges_differ():
-    # Vertex 1 and 2 move up by 0.5 as joint 1 turns about x by 60 degrees: y of 2 halves.
+    # Vertices 1 and 2 move up by 0.5 and joint 1 rotates about x by 60 degrees: y of 2 halves.
     def change(pose):
         pose.dofs[1] = np.pi / 3
 
@@ -113,6 +113,6 @@ def test_edges_and_triangles_without_size_do_not_count():
     skin = skin_from_lists(rows, np.tile(np.eye(4), (2, 1, 1)))
     shape = mesh(corners, triangles=[[0, 1, 3], [1, 2, 1], [1, 2, 2]])
     figure = Figure("flat", shape, square().skeleton, skin)
-    # Corner 2 leaves corner 1: an edge from length 0 has no ratio.
+    # Corner 2 leaves corner 1: an edge of rest length 0 has no ratio.
     for name in ("stretch", "stretch-mean", "area"):
         assert found(name, 1.0, figure).tolist() == [0] * 4

@@ -1,4 +1,4 @@
-"""Scalar quantities: lengths per vertex, each worked out by hand on a few points."""
+"""Scalar quantities of a few points, worked out by hand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ POINTS = [[0.0, 3, 4], [0.0, 3, 4], [1.0, 1, 1]]
 
 
 def sliding(influences, **parts) -> Figure:
-    """Return three points bound to six joints that slide along x and turn about x."""
+    """Return three points bound to six joints that translate along x and rotate about x."""
     dofs = [(joint, kind, 0.0) for joint in range(6) for kind in ("tx", "x")]
     bones = skeleton([-1] * 6, dofs)
     skin = skin_from_lists(influences, np.tile(np.eye(4), (6, 1, 1)))
@@ -52,7 +52,7 @@ def test_cut_is_the_distance_to_four_influences():
     # Six equal sixths; the last two joints move by 6: one unit each is lost.
     sixths = [(joint, 1 / 6) for joint in range(6)]
     figure = sliding([sixths, [(5, 1.0)], []])
-    found = compute("cut", figure, slid(figure, 0, 0, 0, 0, 6, 6), Skinning())
+    found = compute("pruning", figure, slid(figure, 0, 0, 0, 0, 6, 6), Skinning())
     assert_allclose(found, [2.0, 0, 0], atol=1e-14)
 
 
@@ -61,7 +61,7 @@ def test_cut_follows_the_chosen_number_of_influences():
     pose = slid(figure, 4, 0, 0)
     # With one influence 4 instead of 2; with two 4 * 2/3; with three nothing is cut.
     for count, expected in ((1, 2.0), (2, 4 * 2 / 3 - 2), (3, 0.0)):
-        found = compute("cut", figure, pose, Skinning(max_influences=count))
+        found = compute("pruning", figure, pose, Skinning(max_influences=count))
         assert_allclose(found, [expected, 0, 0], atol=1e-14)
 
 
@@ -102,7 +102,7 @@ def test_asymmetry_of_a_posed_figure():
     figure = sliding([[(0, 1.0)], [(1, 1.0)], [(2, 1.0)]], symmetry=np.array([1, 0, 2]))
     figure = replace(figure, mesh=mesh(points))
     assert compute("asymmetry", figure, slid(figure), Skinning()).tolist() == [0, 0, 0]
-    # Both sides outwards by one is symmetric, one side alone is not; the middle counts twice.
+    # Moving both sides outwards by 1 is symmetric, one side alone is not; the middle counts twice.
     assert compute("asymmetry", figure, slid(figure, 1, -1), Skinning()).tolist() == [0, 0, 0]
     assert compute("asymmetry", figure, slid(figure, 1, 0, 0.5), Skinning()).tolist() == [1, 1, 1]
 
@@ -164,8 +164,8 @@ def test_unknown_quantity_is_refused():
 @pytest.mark.parametrize(
     ("name", "low", "high", "ends"),
     [
-        ("cut", 0.25, 2.0, (0.0, 2.0)),
-        ("cut", 0.0, 0.0, (0.0, 1.0)),
+        ("pruning", 0.25, 2.0, (0.0, 2.0)),
+        ("pruning", 0.0, 0.0, (0.0, 1.0)),
         ("weight", 0.0, 0.4, (0.0, 1.0)),
         ("weight", -0.5, 1.5, (-0.5, 1.5)),
         ("stretch", -50.0, 20.0, (-50.0, 50.0)),
@@ -261,9 +261,12 @@ def test_what_a_figure_lacks_for_the_weight_of_a_joint():
 
 def test_units_of_views():
     figure = sliding([[]] * 3, unit="m")
-    found = {name: shown_unit(name, figure) for name in ("cut", "stretch", "entropy", "weight")}
+    found = {name: shown_unit(name, figure) for name in ("pruning", "stretch", "entropy", "weight")}
     assert found == {
-        "cut": (1000.0, "mm"), "stretch": (1.0, "%"), "entropy": (1.0, "bits"), "weight": (1.0, "")
+        "pruning": (1000.0, "mm"),
+        "stretch": (1.0, "%"),
+        "entropy": (1.0, "bits"),
+        "weight": (1.0, ""),
     }  # fmt: skip
 
 
@@ -308,7 +311,7 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
 
 def test_titles_tell_how_many_influences_are_kept():
     figure = sliding([[(0, 1.0)]] * 3)
-    assert quantity_title("cut", figure, Skinning()) == "Distance to 4 influences"
-    assert menu_title("cut", Skinning(max_influences=1)) == "Distance to 1 influence"
-    assert menu_title("cut", Skinning(max_influences=8)) == "Distance to 8 influences"
+    assert quantity_title("pruning", figure, Skinning()) == "Distance to 4 influences"
+    assert menu_title("pruning", Skinning(max_influences=1)) == "Distance to 1 influence"
+    assert menu_title("pruning", Skinning(max_influences=8)) == "Distance to 8 influences"
     assert menu_title("entropy", Skinning(max_influences=8)) == "Entropy of weights"

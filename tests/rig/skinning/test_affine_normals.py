@@ -1,4 +1,4 @@
-"""Normals under joints that scale, shear or mirror, held to closed forms."""
+"""Normals under joints that scale, shear or reflect, against closed forms."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Linear blending in dense blocks: held to the plain sum, at every size and for many frames."""
+"""Linear blending in dense blocks against the plain sum, for all sizes and many frames."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ ROUNDING = 2e-14  # sums of some ten terms of size 10
 
 
 def random_skin(seed, n_vertices, n_joints, most=6):
-    """Return influences with repeats, negative weights, and vertices that nothing moves."""
+    """Return influences with repeats, negative weights, and vertices without influence."""
     rng = np.random.default_rng(seed)
     influences = [
         [
@@ -166,7 +166,7 @@ def test_many_frames_need_poses_a_skin_and_linear_blending():
 
 
 def test_place_of_the_figure_comes_after_raw_weights():
-    # Weights sum to 0.5: half way to the origin, then twice as large, then one to the right.
+    # Weights sum to 0.5: halfway to the origin, then scaled by 2, then moved by 1 along x.
     bones = skeleton([-1], [(0, "z", 0.0)])
     skin = skin_from_lists([[(0, 0.5)]], np.eye(4)[None])
     figure = Figure("point", Mesh([[2.0, 4, 6]], [[0, 0, 1.0]], np.zeros((0, 3), int)), bones, skin)
@@ -175,7 +175,7 @@ def test_place_of_the_figure_comes_after_raw_weights():
     assert deform(figure, pose)[0].tolist() == [[3, 4, 6]]
     assert deform(figure, pose, Skinning(normalize=True))[0].tolist() == [[5, 8, 12]]
     assert deform_frames(figure, [pose])[0].tolist() == [[3, 4, 6]]
-    # Normals take no scale.
+    # Normals are not scaled.
     assert deform(figure, pose)[1].tolist() == [[0, 0, 1]]
 
 

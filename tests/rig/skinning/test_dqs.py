@@ -1,4 +1,4 @@
-"""Dual quaternion skinning: its laws, and closed forms of what it blends."""
+"""Dual quaternion skinning: its invariants, and closed forms of its results."""
 
 from dataclasses import replace
 
@@ -86,7 +86,7 @@ def test_twist_keeps_the_radius_where_linear_blending_collapses(degrees):
     around = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     for a in around:
         point, pairs = (0.3, np.cos(a), np.sin(a)), [(0, 0.5), (1, 0.5)]
-        # Half way between two turns about x: the turn by half the angle.
+        # Halfway between two rotations about x: the rotation by half the angle.
         half = turn_x(angle / 2) @ point
         moved, turned = move(point, pairs, palette, normal=(0, np.cos(a), np.sin(a)))
         assert_allclose(moved, half, atol=ROUNDING)
@@ -106,10 +106,10 @@ def test_half_a_turn_keeps_the_radius():
 
 
 def middle_screw(first, second):
-    """Return the motion half way along the screw from one rigid motion to another.
+    """Return the motion halfway along the screw from one rigid motion to another.
 
-    Independent of quaternions: the relative motion is the turn by ``angle`` about an axis through
-    a point and the slide along it; half of it is half the turn and half the slide.
+    Independent of quaternions: the relative motion is a rotation by ``angle`` about an axis through
+    a point and a translation along it; half of it is half the rotation and half the translation.
     """
     relative = second @ np.linalg.inv(first)
     turn, shift = relative[:3, :3], relative[:3, 3]
@@ -135,7 +135,7 @@ def test_equal_weights_of_two_joints_meet_half_way_along_the_screw(seed):
 
 
 def test_result_does_not_depend_on_the_origin():
-    """Blending is about the screw: moving everything along moves the result along."""
+    """Blending follows the screw motion: moving everything moves the result equally."""
     rng = np.random.default_rng(3)
     palette, shift = random_rigid(rng, 3), matrix(turn_y(1.0), (10, -20, 5))
     pairs, point = [(0, 0.2), (1, 0.5), (2, 0.3)], rng.normal(size=3)
@@ -147,7 +147,7 @@ def test_result_does_not_depend_on_the_origin():
 
 @pytest.mark.parametrize("angle", [2.0, 3.0, 3.5, 5.0, 6.2])
 def test_turns_take_the_shorter_way(angle):
-    """Joints at angle and angle + 0.4: the mean turn is angle + 0.2, wherever w changes sign."""
+    """Joints at angle and angle + 0.4: the mean is angle + 0.2, regardless of the sign of w."""
     palette = [matrix(turn_y(angle)), matrix(turn_y(angle + 0.4))]
     for pairs in ([(0, 0.5), (1, 0.5)], [(1, 0.5), (0, 0.5)]):
         moved, _ = move((1, 2, 3), pairs, palette)
@@ -164,7 +164,7 @@ def test_chain_turned_by_more_than_half_a_turn_blends_across_its_last_joint():
 
 
 def test_side_is_that_of_the_strongest_influence():
-    # 0, 100 and 200 degrees about z, most at 100: 0 and 200 are both nearer than half a turn.
+    # 0, 100 and 200 degrees about z, most at 100: 0 and 200 both differ by less than 180.
     angles = np.radians([0.0, 100.0, 200.0])
     palette = [matrix(turn_z(angle)) for angle in angles]
     weights = [0.25, 0.5, 0.25]

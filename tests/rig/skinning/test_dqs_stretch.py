@@ -1,4 +1,4 @@
-"""Dual quaternion skinning of joints that scale, shear or mirror: two phases."""
+"""Two-phase dual quaternion skinning of joints that scale, shear or reflect."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ BIND = np.array([matrix(None, place) for place in PLACES])
 
 
 def scaled(factors, turn=None, move=(0.0, 0.0, 0.0)):
-    """Return the matrix that scales along the axes, then turns, then moves."""
+    """Return the matrix that scales along the axes, then rotates, then translates."""
     turn = np.eye(3) if turn is None else turn
     return matrix(turn @ np.diag(np.broadcast_to(factors, 3)), move)
 
@@ -44,7 +44,8 @@ def test_one_influence_is_the_affine_map(motion, joint):
     palette[joint] = motion
     moved, turned = moved_by(palette, [(joint, 1.0)])
     assert_allclose(moved, POINTS @ motion[:3, :3].T + motion[:3, 3], atol=1e-13)
-    # Exact normals are those of |det(M)| M^-T, by cofactors, which flattening leaves finite.
+    # Exact normals are those of |det(M)| M^-T, by cofactors, which stay finite for flattening
+    # matrices.
     a, b, c = motion[:3, :3].T
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     exact = (-1.0 if np.linalg.det(motion) < 0.0 else 1.0) * NORMALS @ cofactors.T
@@ -53,7 +54,7 @@ def test_one_influence_is_the_affine_map(motion, joint):
 
 @pytest.mark.parametrize("factor", [0.2, 2.0, -1.5])
 def test_figure_scaled_as_a_whole_equals_linear_blending(factor):
-    """Every joint carries the same map: any weights must give it, whatever the places."""
+    """All joints have the same map, so any weights must give it, at any position."""
     motion = scaled(factor, turn_x(0.9) @ turn_z(2.0), (5, -1, 2))
     moved, _ = moved_by([motion] * 3, [(0, 0.2), (1, 0.5), (2, 0.3)])
     assert_allclose(moved, POINTS @ motion[:3, :3].T + motion[:3, 3], atol=1e-13)
@@ -78,14 +79,14 @@ def test_scaled_root_scales_the_whole_figure(factors):
 
 
 def test_two_scales_blend_linearly_without_rotation():
-    # Stretches about the joints' own places: 0.5 (2 x) + 0.5 (4 (x - c) + c).
+    # Stretches about the joints' own positions: 0.5 (2 x) + 0.5 (4 (x - c) + c).
     palette = [scaled(2.0), matrix(4.0 * np.eye(3), -3.0 * PLACES[1]), np.eye(4)]
     moved, _ = moved_by(palette, [(0, 0.5), (1, 0.5)])
     assert_allclose(moved, POINTS + 2.0 * POINTS - 1.5 * PLACES[1], atol=1e-13)
 
 
 def test_scale_and_twist_keep_the_scaled_radius():
-    """A tube bound at x = 0 to two joints of scale 2, one of them turned by 170 degrees."""
+    """A tube bound at x = 0 to two joints of scale 2, one of them rotated by 170 degrees."""
     angle = np.radians(170)
     palette = [scaled(2.0), scaled(2.0, turn_x(angle)), np.eye(4)]
     skin = skin_from_lists([[(0, 0.5), (1, 0.5)]], np.tile(np.eye(4), (3, 1, 1)))
@@ -106,7 +107,7 @@ def test_stretch_of_a_turned_joint_is_blended_before_the_turn():
 
 
 def test_binding_with_scale_and_shear_is_part_of_the_map():
-    """Only the product M counts: a sheared binding that the pose undoes leaves the mesh alone."""
+    """Only the product M counts: a sheared binding cancelled by the pose changes nothing."""
     rng = np.random.default_rng(3)
     bind = np.tile(np.eye(4), (3, 1, 1))
     bind[:, :3] += 0.3 * rng.normal(size=(3, 3, 4))

@@ -114,7 +114,8 @@ def test_thousands_of_influences_all_count():
     positions, _ = skinned(pairs)
     share = 2500 / 4096
     expected = share * (RIGID[0] @ [1, 2, 3, 1]) + share * (RIGID[1] @ [1, 2, 3, 1])
-    assert_allclose(positions[0], expected[:3], atol=1e-13)  # 5,000 roundings of numbers near 1e-3
+    # 5,000 rounding errors of numbers near 1e-3.
+    assert_allclose(positions[0], expected[:3], atol=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(8))

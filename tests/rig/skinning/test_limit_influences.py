@@ -1,4 +1,4 @@
-"""Skins as engines with few influences take them: merged, sorted, cut, scaled."""
+"""Skins for engines with few influences: merged, sorted, pruned, scaled."""
 
 import numpy as np
 import pytest

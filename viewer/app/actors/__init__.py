@@ -1,1 +1,1 @@
-"""Actors: the figures of the scene, and a camera that follows one."""
+"""Actors: visibility, colour and placement of figures, and a camera that follows one."""

@@ -23,7 +23,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["draw"]
 
-_PLAIN = (0.75, 0.72, 0.68)  # shown by the colour button of actors without a colour of their own
+_PLAIN = (0.75, 0.72, 0.68)  # colour of the button of actors without a colour
 _LOOK = (
     imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.float
 )
@@ -82,15 +82,15 @@ def _draw_place(state: AppState, actor: Actor) -> None:
     """Draw the start time and position of the chosen actor."""
     if actor.clip is not None:
         shown = plain_zero(actor.offset, "%.3f s")
-        changed, value = imgui.drag_float("Starts at", shown, 0.01, 0.0, 0.0, "%.3f s")
-        note_item(state, "Starts at")
+        changed, value = imgui.drag_float("Start time", shown, 0.01, 0.0, 0.0, "%.3f s")
+        note_item(state, "Start time")
         if changed and abs(value) < 1e6:
             actor.offset = value
-        explain("when its motion starts on the scene's clock, seconds")
+        explain("time of the scene at which the actor's motion starts, seconds")
     size = box_size(state.box) or 1.0
     place = [plain_zero(part, "%.3f") for part in actor.placement[:3, 3].tolist()]
-    changed, moved = imgui.drag_float3("Stands at", place, 0.002 * size, 0.0, 0.0, "%.3f")
-    note_item(state, "Stands at")
+    changed, moved = imgui.drag_float3("Position", place, 0.002 * size, 0.0, 0.0, "%.3f")
+    note_item(state, "Position")
     if changed and all(abs(value) < 1e6 * size for value in moved):
         placement = actor.placement.copy()
         kept = np.array(place, dtype=np.float32) == np.array(moved, dtype=np.float32)
@@ -99,7 +99,7 @@ def _draw_place(state: AppState, actor: Actor) -> None:
 
 
 def _draw_following(state: AppState) -> None:
-    """Draw the choice of what the camera follows: the chosen actor, a joint or none."""
+    """Draw the choice of the camera's target: the chosen actor, its selected joint or none."""
     imgui.text_unformatted("Camera follows")
     same_line_if_room("Actor")
     target = state.of(Following).target

@@ -19,11 +19,11 @@ class Following:
     Attributes
     ----------
     target : (int, int) or None
-        The actor, and the joint of it (-1 for its middle).
+        Indices of an actor and of its joint; joint -1 for the actor's centre.
     place : (3,) or None
-        Its position when the camera was last moved.
+        Position of the target when the camera was last moved.
     n_posed : int
-        Value of the clock's ``n_posed`` then.
+        Value of the clock's ``n_posed`` at that time.
     """
 
     target: tuple[int, int] | None = None
@@ -34,7 +34,7 @@ class Following:
 def follow_actor(state: AppState) -> None:
     """Keep the camera's target on the followed actor or joint at the same distance.
 
-    Only the clock moves the camera: while a pose is edited by hand, the camera stands still.
+    Only the clock moves the camera: it stands still while a pose is edited by hand.
     """
     following, n_posed = state.of(Following), state.clock.n_posed
     if following.target is None or following.n_posed == n_posed:
@@ -51,7 +51,7 @@ def follow_actor(state: AppState) -> None:
 
 
 def start_following(state: AppState, actor: int, joint: int) -> None:
-    """Let the camera follow an actor's joint, or its middle (-1), from its current position."""
+    """Let the camera follow an actor's joint, or its centre (-1), from its current position."""
     following = state.of(Following)
     state.framing.is_fitting = False
     following.target = actor, joint

@@ -32,14 +32,14 @@ class PosedFor(NamedTuple):
     ----------
     time : float
         Seconds.
-    fill_gaps : bool
+    interpolate_gaps : bool
         Whether captures are interpolated in their gaps.
     clips : tuple
         Clip and offset of each actor; clips are replaced, never changed.
     """
 
     time: float
-    fill_gaps: bool
+    interpolate_gaps: bool
     clips: tuple[object, ...]
 
 
@@ -74,7 +74,7 @@ class Clock:
         Frames per second for scenes without sampled motion: keyed clips have no rate of their own.
     has_frames : bool
         Whether some motion is sampled: each frame is then shown for its whole duration.
-    fill_gaps : bool
+    interpolate_gaps : bool
         Whether captures are interpolated in their gaps.
     has_motion : bool
         Whether any actor has a motion.
@@ -96,7 +96,7 @@ class Clock:
     keyed_rate: float = DEFAULT_RATE
     first_frame: int = 0
     has_frames: bool = False
-    fill_gaps: bool = False
+    interpolate_gaps: bool = False
     has_motion: bool = False
     _over: float = 0.0  # seconds since the last frame of the range began
     _is_returning: bool = False  # in the backward half of ping-pong
@@ -296,12 +296,12 @@ class Clock:
         clips = tuple((actor.clip, actor.offset) for actor in actors)
         if before is None or before.clips != clips:
             self.follow(chosen)
-        wanted = PosedFor(self.time, self.fill_gaps, clips)
+        wanted = PosedFor(self.time, self.interpolate_gaps, clips)
         if wanted == before and not again:
             return False
         self.posed_for = wanted
         self.n_posed += 1
-        pose_actors(actors, self.time, self.fill_gaps)
+        pose_actors(actors, self.time, self.interpolate_gaps)
         return True
 
     def go_back(self, time: float, chosen: Actor | None = None) -> None:

@@ -136,7 +136,7 @@ class MotionExtent:
                 actor.pose = self._opened[id(shown)][2].copy()
                 actor.pose.shape_weights = weights
         if clock.has_motion:
-            pose_actors(seen.actors, time, clock.fill_gaps)
+            pose_actors(seen.actors, time, clock.interpolate_gaps)
             if not any(actor.is_drawn for actor in seen.actors):
                 return np.zeros((0, 3))
         points = scene_points(seen, show)

@@ -16,6 +16,7 @@ __all__ = [
     "Rect",
     "begin_menu",
     "begin_overlay",
+    "begin_window",
     "button",
     "checkbox",
     "choice",
@@ -86,6 +87,33 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
     flags |= imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
     flags |= imgui.WindowFlags_.no_nav
     return imgui.begin(name, None, flags)[0]
+
+
+def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
+    """Begin a window of its own, which opens in the middle; ``imgui.end`` ends it.
+
+    Parameters
+    ----------
+    title : str
+        In its title bar.
+    size : (float, float)
+        Width and height where it first appears, in letters' heights; less in a small window.
+
+    Returns
+    -------
+    shown, stays : bool
+        Whether its content is visible, and False once the user closes it.
+    """
+    letter, viewport = imgui.get_font_size(), imgui.get_main_viewport()
+    room = (
+        min(size[0] * letter, 0.95 * viewport.size.x),
+        min(size[1] * letter, 0.9 * viewport.size.y),
+    )
+    imgui.set_next_window_size(room, imgui.Cond_.appearing)
+    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
+    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    shown, stays = imgui.begin(title, True, flags | imgui.WindowFlags_.no_collapse)
+    return shown, bool(stays)
 
 
 def overlay_rect(state: AppState, name: str) -> Rect:

@@ -1,1 +1,1 @@
-"""Curves: the channels and keys of a clip, shown and edited."""
+"""Curves: plotting and editing of the channels and keys of a clip."""

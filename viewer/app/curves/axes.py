@@ -16,7 +16,7 @@ __all__ = ["Color", "Plot", "curve_color", "factor_of", "measured"]
 Color = tuple[float, float, float, float]
 
 _COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
-_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # for one axis of several joints
+_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness of the same axis of several joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Plot:
     curves : tuple of Curve
         All curves of the motion.
     limits : (low, high, bottom, top)
-        Clip time in seconds, then values in the displayed unit.
+        Ranges of clip time, in seconds, and of values, in the displayed unit.
     scale : (float, float)
         Pixels per second and per displayed unit.
     """
@@ -75,7 +75,7 @@ def factor_of(state: AppState, curve: Curve) -> float:
 
 
 def curve_color(view: Curves, curves: tuple[Curve, ...], row: int) -> Color:
-    """Return a curve's colour: red, green or blue for x, y, z, other shades for other joints."""
+    """Return a curve's colour: red, green or blue for x, y, z; each joint has its own shade."""
     groups = list(dict.fromkeys(curves[other].number for other in view.rows))
     number = curves[row].number
     shade = _SHADES[groups.index(number) % len(_SHADES)] if number in groups else 1.0

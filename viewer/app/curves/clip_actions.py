@@ -24,7 +24,7 @@ def can_have_keys(state: AppState) -> bool:
 
 
 def new_clip(state: AppState) -> None:
-    """Give the chosen actor a clip that holds its pose: one key for each DOF."""
+    """Create a clip that holds the chosen actor's pose, with one key per DOF."""
     actor = state.actor
     if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
         return

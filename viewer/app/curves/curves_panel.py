@@ -34,12 +34,12 @@ from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip,
 
 __all__ = ["draw"]
 
-_LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 20.0, 5.8  # letters' heights
+_LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 20.0, 5.8  # widths, in font sizes
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
 _TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}
 _SIDES = ("In", "Out")
 _FARTHEST = 1e9  # largest number that can be typed
-_WIDE = "M" * 8  # about the width of a field with its label
+_WIDE = "M" * 8  # text about as wide as a field with its label
 _HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift selects more."
 
 
@@ -56,7 +56,7 @@ def draw(state: AppState) -> None:
         _draw_list(state, curves)
     imgui.end_child()
     imgui.same_line()
-    # Beside the plot, not above it: widgets that appear must not push a key from under the mouse.
+    # Beside the plot, not above it: widgets that appear must not move a key away from the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
     if clip_of(state) is not None:
         side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.45 * room)
@@ -75,7 +75,7 @@ def draw(state: AppState) -> None:
 
 
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Drop selected curves that are gone, and follow the joint that is selected elsewhere."""
+    """Deselect curves and keys that no longer exist, and show those of a newly selected joint."""
     view, clip = state.of(Curves), state.actor.clip
     owner = (id(state.actor), type(clip).__name__, len(curves))
     if owner != view.owner:
@@ -108,7 +108,7 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
         return
     shown = _listed(curves, view.filter.lower())
     if not shown:
-        imgui.text_disabled("no channel has this in its name")
+        imgui.text_disabled("no channel name contains this text")
     if view.wants_scroll:
         view.wants_scroll = False
         above = shown.index(view.rows[0]) - 1 if view.rows and view.rows[0] in shown else 0
@@ -126,7 +126,7 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
-    """Return rows of curves, those of each joint preceded by its number as text."""
+    """Return the rows of listed curves, with each joint's number as text before its curves."""
     listed: list[int | str] = []
     last: int | None = None
     for row, curve in enumerate(curves):
@@ -168,7 +168,7 @@ def _key_count(state: AppState, row: int) -> str:
 
 
 def _choose(state: AppState, rows: tuple[int, ...]) -> None:
-    """Show only these curves; Ctrl or Shift adds or removes them."""
+    """Select these curves only; with Ctrl or Shift, add them to the selection or remove them."""
     view, io = state.of(Curves), imgui.get_io()
     if io.key_ctrl or io.key_shift:
         if set(rows) <= set(view.rows):
@@ -188,22 +188,22 @@ def _draw_tools(state: AppState) -> None:
     explain("fit the axes to the selected curves")
     if clip_of(state) is None:
         imgui.same_line()
-        imgui.text_disabled("sampled frames without keys: read-only")
+        imgui.text_disabled("sampled animation without keys: read-only")
         return
-    if _button_beside(state, "Add key", "on the shown curves, at the current time"):
+    if _button_beside(state, "Add key", "add a key to the shown curves at the current time"):
         add_key_at(state, view.rows, state.clock.time - state.actor.offset)
     if _button_beside(state, "Key pose", "key every DOF of the pose at the current time"):
         key_present_pose(state)
-    if _button_beside(state, "Key changes", "key only the DOFs that the pose has changed"):
+    if _button_beside(state, "Key changes", "key only the DOFs that differ from the clip"):
         key_present_pose(state, only_changed=True)
-    if _button_beside(state, "Save clip…", "as .anim"):
+    if _button_beside(state, "Save clip…", "save the clip as .anim"):
         ask_for_clip(state)
 
 
-def _button_beside(state: AppState, text: str, words: str) -> bool:
+def _button_beside(state: AppState, text: str, tooltip: str) -> bool:
     same_line_if_room(text)
     pressed = button(state, text)
-    explain(words)
+    explain(tooltip)
     return pressed
 
 
@@ -211,7 +211,7 @@ def _button_beside(state: AppState, text: str, words: str) -> bool:
 
 
 def _draw_modes(state: AppState) -> None:
-    """Draw the extrapolation of the curves in focus before and after their keys."""
+    """Draw the choice of extrapolation before and after the keys of the curves in focus."""
     rows, clip = focused_rows(state.of(Curves)), clip_of(state)
     channel = channel_of(clip, rows[0]) if rows and clip is not None else None
     if channel is None:
@@ -221,14 +221,14 @@ def _draw_modes(state: AppState) -> None:
             same_line_if_room(_WIDE)
         now = channel.extrapolation[side]
         new = choice(state, text, now, _MODES)
-        explain("of the curves with selected keys, otherwise of all shown curves")
+        explain("extrapolation of the curves with selected keys, otherwise of all shown curves")
         for mode in EXTRAPOLATIONS:
             if new == mode != now:
                 extrapolate(state, side, mode)
 
 
 def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Draw numbers and tangents of the chosen keys."""
+    """Draw the fields of the selected keys: time, value and tangents."""
     view, clip = state.of(Curves), clip_of(state)
     place = min(view.keys, default=None)
     channel = None if clip is None or place is None else channel_of(clip, place[0])
@@ -280,7 +280,7 @@ def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, te
     now = tangent if isinstance(tangent, str) else "number"
     new = choice(state, text, now, _TANGENTS)
     if new == "number" != now:
-        # The slope that the rule gave keeps the curve unchanged.
+        # The slope computed by the rule keeps the curve unchanged.
         turn_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
     for rule in TANGENT_RULES:
         if new == rule != now:

@@ -1,4 +1,4 @@
-"""Curves of a motion for plotting: names and values."""
+"""Names and values of the curves of a motion, for plotting."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 
 _AXES = "xyz"
 _FIRST_ROTATION = 3
-_PLACE = "place"  # group of the whole figure
+_PLACE = "place"  # heading of the curves of the whole figure
 _MOST_POINTS = 2000
 _PAGE = 500  # frames by which the visible part of a long motion advances
 
@@ -30,16 +30,16 @@ Points = tuple[Floats, Floats]
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One curve as the list shows it.
+    """A curve of the plot, as an entry of the list.
 
     Attributes
     ----------
     group : str
-        The joint or keypoint, for the heading.
+        Name of the joint or keypoint, used as heading.
     number : int
-        Its index; -1 for the whole figure.
+        Index of the joint or keypoint; -1 for the whole figure.
     name : str
-        ``"x"``, ``"ty"`` …
+        Name of the channel: ``"x"``, ``"ty"`` …
     axis : int
         0 to 2 for x, y, z.
     is_angle : bool
@@ -64,10 +64,10 @@ _parts: Memo[Clip, Clip] = Memo(kept=2)
 
 
 def curves_of(actor: Actor) -> tuple[Curve, ...]:
-    """Return the curves of an actor's motion; their indices are used as rows everywhere.
+    """Return the curves of an actor's motion; a row is an index into them.
 
-    For a keyed clip these are the DOFs; for frames the figure's position and each joint's angles
-    about x, y and z (R = Rz Ry Rx); for captured points their coordinates.
+    A keyed clip has a curve per DOF; a sampled animation has the figure's position and each joint's
+    angles about x, y and z (R = Rz Ry Rx); captured points have their coordinates.
     """
     skeleton, points = actor.figure.skeleton, actor.figure.points
     if isinstance(actor.clip, PointClip) and points is not None:
@@ -109,7 +109,7 @@ def _point_curves(points: PointLayout) -> tuple[Curve, ...]:
 
 def channel_of(clip: Clip, row: int) -> Channel | None:
     """Return the channel that drives a DOF, None if there is none."""
-    # Files list a channel for every DOF, in their order.
+    # Usually files list a channel for every DOF, in the same order.
     if row < len(clip.channels) and clip.channels[row].target == row:
         return clip.channels[row]
     return next((channel for channel in clip.channels if channel.target == row), None)
@@ -130,7 +130,7 @@ def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
 
 
 def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: float) -> Points:
-    """Return a curve of frames as a line of at most 2000 points, each exactly on a frame.
+    """Return a curve of a sampled animation: at most 2000 points, each exactly on a frame.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: fl
     row : int
         See ``curves_of``.
     low, high : float
-        Visible range, seconds; longer motions are thinned out only as needed for it.
+        Visible range, seconds; only as many frames are skipped as this range requires.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: fl
     first, step = 0, 1
     if timing.n_frames > _MOST_POINTS:
         seen = max((high - low) * timing.frame_rate, 1.0)
-        # By powers of two, so that zooming a little shows the same points.
+        # Steps are powers of two, so that zooming slightly keeps the same points.
         while step * (_MOST_POINTS - 2 * _PAGE) < min(seen, timing.n_frames):
             step *= 2
         page = step * _PAGE
@@ -163,22 +163,22 @@ def _line(clip: SampledClip | PointClip, row: int, first: int, step: int) -> Poi
     timing = clip.timing
     frames = np.arange(first, min(first + step * _MOST_POINTS, timing.n_frames), step)
     rows = timing.rows[frames]
-    there = rows >= 0
+    present = rows >= 0
     values = np.full(len(frames), np.nan)
     if isinstance(clip, PointClip):
-        seen = clip.points[rows[there], row // 3]
-        values[there] = np.where(seen[:, 3] > 0.0, seen[:, row % 3], np.nan)
+        seen = clip.points[rows[present], row // 3]
+        values[present] = np.where(seen[:, 3] > 0.0, seen[:, row % 3], np.nan)
     elif row < 3:
-        values[there] = _places(clip, rows[there])[:, row]
+        values[present] = _places(clip, rows[present])[:, row]
     else:
         joint, axis = divmod(row - 3, 3)
-        angles = matrix_to_euler(quaternion_to_matrix(clip.rotations[rows[there], joint]))
-        values[there] = np.unwrap(angles[:, axis])
+        angles = matrix_to_euler(quaternion_to_matrix(clip.rotations[rows[present], joint]))
+        values[present] = np.unwrap(angles[:, axis])
     return timing.start + frames / timing.frame_rate, values
 
 
 def _places(clip: SampledClip, rows: np.ndarray) -> Floats:
-    """Return the position of the whole figure, including its root's: (N, 3)."""
+    """Return the position of the whole figure, including the root's translation: (N, 3)."""
     places = np.zeros((len(rows), 3))
     if clip.figure_translations is not None:
         places += clip.figure_translations[rows]

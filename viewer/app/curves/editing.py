@@ -1,4 +1,4 @@
-"""Edits of the chosen actor's clip in the Curves panel; each replaces it by a new clip."""
+"""Edits of the chosen actor's clip in the Curves panel; each replaces the clip by a new one."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
     "turn_tangent",
 ]
 
-_GAP = 1e-3  # seconds: least distance of keys when dragging
+_GAP = 1e-3  # smallest distance of keys when dragging, seconds
 
 
 def clip_of(state: AppState) -> Clip | None:

@@ -34,7 +34,7 @@ _TIME_ID, _START_ID, _END_ID = 1, 2, 3
 
 def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
     """Draw the selected curves in the remaining space, and handle the mouse."""
-    # A double click adds a key, so it cannot fit the axes as well.
+    # A double click adds a key, so the middle button fits the axes instead.
     implot.get_input_map().fit = imgui.MouseButton_.middle
     flags = implot.Flags_.no_title | implot.Flags_.no_legend | implot.Flags_.no_menus
     room = imgui.get_content_region_avail()
@@ -61,7 +61,7 @@ def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
     _draw_outside(plot)
     for row in view.rows:
         _draw_line(plot, row)
-    # Of overlapping items, ImGui gives the mouse to the first one.
+    # Of several overlapping items, the one drawn first gets the mouse.
     touched = draw_keys(plot)
     _draw_time(plot)
     _draw_range(plot)
@@ -70,7 +70,7 @@ def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _draw_units(plot: Plot) -> None:
-    """Write the unit of the values in a corner."""
+    """Draw the unit of the values in a corner."""
     kinds = {plot.curves[row].is_angle for row in plot.view.rows}
     angle = "degrees" if plot.state.in_degrees else "radians"
     text = ", ".join(["units"] * (False in kinds) + [angle] * (True in kinds))
@@ -104,7 +104,7 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     values = values[np.isfinite(values)]
     bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
     pad = 2.0 * _MARGIN * (top - bottom)
-    # Rounding errors must not fill the height.
+    # A constant curve must not be magnified to its rounding errors.
     pad = pad if pad > 1e-6 * max(abs(top), 1e-6) else max(0.5 * abs(top), 0.5)
     return low, high, bottom - pad, top + pad
 
@@ -140,18 +140,18 @@ def _draw_line(plot: Plot, row: int) -> None:
 def _inner_times(keys: Floats, low: float, high: float) -> Floats:
     """Return sample times: evenly over the visible range, and at the keys."""
     seen = keys[(keys >= low) & (keys <= high)][:_MOST_SAMPLES]
-    # Just before a key too: two keys at one time make a jump.
+    # Times just before the keys are included, because two keys at one time make a jump.
     times = np.concatenate([np.linspace(low, high, _MOST_SAMPLES), seen, np.nextafter(seen, low)])
     return np.sort(np.clip(times, low, high))
 
 
 def _draw_dashes(plot: Plot, clip: Clip, row: int, start: float, end: float) -> None:
-    """Draw every other piece of a curve as three short lines that follow its bends."""
+    """Draw dashes along a curve, each of three short segments that follow its shape."""
     step = (plot.limits[1] - plot.limits[0]) / _DASHES
     # Multiples of the step, so that dashes stay in place while panning.
     lows = step * np.arange(math.floor(start / step), math.ceil(end / step))
-    share = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
-    points = np.clip((lows[:, None] + step * share).ravel(), start, end)
+    fractions = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
+    points = np.clip((lows[:, None] + step * fractions).ravel(), start, end)
     values = plot.factor(row) * keyed_values(clip, (row,), points)[:, 0]
     spec = _spec((*plot.color(row)[:3], 0.75), 1.2, implot.LineFlags_.segments)
     implot.plot_line(f"##outside {row} {start < plot.limits[1]}", points, values, spec)
@@ -173,7 +173,7 @@ def _draw_outside(plot: Plot) -> None:
 
 
 def _draw_range(plot: Plot) -> None:
-    """Draw the ends of the range, which can be dragged if the clip has keys."""
+    """Draw the start and end of the range, which can be dragged if the clip has keys."""
     clip = plot.state.actor.clip
     if clip is None:
         return

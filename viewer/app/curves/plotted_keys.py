@@ -27,9 +27,9 @@ __all__ = ["draw_keys", "edit"]
 
 _CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
 _FAINT = (0.75, 0.75, 0.8, 0.8)
-_MOST_KEYS = 300  # number of keys that can be grabbed
-_SAME_KEY = 2.0  # points: keys closer than this could not be told apart
-_HANDLE_LENGTH = 4.0  # letters' heights
+_MOST_KEYS = 300  # largest number of visible keys that can be dragged
+_SAME_KEY = 2.0  # points: keys closer than this cannot be distinguished
+_HANDLE_LENGTH = 4.0  # in font sizes
 _HANDLE_ID = 16
 _FIRST_KEY_ID = 32
 _KEYS_PER_ROW = 1 << 20
@@ -39,8 +39,8 @@ _FIXED = implot.DragToolFlags_.no_fit
 def draw_keys(plot: Plot) -> bool:
     """Draw keys and tangents; return whether the mouse is at one of them.
 
-    Of overlapping items, ImGui gives the mouse to the first one: selected keys, tangents,
-    other keys.
+    Of several overlapping items, the one drawn first gets the mouse. So selected keys are drawn
+    first, then tangents, then other keys.
     """
     clip = clip_of(plot.state)
     if clip is None:
@@ -53,7 +53,7 @@ def draw_keys(plot: Plot) -> bool:
             values = plot.factor(row) * channel.values
             inside = (channel.times >= low) & (channel.times <= high)
             inside &= (values >= bottom) & (values <= top)
-            # A key dragged out of the plot is still held.
+            # A selected key may be dragged out of the plot.
             inside[[key for owner, key in plot.view.keys if owner == row]] = True
             seen.append((row, channel.times, values, np.flatnonzero(inside).tolist()))
     if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
@@ -73,7 +73,7 @@ def draw_keys(plot: Plot) -> bool:
 
 
 def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
-    """Draw the selected keys once more, over everything."""
+    """Draw the selected keys again, on top of everything."""
     implot.push_plot_clip_rect()
     for place, time, value in chosen:
         middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
@@ -84,7 +84,7 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
 
 
 def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
-    """Draw keys that are too many to grab as plain dots."""
+    """Draw keys as plain dots, which cannot be dragged, because there are too many."""
     for row, times, values, keys in seen:
         if keys:
             color = plot.color(row)
@@ -154,7 +154,7 @@ def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bo
     )
     plot.note(f"tangent {side}", end, height)
     if moved:
-        # At least a pixel away on its own side of the key: no tangent is vertical.
+        # The knob stays at least a pixel away on its side of the key: no tangent is vertical.
         run = sign * max(sign * (x - time), 1.0 / across)
         for each in (0, 1) if imgui.get_io().key_shift else (side,):
             turn_tangent(plot.state, [place], each, (y - value) / run / factor)
@@ -169,13 +169,13 @@ def edit(plot: Plot, touched: bool) -> None:
     plot : Plot
         Current plot.
     touched : bool
-        Whether the mouse is at a key or tangent, so that a click is not for the plot.
+        Whether the mouse is at a key or tangent, which then handles clicks.
     """
     state, view, clip = plot.state, plot.view, clip_of(plot.state)
     if clip is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
         return
     left, io = imgui.MouseButton_.left, imgui.get_io()
-    # Draggable keys and lines hide the plot from the mouse, but not from the keyboard.
+    # Keys and lines that can be dragged take the mouse from the plot, but not the keyboard.
     is_free = implot.is_plot_hovered()
     is_second = io.mouse_clicked_last_count[left] > 1
     was_dragged = io.mouse_drag_max_distance_sqr[left] >= io.mouse_drag_threshold**2
@@ -207,7 +207,7 @@ def _add_key(plot: Plot, clip: Clip, row: int, time: float) -> None:
 
 
 def _is_mouse_inside() -> bool:
-    """Return whether the mouse is over any part of the plot, with no window in between."""
+    """Return whether the mouse is over the plot and no other window covers it."""
     flags = imgui.HoveredFlags_.allow_when_blocked_by_active_item
     place, size = implot.get_plot_pos(), implot.get_plot_size()
     corner = (place.x + size.x, place.y + size.y)
@@ -215,7 +215,7 @@ def _is_mouse_inside() -> bool:
 
 
 def _is_pressed(key: imgui.Key) -> bool:
-    """Return whether a key was pressed while nothing is typed or dragged."""
+    """Return whether a key was pressed while no text is entered and nothing is dragged."""
     is_dragging = imgui.is_mouse_down(imgui.MouseButton_.left)
     is_free = not (is_dragging or imgui.get_io().want_text_input)
     return is_free and imgui.is_key_pressed(key, False)

@@ -21,15 +21,15 @@ class Curves:
     keys : frozenset of (row, key)
         Selected keys.
     filter : str
-        Text that the names of listed curves contain.
+        Text that the names of listed curves must contain.
     wants_fit : bool
         Whether the axes are fitted in the next frame.
     wants_scroll : bool
         Whether the list scrolls to the first selected curve in the next frame.
     owner : (int, str, int)
-        The actor, and the kind and number of curves that ``rows`` belong to.
+        Key of the actor, kind of motion and number of curves for which ``rows`` are valid.
     joint : int
-        The selected joint when the rows last followed it.
+        Joint whose curves were selected last.
     """
 
     rows: tuple[int, ...] = ()
@@ -41,5 +41,5 @@ class Curves:
     joint: int = -1
 
     def choose(self, rows: tuple[int, ...]) -> None:
-        """Show other curves and fit the axes to them."""
+        """Select curves, and fit the axes to them."""
         self.rows, self.keys, self.wants_fit = rows, frozenset(), True

@@ -1,1 +1,1 @@
-"""Linting: checks of the scene, their findings, and where those are."""
+"""Linting: checks of the scene, and their findings in a panel and in the view."""

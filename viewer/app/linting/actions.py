@@ -89,7 +89,7 @@ def take_findings(state: AppState) -> None:
     running = view.running
     if running is not None and running.job is not state.job:
         view.running = None
-        # A cancelled check, or one of a scene that is gone, has nothing to show.
+        # The result of a cancelled check, or of a scene that was replaced, is not shown.
         if running.result is not None and running.result.source is state.scene:
             view.checked, view.chosen = running.result, -1
             view.is_edited, view.seen = False, _moving(state)
@@ -140,9 +140,9 @@ def choose_finding(state: AppState, index: int) -> None:
     Parameters
     ----------
     state : AppState
-        Its camera moves there with the next picture.
+        Holds the camera, which moves to the finding in the next frame.
     index : int
-        Of ``state.of(Linting).checked.findings``.
+        Index into ``state.of(Linting).checked.findings``.
     """
     view = state.of(Linting)
     view.chosen = -1 if index == view.chosen else index
@@ -160,7 +160,7 @@ def choose_finding(state: AppState, index: int) -> None:
         seek = finding.times[0] if finding.seek is None else finding.seek
         state.clock.seek(float(seek))
         if finding.seek is not None and finding.code == "C005":
-            state.say_status("The last frame before the gap: the person is absent in the next one")
+            state.say_status("Last frame before the gap: the person is absent in the next frame")
     if not actor.visible:
         state.say_status(f"{printable(actor.name, 60)} is hidden: see the Actors panel")
 
@@ -176,9 +176,9 @@ def is_known_there(state: AppState, finding: Finding) -> bool:
     Parameters
     ----------
     state : AppState
-        With the check.
+        Holds the last check.
     finding : Finding
-        Of its last check.
+        A finding of that check.
     """
     known, index = state.of(Linting).checked, finding.actor
     if known is None or index is None or not is_in_scene(state, finding):
@@ -187,7 +187,7 @@ def is_known_there(state: AppState, finding: Finding) -> bool:
 
 
 def file_place(finding: Finding) -> str:
-    """Return path and line of a finding in the form editors accept; empty if it is in no file."""
+    """Return path and line of a finding as ``path:line``; empty if it is not about a file."""
     if finding.file is None or finding.file == Path():
         return ""
     line = "" if finding.line is None else f":{finding.line}"
@@ -195,7 +195,7 @@ def file_place(finding: Finding) -> str:
 
 
 def copy_place(state: AppState, finding: Finding) -> None:
-    """Copy path and line of a finding that is in no figure, and clear the choice."""
+    """Copy path and line of a finding that is not about an actor, and clear the choice."""
     choose_finding(state, -1)
     place = file_place(finding)
     if place:

@@ -44,7 +44,7 @@ _GROUNDS = {
 }
 _LONGEST = 400  # longest message in the list, characters
 _FASTEST = 100.0  # largest speed that can be set, units per second
-_TIP_WIDTH = 30.0  # letters' heights
+_TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 
 
 def draw(state: AppState) -> None:
@@ -81,7 +81,7 @@ def _draw_warning(text: str) -> None:
 def _draw_buttons(state: AppState, known: Checked | None) -> None:
     if button(state, "Check" if known is None else "Recheck", no_job_room(state)):
         start_check(state)
-    explain("look for faults in rigs, meshes and motions as they are now, and in their files")
+    explain("check rigs, meshes and motions in their current state, and the files")
     same_line_if_room("Limits…")
     if button(state, "Limits…"):
         imgui.open_popup("lint limits")
@@ -103,22 +103,22 @@ def _draw_limits(state: AppState) -> None:
         return
     view = state.of(Linting)
     options = view.options
-    turn = np.degrees(options.max_turn)
-    moved = slider(state, "Largest rotation", turn, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
-    explain("of a joint relative to its parent, between two frames")
-    if moved != turn:
-        view.options = replace(view.options, max_turn=float(np.radians(max(moved, 0.0))))
+    rotation = np.degrees(options.max_rotation)
+    moved = slider(state, "Largest rotation", rotation, 90.0, 10_000.0, "%.0f\N{DEGREE SIGN}/s")
+    explain("rotation of a joint relative to its parent, between two frames")
+    if moved != rotation:
+        view.options = replace(view.options, max_rotation=float(np.radians(max(moved, 0.0))))
     speed = options.max_speed or 0.0
-    text = "%.2f units/s" if speed else "15 times its size"
+    text = "%.2f units/s" if speed else "automatic"
     moved = slider(state, "Largest speed", speed, 0.0, _FASTEST, text)
-    explain("of joints and captured points; 0: 15 times the figure's size a second")
+    explain("speed of joints and captured points; 0 for 15 times the figure's size per second")
     if moved != speed:
         view.options = replace(view.options, max_speed=moved if moved > 0.0 else None)
     sure = options.confidence
     moved = slider(state, "Low confidence", sure, 0.0, 1.0)
     explain(
         "report a captured point if its confidence is below this in more than "
-        f"{100.0 * LOW_FRACTION:g} % of the frames that see it, and in at least {LOW_FRAMES}"
+        f"{100.0 * LOW_FRACTION:g} % of the frames with the point, and in at least {LOW_FRAMES}"
     )
     if moved != sure:
         view.options = replace(view.options, confidence=moved)
@@ -134,7 +134,7 @@ def _draw_ground(state: AppState) -> None:
     ground = view.options.ground
     is_given = not isinstance(ground, str)
     chosen = choice(state, "Ground", "height" if is_given else str(ground), _GROUNDS)
-    explain("feet may be below it by at most 1 % of the figure's height")
+    explain("feet may be at most 1 % of the figure's height below the ground")
     if chosen == "height":
         height = float(ground) if is_given else 0.0
         size = box_size(state.box) or 1.0
@@ -153,8 +153,8 @@ def _draw_progress(state: AppState) -> None:
         return
     job = running.job
     done, total = job.progress
-    share = done / total if total else -imgui.get_time()
-    imgui.progress_bar(share, (-1.0, 0.0), f"{done} of {total}" if total else "")
+    fraction = done / total if total else -imgui.get_time()
+    imgui.progress_bar(fraction, (-1.0, 0.0), f"{done} of {total}" if total else "")
     if button(state, "Cancel check"):
         job.cancel()
         state.say_status("Cancelled")
@@ -183,7 +183,7 @@ def _draw_list(state: AppState, known: Checked) -> None:
     shown = [
         index
         for index, finding in enumerate(known.findings)
-        if finding.severity in view.severities and view.text.lower() in _words(finding)
+        if finding.severity in view.severities and view.text.lower() in _searched_text(finding)
     ]
     if not shown:
         imgui.text_disabled("no finding matches" if known.findings else "no findings")
@@ -201,10 +201,10 @@ def _draw_list(state: AppState, known: Checked) -> None:
     imgui.end_table()
 
 
-def _words(finding: Finding) -> str:
+def _searched_text(finding: Finding) -> str:
     """Return the text that the filter searches, in lower case."""
-    words = (finding.code, finding.severity, finding.title, finding.message, finding.name)
-    return " ".join((*words, _place(finding))).lower()
+    parts = (finding.code, finding.severity, finding.title, finding.message, finding.name)
+    return " ".join((*parts, _place(finding))).lower()
 
 
 def _place(finding: Finding) -> str:
@@ -269,9 +269,9 @@ def _click_text(state: AppState, finding: Finding) -> str:
     if is_in_scene(state, finding):
         return "click to select the actor: its figure has changed since the check"
     if not file_place(finding):
-        return "it has no location in the view"
+        return "this finding has no location in the view"
     copied = "its path" if finding.line is None else "its path and line"
-    return f"it is in the file, not in the figure shown: click to copy {copied}"
+    return f"this finding is about the file, not the figure shown: click to copy {copied}"
 
 
 def _draw_severity(severity: str) -> None:

@@ -1,4 +1,4 @@
-"""Marks of the chosen finding in the view, and the camera that moves there."""
+"""Marks of the chosen finding in the view, and aiming of the camera at them."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from viewer.rig.scene import actor_points
 
 __all__ = ["aim", "marks_of", "show_finding"]
 
-_MOST = 3000  # largest numbers of marked vertices and triangles' edges
-_FEW = 200  # triangles whose middles are marked too: the smallest edges cover no pixel
-_AROUND, _AROUND_JOINTS = 0.06, 0.15  # of the actor's size: surroundings shown for orientation
-_ONE_WAY = 0.5  # least length of a mean normal that gives a place a front
-_AWAY = 0.2  # cosine to the line of sight below which the front is not visible
+_MOST = 3000  # largest number of marked vertices, and of marked edges of triangles
+_FEW = 200  # up to so many triangles are marked at their centres too: tiny edges cover no pixel
+_AROUND, _AROUND_JOINTS = 0.06, 0.15  # surroundings to show, relative to the actor's size
+_ONE_WAY = 0.5  # shortest mean normal of a place that has a front side
+_AWAY = 0.2  # cosine to the line of sight below which the front side is not visible
 _STEEPEST = 70.0  # degrees
 _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 
@@ -33,7 +33,7 @@ _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 def show_finding(state: AppState) -> Marks | None:
     """Return the marks of the chosen finding in the current pose; move the camera if asked.
 
-    Called when the scene has been posed, before it is drawn.
+    Called in each frame after the scene is posed and before it is drawn.
     """
     view = state.of(Linting)
     finding = view.finding
@@ -70,7 +70,7 @@ def _key(state: AppState) -> object:
         return None
     actor = state.scene.actors[finding.actor]
     if actor.figure is not known.scene.actors[finding.actor].figure:
-        return None  # the finding's indices may be invalid for it
+        return None  # the finding's indices may be invalid for the new figure
     options = state.options
     return (
         id(finding),
@@ -88,14 +88,14 @@ def marks_of(places: Places) -> tuple[Marks, str]:
     Parameters
     ----------
     places : Places
-        Those that are not finite are left out.
+        Places to mark; those that are not finite are omitted.
 
     Returns
     -------
     marks : Marks
         Points at vertices and joints, edges of triangles.
     note : str
-        Empty if all are marked.
+        Note about places that are not marked; empty if all are.
     """
     vertices, joints = _finite(places.vertices), _finite(places.joints)
     triangles = _finite(places.triangles)
@@ -126,7 +126,7 @@ def _finite(places: Floats) -> Floats:
 
 
 def _radius(count: int) -> float:
-    """Return the size of points, pixels: the more, the smaller."""
+    """Return the radius of points, pixels: smaller if there are more of them."""
     return 4.5 if count <= 50 else 3.0 if count <= 500 else 1.8
 
 
@@ -136,13 +136,13 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     Parameters
     ----------
     state : AppState
-        Its camera moves at once and shows some surroundings of the points too.
+        Holds the camera, which moves at once.
     points : (N, 3)
         Scene space.
     facing : (3,)
-        Mean normal, as ``Places`` has it.
+        Mean normal, as in ``Places``.
     around : float
-        Least visible surroundings of their middle, as a fraction of the actor's size.
+        Smallest extent to show around their centre, as a fraction of the actor's size.
     """
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding
@@ -151,11 +151,11 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     whole = _finite(actor_points(state.scene.actors[finding.actor]))
     size = box_size(bounding_box(whole if len(whole) else points)) or box_size(state.box) or 1.0
     room = bounding_box(points).mean(axis=0) + around * size * np.array([[-1.0], [1.0]])
-    _turn(camera, facing)
+    _face(camera, facing)
     fit_points(state, np.concatenate([points, room]))
 
 
-def _turn(camera: Camera, facing: Floats) -> None:
+def _face(camera: Camera, facing: Floats) -> None:
     """Rotate a camera that looks at the back of a surface to its front."""
     length = float(np.linalg.norm(facing))
     backward = camera_axes(camera)[2]

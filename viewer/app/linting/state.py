@@ -27,7 +27,7 @@ class Checked:
     findings : tuple of Finding
         The worst first.
     n_files : int
-        Number of its files, which were read again.
+        Number of files of the scene, which were read again.
     notes : tuple of str
         Changes of these files since they were opened.
     """
@@ -65,7 +65,7 @@ class Linting:
     severities : set of str
         Severities that are listed.
     text : str
-        Text that listed findings contain.
+        Text that listed findings must contain.
     chosen : int
         Index of the chosen finding, -1 for none.
     wants_aim : bool
@@ -75,7 +75,7 @@ class Linting:
     seen : tuple
         Time and poses of moving actors in the previous frame.
     marks : Marks or None
-        Of the chosen finding.
+        Marks of the chosen finding.
     marks_key : object
         Key that identifies the marks.
     marks_note : str

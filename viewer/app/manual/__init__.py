@@ -1,1 +1,1 @@
-"""The manual's pages in the window."""
+"""Window with the pages of the manual."""

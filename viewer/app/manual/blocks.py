@@ -23,9 +23,9 @@ class Block:
     kind : str
         ``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``.
     text : str
-        One line, to be wrapped; for code, all lines. Empty for tables.
+        One line of text to wrap, or all lines of code; empty for tables.
     rows : tuple of tuples of str
-        Cells of a table, the head first.
+        Cells of a table, the header first.
     """
 
     kind: str
@@ -40,7 +40,7 @@ def blocks_of(text: str) -> list[Block]:
     [('title', 'Keys'), ('text', 'H or ? lists them.')]
     """
     found: list[Block] = []
-    # Every other part is code, after the line that names its language.
+    # Every second part is code; its first line names the language.
     for number, part in enumerate(re.split(rf"^{_FENCE}", text, flags=re.MULTILINE)):
         if number % 2:
             found.append(Block("code", part.partition("\n")[2].rstrip("\n")))

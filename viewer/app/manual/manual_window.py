@@ -1,4 +1,4 @@
-"""The window "Manual": the list of pages, and the chosen page."""
+"""The Manual window: the list of pages, and the chosen page."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from dataclasses import dataclass, field
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import begin_menu, menu_item, note_item
+from viewer.app.core.widgets import begin_menu, begin_window, menu_item, note_item
 from viewer.app.manual.blocks import Block, blocks_of
 from viewer.errors import ViewerError
 from viewer.manual import PAGES, page_text
 
 __all__ = ["Manual", "draw_manual", "draw_manual_menu"]
 
-_SIZE = (60.0, 40.0)  # letters' heights
-_TOPICS = 8.5  # letters' heights across
-_TITLE = 1.35  # relative to the font size
+_SIZE = (60.0, 40.0)  # size of the window, in font sizes
+_TOPICS = 8.5  # width of the list, in font sizes
+_TITLE = 1.35  # scale of the title's font
 _TITLE_COLOR = (1.0, 0.78, 0.45, 1.0)
 _CODE_COLOR = (0.72, 0.85, 0.95, 1.0)
 _ALIGNED = re.compile(" {2,}#")
-_NARROWEST, _WIDEST = 6, 60  # least width of a column, characters
+_NARROWEST, _WIDEST = 6, 60  # smallest and largest width of a column, characters
 
 
 @dataclass(slots=True)
@@ -46,7 +46,7 @@ def draw_manual_menu(state: AppState) -> None:
         return
     manual = state.of(Manual)
     for topic in PAGES:
-        # Some pages have the names of other items.
+        # Some pages have the same names as other menu items.
         if menu_item(state, f"{_title(topic)}##page {topic}", "", topic == manual.topic):
             manual.topic = topic
     imgui.end_menu()
@@ -57,15 +57,7 @@ def draw_manual(state: AppState) -> None:
     manual = state.of(Manual)
     if not manual.topic:
         return
-    size, viewport = imgui.get_font_size(), imgui.get_main_viewport()
-    room = (
-        min(_SIZE[0] * size, 0.95 * viewport.size.x),
-        min(_SIZE[1] * size, 0.9 * viewport.size.y),
-    )
-    imgui.set_next_window_size(room, imgui.Cond_.appearing)
-    imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
-    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
-    shown, stays = imgui.begin("Manual", True, flags | imgui.WindowFlags_.no_collapse)
+    shown, stays = begin_window("Manual", _SIZE)
     if shown:
         _draw_topics(state, manual)
         imgui.same_line()
@@ -93,7 +85,7 @@ def _draw_topics(state: AppState, manual: Manual) -> None:
 
 
 def _draw_page(state: AppState, manual: Manual) -> None:
-    """Draw the chosen page; each keeps its scroll position."""
+    """Draw the chosen page; each page keeps its scroll position."""
     topic = manual.topic
     if topic not in manual.pages:
         try:
@@ -130,7 +122,7 @@ def _draw_block(block: Block, number: int) -> None:
 
 
 def _draw_code(text: str, number: int) -> None:
-    """Draw lines without wrapping, in a frame that scrolls if they are too long."""
+    """Draw lines without wrapping, in a frame with a scroll bar if they are too long."""
     flags = imgui.ChildFlags_.frame_style | imgui.ChildFlags_.auto_resize_y
     scrolls = imgui.WindowFlags_.horizontal_scrollbar
     if imgui.begin_child(f"##code {number}", (0.0, 0.0), flags, scrolls):

@@ -1,1 +1,1 @@
-"""Playback: the timeline and its frames."""
+"""Playback: the timeline, frame rate and playback range."""

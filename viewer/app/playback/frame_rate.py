@@ -1,4 +1,4 @@
-"""Frame rate of the chosen actor's capture, or the rate for counting keyed clips."""
+"""Frame rate of the chosen actor's capture, or the rate at which keyed clips are counted."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def rate_of(state: AppState) -> float:
 
 
 def foreign_rate(state: AppState) -> str:
-    """Return why the rate cannot be set for the chosen actor: another one gives the frames."""
+    """Return why the rate cannot be set for the chosen actor: another actor defines the frames."""
     clock = state.clock
     if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
         return ""
@@ -35,12 +35,12 @@ def foreign_rate(state: AppState) -> str:
 def set_rate(state: AppState, rate: float) -> None:
     """Set the frame rate of the chosen actor and of all people of its capture.
 
-    Keyed clips have no frames: for them the rate of stepping and counting is set, no clip changes.
+    Keyed clips have no frames: for them only the rate for stepping and frame numbers is set.
 
     Parameters
     ----------
     state : AppState
-        Clips of its actors are replaced, so that the edit can be undone.
+        Holds the actors; their clips are replaced, so that the edit can be undone.
     rate : float
         Frames per second; a rate outside ``LIMITS`` is rejected with a message.
     """
@@ -64,7 +64,7 @@ def set_rate(state: AppState, rate: float) -> None:
 
 
 def _is_together(one: Actor, other: Actor) -> bool:
-    """Return whether two actors are identical or belong to one capture."""
+    """Return whether two actors are the same or belong to the same capture."""
     first, second = one.clip, other.clip
     if one is other:
         return True

@@ -14,7 +14,7 @@ _gaps: Memo[Motion, bool] = Memo()
 
 
 def no_gaps(state: AppState) -> str:
-    """Return why there are no gaps to interpolate; a capture being read may still get some."""
+    """Return why there are no gaps to interpolate; empty while a capture is being read."""
     if state.of(Files).stream is not None or any(
         _has_gaps(actor.clip) for actor in state.scene.actors if actor.clip is not None
     ):

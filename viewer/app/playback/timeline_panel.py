@@ -1,4 +1,4 @@
-"""Timeline panel: playback buttons, a ruler to scrub, and a track per actor with its gaps."""
+"""Timeline panel: playback buttons, settings, a ruler for scrubbing, and a track per actor."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _draw_transport(state: AppState) -> None:
         step(state, -1)
     explain("one frame back (Left)")
     imgui.same_line()
-    # One width for both labels, or the buttons after it would jump.
+    # Both labels get the same width, or the following buttons would move.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
@@ -117,8 +117,8 @@ def _draw_settings(state: AppState) -> None:
     _draw_range(state)
     same_line_if_room("Interpolate gaps")
     gapless = no_gaps(state)
-    clock.fill_gaps = checkbox(state, "Interpolate gaps", clock.fill_gaps, gapless)
-    text = "interpolate captures in their gaps, between the frames before and after"
+    clock.interpolate_gaps = checkbox(state, "Interpolate gaps", clock.interpolate_gaps, gapless)
+    text = "interpolate missing frames of captures between the frames before and after the gap"
     explain(text, gapless)
 
 

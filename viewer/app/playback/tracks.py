@@ -1,4 +1,4 @@
-"""Ruler and tracks of the timeline: presence of each actor over time, and the current time."""
+"""Ruler and tracks of the timeline: the presence of each actor over time, and the current time."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from viewer.rig.scene import Actor, Motion
 
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
-_NAME_WIDTH = 9.0  # letters' heights
+_NAME_WIDTH = 9.0  # in font sizes
 _TICK_GAP = 5.0  # font sizes: smallest distance of two numbers on the ruler
-_TICK_ASIDE = 3.0  # points between a line of the ruler and its number
+_TICK_ASIDE = 3.0  # points between a tick of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
-_PLAIN = (0.44, 0.62, 0.80)  # of actors without a colour of their own, sRGB
+_PLAIN = (0.44, 0.62, 0.80)  # colour of actors without a colour, sRGB
 _QUIET = 0.6  # opacity of the tracks of unchosen actors
 _CHOSEN_EDGE = (1.0, 1.0, 1.0, 0.85)
-_NARROWEST = 0.35  # font sizes, of a bar: a single frame between gaps must be visible
-_NARROWEST_GAP = 1.0  # points between two bars of least width
+_NARROWEST = 0.35  # smallest width of a bar, in font sizes: single frames must be visible
+_NARROWEST_GAP = 1.0  # points between two bars of that width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
 _LINE, _TEXT = (1.0, 1.0, 1.0, 0.13), (1.0, 1.0, 1.0, 0.6)
 _BACK = (1.0, 1.0, 1.0, 0.03)
 
 
 def draw_tracks(state: AppState) -> None:
-    """Draw the ruler and the tracks; dragging moves time by whole frames, with Alt freely."""
+    """Draw the ruler and the tracks; dragging sets the time to whole frames, with Alt to any."""
     size = imgui.get_font_size()
     moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
     height = imgui.get_text_line_height_with_spacing()
@@ -101,7 +101,7 @@ def _draw_track(
     red, green, blue = encode_color(actor.color) if actor.color is not None else _PLAIN
     color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
     edge = imgui.get_color_u32(_CHOSEN_EDGE)
-    assert actor.clip is not None  # it has a track
+    assert actor.clip is not None  # only moving actors have tracks
     spans = present_spans(actor.clip, 1.0 / scale)
     places = [left + (time + actor.offset - low) * scale for span in spans for time in span]
     for x0, x1 in bars(places, _NARROWEST * imgui.get_font_size(), left + width):
@@ -116,11 +116,11 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
     Parameters
     ----------
     places : sequence of float
-        Start and end of each in turn, in points.
+        Start and end of each bar in turn, in points.
     narrowest : float
-        Least width of a bar, unless its neighbours leave less room.
+        Smallest width of a bar, unless its neighbours leave less room.
     end : float
-        The right end of all.
+        Right end of the track.
 
     >>> bars([0.0, 9.0, 20.0, 20.0, 22.0, 30.0, 40.0, 40.0], 5.0, 40.0)
     [(0.0, 9.0), (16.0, 21.0), (22.0, 30.0), (35.0, 40.0)]
@@ -143,12 +143,12 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     clip : Motion
         A motion; in keyed clips the actor is always present.
     shortest : float
-        Gaps shorter than this, in seconds, are ignored: they would be invisible.
+        Gaps shorter than this, in seconds, are ignored, because they would be invisible.
 
     Returns
     -------
     list of (float, float)
-        Seconds of the motion's own clock.
+        Start and end times in the clip's own time, seconds.
     """
     if isinstance(clip, Clip):
         return [(clip.start, clip.end)]
@@ -171,7 +171,7 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: f
     scale = width / max(high - low, 1e-9)
     line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
     first, last = (clock.first_frame + frame for frame in clock.frame_range)
-    # Room for two numbers: the last one may be left of its line.
+    # Room for two numbers: the last number may be to the left of its tick.
     room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE
     room = max(_TICK_GAP * imgui.get_font_size(), room)
     step = nice_step(room / scale * clock.frame_rate)
@@ -188,12 +188,12 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: f
 
 
 def ruler_text_place(x: float, length: float, end: float) -> float:
-    """Return the start of a number on the ruler: right of its line, or left of it at the end.
+    """Return the start of a number on the ruler: right of its tick, or left of it at the end.
 
     Parameters
     ----------
     x : float
-        Of the line, points.
+        Position of the tick, points.
     length : float
         Width of the number, points.
     end : float
@@ -209,8 +209,8 @@ def _draw_time(clock: Clock, area: tuple[float, float, float, float]) -> None:
     draw_list = imgui.get_window_draw_list()
     left, top, width, total = area
     low, high = clock.whole
-    share = (clock.time - low) / max(high - low, 1e-9)
-    x = left + width * min(max(share, 0.0), 1.0)
+    fraction = (clock.time - low) / max(high - low, 1e-9)
+    x = left + width * min(max(fraction, 0.0), 1.0)
     color = imgui.get_color_u32(_TIME)
     draw_list.add_line((x, top), (x, top + total), color, 2.0)
     half = 0.3 * imgui.get_font_size()
@@ -218,7 +218,7 @@ def _draw_time(clock: Clock, area: tuple[float, float, float, float]) -> None:
 
 
 def nice_step(smallest: float) -> int:
-    """Return the smallest of 1, 2, 5, 10, 20, 50 … that is no smaller.
+    """Return the smallest of 1, 2, 5, 10, 20, 50 … that is at least as large as a number.
 
     >>> [nice_step(x) for x in (0.2, 1.5, 3, 11, 60)]
     [1, 2, 5, 20, 100]

@@ -1,1 +1,1 @@
-"""Recording: pictures and videos of the view."""
+"""Recording of the view as pictures or video."""

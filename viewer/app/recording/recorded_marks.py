@@ -1,4 +1,4 @@
-"""Marks and explanations of the view for each frame of a recording."""
+"""Annotations of the view for each frame of a recording."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["RecordedMarks"]
 
 
 class RecordedMarks:
-    """Annotations of a moving scene: the pinned vertex and the chosen finding at creation.
+    """Annotations of a moving scene: those of the pinned vertex and of the chosen finding.
 
     Parameters
     ----------
     state : AppState
-        Later changes of the pinned vertex or finding have no effect.
+        Holds both; they are copied, so later changes have no effect.
     """
 
     def __init__(self, state: AppState) -> None:
@@ -42,7 +42,7 @@ class RecordedMarks:
         Parameters
         ----------
         scene : Scene
-            Posed; its actors are those of the state, or copies of them.
+            Posed scene with the actors of the state, or copies of them.
         size : (int, int)
             Width and height of the picture, pixels.
 

@@ -1,4 +1,4 @@
-"""Recording of the view, one step per frame, so that the window responds and can cancel it."""
+"""Recording of the view in steps of one frame, between which the window stays responsive."""
 
 from __future__ import annotations
 
@@ -42,16 +42,15 @@ def recording_steps(
     Parameters
     ----------
     state : AppState
-        Its scene is copied; later edits do not affect the recording, except for clips that
-        are being edited.
+        Holds the scene, which is copied: later edits do not affect the recording.
     context : moderngl.Context
-        Current in every step.
+        Context that is current in every step.
     settings : RecordSettings
         Settings of the recording.
     path : Path
         Target file; ``{frame}`` in the name of numbered pictures stands for their number.
     ghost : Ghost, optional
-        A surface drawn over the scene.
+        Surface that is drawn over the scene.
 
     Yields
     ------
@@ -73,7 +72,7 @@ def recording_steps(
     files = [path]
     if settings.kind == "pictures":
         files = _numbered(path, numbers)
-    # The dialog asks only about the file whose name it knows.
+    # The dialog asks about replacing a single file only, not about numbered ones.
     is_asked = settings.kind != "pictures"
     check_targets(files, state.inputs, is_asked, hint="choose another name")
     sink, size = _sink(settings, files, size, rate, numbers)
@@ -81,7 +80,7 @@ def recording_steps(
     renderer = Renderer(context)
     renderer.ghost = ghost
     try:
-        # Closed before its renderer is released, also if this generator is closed.
+        # The recording must be closed before its renderer, even if this generator is closed.
         with contextlib.closing(record(recording, renderer, sink)) as steps:
             for progress in steps:
                 yield progress.done, progress.total
@@ -95,7 +94,7 @@ def recording_steps(
 def _recording(
     state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
 ) -> Recording:
-    """Return the recorder of everything that the view shows, without tools and panels."""
+    """Return the description of a recording of the view, without tools and panels."""
     following = state.of(Following)
     options = copy.deepcopy(state.options)
     if settings.transparent and settings.kind != ".mp4":
@@ -111,7 +110,7 @@ def _recording(
         options,
         box=state.box.copy(),
         moves=state.clock.has_motion,
-        interpolate=state.clock.fill_gaps,
+        interpolate=state.clock.interpolate_gaps,
         turn=_FULL if settings.turntable else 0.0,
         follow=follow,
         selected=(state.chosen_actor, state.selected_joint),

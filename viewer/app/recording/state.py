@@ -1,4 +1,4 @@
-"""State of recording: the settings of the window "Record", and its request."""
+"""State of recording: settings of the Record window, and the requested file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class RecordSettings:
     size : str
         A key of the sizes offered.
     own_size : (int, int)
-        For ``"own"``.
+        Width and height for the size ``"own"``.
     rate : float
         Frames per second; 0 for the scene's own rate.
     turntable : bool
@@ -39,7 +39,7 @@ class RecordSettings:
     seconds : float
         Duration of the orbit if there is no motion.
     transparent : bool
-        Whether the background is left out.
+        Whether the background is transparent.
     n_cells : int
         Frames of a contact sheet.
     quality : int
@@ -57,7 +57,7 @@ class RecordSettings:
     quality: int = 75
 
     def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
-        """Return width and height for a view of a size."""
+        """Return the width and height of the recording for a given size of the view."""
         if self.size == "view":
             wide, high = (max(round(side), LEAST_PIXELS) for side in view)
             # Videos need even sizes; a lost row of the view does not matter.
@@ -70,14 +70,14 @@ class RecordSettings:
 
 @dataclass(slots=True)
 class Recording:
-    """State of the window "Record" and its request.
+    """State of the Record window.
 
     Attributes
     ----------
     settings : RecordSettings or None
-        Settings in the window "Record" while it is open.
+        Settings shown in the window; None while it is closed.
     wanted : Path or None
-        Where to record to, after the frame.
+        Target file of a recording that starts after the frame.
     """
 
     settings: RecordSettings | None = None

@@ -231,7 +231,9 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         choices.refines = checkbox(state, "Refine alignment", choices.refines)
         explain("refine the result of the search or the landmarks by closest points", why)
         choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
-        explain("carried: move with the surface around them; copied: with the alignment only", why)
+        explain(
+            "surface: joints follow the surface around them; alignment: only the alignment", why
+        )
         changed, count = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ITERATIONS)
         note_item(state, "Smoothing")
         explain("smoothing iterations for inpainted weights", why)

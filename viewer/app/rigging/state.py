@@ -198,7 +198,7 @@ class RigChoices:
     refines: bool = True
     fits: bool = True
     method: str = "robust"
-    joints: str = "carried"
+    joints: str = "surface"
     max_distance: float = 0.05
     max_angle: float = 30.0
     smoothing: int = 0

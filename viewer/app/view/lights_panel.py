@@ -5,9 +5,16 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, slider
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    note_item,
+    plain_zero,
+    same_line_if_room,
+    slider,
+)
 from viewer.app.view.display_actions import reset_lights
-from viewer.rendering.options import Light
+from viewer.rendering.options import Color, Light
 from viewer.rendering.srgb import decode_color, encode_color
 
 __all__ = ["draw"]
@@ -29,15 +36,13 @@ def draw(state: AppState) -> None:
     imgui.same_line()
     if button(state, "Reset lights"):
         reset_lights(state)
+    lights.sky = _color(state, "Light from above", lights.sky)
+    same_line_if_room("Light from below")
+    lights.ground = _color(state, "Light from below", lights.ground)
 
 
 def _draw_light(state: AppState, name: str, light: Light) -> None:
-    changed, picked = imgui.color_edit3(
-        f"{name} light", list(encode_color(light.color)), imgui.ColorEditFlags_.no_inputs
-    )
-    note_item(state, f"{name} light")
-    if changed:
-        light.color = decode_color((picked[0], picked[1], picked[2]))
+    light.color = _color(state, f"{name} light", light.color)
     imgui.push_id(name)
     for attribute, text, low, high, unit in (
         ("strength", "Strength", 0.0, 4.0, "%.2f"),
@@ -51,3 +56,11 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
         if changed:
             setattr(light, attribute, value)
     imgui.pop_id()
+
+
+def _color(state: AppState, label: str, color: Color) -> Color:
+    """Draw a colour picker and return the chosen colour, linear."""
+    flags = imgui.ColorEditFlags_.no_inputs
+    changed, picked = imgui.color_edit3(label, list(encode_color(color)), flags)
+    note_item(state, label)
+    return decode_color((picked[0], picked[1], picked[2])) if changed else color

@@ -1,1 +1,1 @@
-"""Weights: numbers of vertices as colours, and explanations of single vertices."""
+"""Weights: scalar quantities as colours, hover text, and explanations of single vertices."""

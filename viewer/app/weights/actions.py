@@ -33,18 +33,18 @@ __all__ = [
 ]
 
 _FIRST = ("weight", "field", "class", "parts")
-"""Views to begin with, the best first."""
+"""Quantities to show at first, by preference."""
 
 
 def no_view(state: AppState, key: str) -> str:
-    """Say why a scalar view has nothing to show; a joint or field can still be chosen.
+    """Return why a scalar quantity cannot be shown; a joint or field may still have to be chosen.
 
     Parameters
     ----------
     state : AppState
-        With the scene.
+        Holds the scene.
     key : str
-        Of ``SCALARS``.
+        A key of ``SCALARS``.
     """
     figures = [actor.figure for actor in state.scene.actors if actor.figure.mesh is not None]
     if not figures:
@@ -56,10 +56,10 @@ def no_view(state: AppState, key: str) -> str:
 
 
 def start_heat_map(state: AppState) -> None:
-    """Show numbers as colours, and begin with something to see.
+    """Show a scalar quantity as colours, replacing a choice for which nothing would be visible.
 
-    A view that no figure here has is replaced by one that there is; a joint without influence, or
-    none, by the one with the most; a field that is 0 everywhere by the first that is not.
+    A quantity that no figure has is replaced by an available one; a joint without influence, or
+    none, by the joint with the most; a field that is 0 everywhere by the first that is not.
     """
     options = state.options
     options.shading = "scalar"
@@ -82,7 +82,7 @@ def _start_with_joint(state: AppState, key: str) -> None:
     if 0 <= joint < len(sums) and sums[joint]:
         return
     most = most_influential(figure)
-    if most < 0:  # the chosen actor has no weights, another one may
+    if most < 0:  # the chosen actor has no weights, but another actor may have some
         state.options.scalar = telling_quantity(key, [actor.figure for actor in state.scene.actors])
         return
     if joint >= 0:
@@ -92,7 +92,7 @@ def _start_with_joint(state: AppState, key: str) -> None:
 
 
 def show_scalar(state: AppState, name: str) -> None:
-    """Show a scalar view; a range that was fixed for another one is let go of."""
+    """Show a scalar quantity; a range that was fixed for another quantity is discarded."""
     options = state.options
     if split_name(name)[0] != split_name(options.scalar)[0]:
         options.scalar_range = options.isolines = None
@@ -101,7 +101,7 @@ def show_scalar(state: AppState, name: str) -> None:
 
 
 def shown_joint(state: AppState) -> str:
-    """Return what the joint is called whose weights are shown; empty if none is selected."""
+    """Return the name of the joint whose weights are shown; empty if none is selected."""
     about, figure = split_name(state.options.scalar)[1], state.actor.figure
     if about or state.selected_joint < 0:
         return about
@@ -111,7 +111,7 @@ def shown_joint(state: AppState) -> str:
 
 
 def toggle_weights(state: AppState) -> None:
-    """Show the weights of the selected joint as colours, or the figure as before."""
+    """Switch between the weights of the selected joint as colours and normal shading."""
     options = state.options
     if options.shading == "scalar" and options.scalar == "weight":
         options.shading = "phong"
@@ -127,30 +127,32 @@ def toggle_weights(state: AppState) -> None:
 
 
 def toggle_telling(state: AppState) -> None:
-    """Describe the vertex under the mouse, also without the Weights panel, or only with it."""
+    """Choose whether hover text is shown always or only while the Weights panel is visible."""
     view = state.of(Weights)
     view.tells_always = not view.tells_always
     state.say_status(f"Vertex under the mouse {'on' if view.tells_always else 'off'}")
 
 
 def toggle_picking(state: AppState) -> None:
-    """Let clicks pin vertices, or choose actors and joints again."""
+    """Switch between clicks that pin vertices and clicks that select actors and joints."""
     view = state.of(Weights)
     view.picks_vertices = not view.picks_vertices
-    state.say_status("Click a vertex" if view.picks_vertices else "Clicks select again")
+    state.say_status(
+        "Clicks pin vertices" if view.picks_vertices else "Clicks select actors and joints"
+    )
 
 
 def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
-    """Explain a vertex from now on.
+    """Pin a vertex, and explain it in the Vertex panel.
 
     Parameters
     ----------
     state : AppState
-        With the scene.
+        Holds the scene.
     actor : int
-        Index in the scene.
+        Index of the actor in the scene.
     vertex : int
-        Of its figure.
+        Index of the vertex in its figure.
     """
     figure = state.scene.actors[actor].figure
     if not figure.is_attached:
@@ -161,7 +163,7 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
 
 
 def unpin(state: AppState) -> None:
-    """Explain no vertex any more; the panel that did so goes."""
+    """Unpin the vertex, and close the Vertex panel."""
     set_open(state, "vertex", False)
     view = state.of(Weights)
     view.pinned = view.explanation = view.explanation_key = None
@@ -169,7 +171,7 @@ def unpin(state: AppState) -> None:
 
 
 def explained(state: AppState) -> Explanation | None:
-    """Return why the pinned vertex is where it is right now; None if none is pinned any more.
+    """Return the explanation of the pinned vertex in the current pose; None if none is pinned.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The pinned vertex in pictures: where each joint alone would carry it, and where it is."""
+"""Drawing of the pinned vertex, with lines to its images under each joint alone."""
 
 from __future__ import annotations
 
@@ -24,36 +24,36 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["draw_hovered", "influence_colors", "pinned_annotations", "vertex_annotation"]
 
-# Pixels of a picture of usual height.
+# Pixels in a picture of standard height.
 _THINNEST, _THICKEST = 1.0, 5.0  # lines of the smallest and largest weight
-_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameters, the dark around a dot and around a line
+_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot, dark borders of dots and of lines
 _FAINTEST = 0.35
-_LONGEST = 24  # letters of a name
+_LONGEST = 24  # characters of a name
 _DARK, _LIGHT = (0.05, 0.06, 0.08, 0.8), (1.0, 1.0, 1.0, 1.0)
 _palettes: Memo[Skeleton, Bytes] = Memo()
 
 
 def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
-    """Return the colours of the influences, as the view of dominant joints has them: (K, 3), sRGB.
+    """Return the colours of the influences, those of dominant joints: (K, 3), sRGB.
 
     Parameters
     ----------
     explanation : Explanation
-        Of a vertex.
+        Explanation of a vertex.
     skeleton : Skeleton
-        Of its figure.
+        Skeleton of its figure.
     """
     colors = _palettes.get(skeleton, (), lambda: joint_palette(skeleton.parents))
     return colors[explanation.joints, :3] / 255.0
 
 
 def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotation, ...]:
-    """Return what is drawn of the pinned vertex, the same as long as nothing about it changes.
+    """Return the annotation of the pinned vertex; the same object as long as nothing changes.
 
     Parameters
     ----------
     state : AppState
-        With the scene as it is posed; a vertex that cannot be explained is let go of.
+        Holds the posed scene; a vertex that cannot be explained is unpinned.
     size : (int, int)
         Width and height of the picture, pixels.
     """
@@ -85,11 +85,11 @@ def vertex_annotation(
     Parameters
     ----------
     explanation : Explanation
-        Of the vertex, as its actor is posed.
+        Explanation of the vertex in the actor's pose.
     actor : Actor
-        With a skeleton.
+        Actor with a skeleton.
     draws_lines : bool
-        Whether there is more than the dot.
+        Whether lines are drawn in addition to the dot.
     size : (int, int)
         Width and height of the picture, pixels.
     """
@@ -100,17 +100,17 @@ def vertex_annotation(
     if not draws_lines or not len(explanation.joints):
         return Annotation(joined(parts), Manner(on_top=True))
     skeleton = actor.figure.skeleton
-    assert skeleton is not None  # something moves the vertex
+    assert skeleton is not None  # influences imply a skeleton
     images = apply_transform(actor.placement @ explanation.placement, explanation.images)
     colors = influence_colors(explanation, skeleton)
     lines = _image_lines(vertex, images, colors, explanation.weights, scale)
-    words = tuple(
+    texts = tuple(
         f"{printable(name, _LONGEST)}  {weight:.3f}"
         for name, weight in zip(explanation.names, explanation.weights.tolist(), strict=True)
     )
-    white = np.broadcast_to(LABEL_COLOR, (len(words), 3))
-    # After the name of the selected joint, before those of all others.
-    labels = Labels(words, images, np.arange(1, len(words) + 1, dtype=np.int32), white)
+    white = np.broadcast_to(LABEL_COLOR, (len(texts), 3))
+    # Priorities after the name of the selected joint, before those of all other joints.
+    labels = Labels(texts, images, np.arange(1, len(texts) + 1, dtype=np.int32), white)
     return Annotation(joined([lines, *parts]), Manner(on_top=True), labels)
 
 
@@ -118,9 +118,9 @@ def _image_lines(
     vertex: Floats, images: Floats, colors: Floats, weights: Floats, scale: float
 ) -> Segments:
     """Return a line and a dot for each influence, both with a dark rim; the strongest on top."""
-    shares = np.clip(np.abs(weights), 0.0, 1.0)
-    opacities = _FAINTEST + (1.0 - _FAINTEST) * shares
-    widths = _THINNEST + (_THICKEST - _THINNEST) * shares
+    strengths = np.clip(np.abs(weights), 0.0, 1.0)
+    opacities = _FAINTEST + (1.0 - _FAINTEST) * strengths
+    widths = _THINNEST + (_THICKEST - _THINNEST) * strengths
     count = len(images)
     dark, one = np.tile(_DARK, (count, 1)), np.ones((count, 1))
     starts = np.stack([np.broadcast_to(vertex, images.shape)] * 2 + [images] * 2, axis=1)
@@ -129,7 +129,7 @@ def _image_lines(
     shades = np.stack([dark, faint, dark, solid], axis=1)
     dot = np.full(count, _DOT)
     thick = scale * np.stack([widths + _BORDER, widths, dot + _RIM, dot], axis=1)
-    # The weakest first: they come last in explanations.
+    # Draw the weakest first; explanations list them last.
     order = np.arange(count)[::-1]
     return Segments(
         starts[order].reshape(-1, 3),
@@ -140,7 +140,7 @@ def _image_lines(
 
 
 def draw_hovered(state: AppState) -> None:
-    """Mark the vertex that is described, if one is; it is no part of pictures."""
+    """Mark the vertex that the hover text describes, in the window only, not in screenshots."""
     hover = state.of(Weights).hover
     if not hover.lines:
         return

@@ -1,4 +1,4 @@
-"""The legend of a scalar view: what its colours stand for, in a corner of the view."""
+"""Legend of a scalar quantity, in a corner of the view."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ __all__ = ["draw_legend"]
 
 _GAP = 10.0  # points from the edges of the view
 _BAR = (200.0, 12.0)  # points
-_TALL, _WIDE = 0.8, 0.4  # of the view, for names
-_MANY, _SMALLER = 12, 0.8  # with more names than this, they are written that much smaller
-_LONGEST = 40  # letters of a name
+_TALL, _WIDE = 0.8, 0.4  # fractions of the view's height and width available for names
+_MANY, _SMALLER = 12, 0.8  # number of names above which the font is scaled, and its scale
+_LONGEST = 40  # characters of a name
 _LINE = (0.05, 0.05, 0.06, 1.0)
 
 
 def draw_legend(state: AppState) -> Rect | None:
-    """Draw the legend if a scalar view is shown; return where it is.
+    """Draw the legend if a scalar quantity is shown; return its rectangle.
 
-    A picture that has its legend drawn into it needs no second one.
+    It is not drawn if the renderer already draws a legend into the picture.
     """
     x, y, width, height = state.view_rect
     shows_mesh = any(
@@ -51,10 +51,10 @@ def draw_legend(state: AppState) -> Rect | None:
 
 
 def _draw_bar(legend: Legend, width: float) -> None:
-    """Draw the colours, lines where the isolines are, and the numbers beneath."""
+    """Draw the colours, lines at the isolines, and the numbers below."""
     place, draw_list = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
     colors = legend.colors.astype(float) / 255.0
-    # Blocks of counts as they are, a smooth map in steps of some points.
+    # Discrete colours are drawn as they are, a continuous map in steps of a few points.
     steps = min(len(colors), round(width / 3.0)) if len(colors) == 256 else len(colors)
     for step in range(steps):
         # Whole pixels: edges between them would be blended with the background.
@@ -71,14 +71,14 @@ def _draw_bar(legend: Legend, width: float) -> None:
     base = imgui.get_cursor_pos()
     for tick in legend.ticks:
         size = imgui.calc_text_size(tick.text).x
-        # Numbers stay within the bar, and the next goes on the same line.
+        # Numbers stay within the bar, all on the same line.
         shift = min(max(tick.place * width - 0.5 * size, 0.0), width - size)
         imgui.set_cursor_pos((base.x + shift, base.y))
         imgui.text_unformatted(tick.text)
 
 
 def _draw_entries(legend: Legend, width: float, height: float) -> None:
-    """Draw a swatch and a name for as many things as there is room for, in columns."""
+    """Draw a colour and a name for as many entries as there is room for, in columns."""
     if not legend.entries:
         return
     side, line = imgui.get_text_line_height(), imgui.get_text_line_height_with_spacing()
@@ -98,7 +98,7 @@ def _draw_entries(legend: Legend, width: float, height: float) -> None:
             imgui.text_disabled(f"and {columns.left_out} more")
         first, left = first + count, left + columns.widths[number]
     imgui.set_cursor_pos((imgui.get_style().window_padding.x, top + columns.rows * line))
-    imgui.dummy((0.0, 0.0))  # ImGui wants an item where the cursor was set
+    imgui.dummy((0.0, 0.0))  # ImGui requires an item after the cursor is set
 
 
 def _draw_entry(entry: Entry, text: str, side: float) -> None:

@@ -1,4 +1,4 @@
-"""State of the tools that show weights: hovering, picking, explaining."""
+"""State of the Weights and Vertex panels: hovering, picking, and the pinned vertex."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ __all__ = ["Hover", "Pinned", "Weights", "wants_vertex"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pinned:
-    """A vertex that is explained.
+    """The vertex that the Vertex panel explains.
 
     Attributes
     ----------
     actor : int
-        Index in the scene.
+        Index of its actor in the scene.
     figure : Figure
-        That actor's: of another figure the vertex means nothing.
+        Figure of that actor, for which the index is valid.
     vertex : int
-        Index.
+        Index of the vertex.
     """
 
     actor: int
@@ -36,22 +36,22 @@ class Pinned:
 
 @dataclass(slots=True)
 class Hover:
-    """What lies under a mouse that rests.
+    """The vertex under a mouse that does not move.
 
     Attributes
     ----------
     since : float
-        Seconds of ImGui's clock at which mouse and picture came to rest.
+        Time since which neither mouse nor picture has changed, seconds of ImGui's clock.
     place : (float, float)
-        Where the mouse is, window coordinates.
+        Position of the mouse, window coordinates.
     picture : object
-        What the picture depends on; compared to know whether it changed.
+        Key of the picture, compared to detect a change.
     is_known : bool
-        Whether it was looked what is there since then.
+        Whether the vertex has been determined since then.
     lines : tuple of str
-        What is said of the vertex; empty for none.
+        Hover text; empty if there is no vertex.
     point : (3,)
-        Where the vertex is, scene space.
+        Position of the vertex, scene space.
     """
 
     since: float = 0.0
@@ -64,32 +64,32 @@ class Hover:
 
 @dataclass(slots=True)
 class Weights:
-    """The state of the Weights panel and of what shows vertices.
+    """State of the Weights and Vertex panels.
 
     Attributes
     ----------
     panel_frame : int
-        The frame of ImGui in which the Weights panel was drawn last.
+        ImGui's number of the last frame in which the Weights panel was drawn.
     tells_always : bool
-        Whether vertices under the mouse are described though the panel is not shown.
+        Whether hover text is shown even if the Weights panel is not visible.
     picks_vertices : bool
-        Whether clicks pin vertices in place of choosing actors and joints.
+        Whether clicks pin vertices instead of selecting actors and joints.
     hover : Hover
-        What lies under the mouse.
+        The vertex under the mouse.
     is_waiting : bool
-        Whether the mouse rests, but not yet long enough.
+        Whether the mouse is still, but not yet for long enough.
     pinned : Pinned or None
         The vertex that is explained.
     draws_lines : bool
-        Whether lines lead from it to where each joint alone would carry it.
+        Whether lines are drawn from it to its images under each joint alone.
     explanation : Explanation or None
-        Of it, as it was computed last.
+        Its latest explanation.
     explanation_key : object
-        What that depends on.
+        Key of the state for which the explanation was computed.
     annotations : tuple of Annotation
-        What is drawn of it; at most one.
+        Its drawing in the view; at most one.
     annotation_key : object
-        What that depends on.
+        Key of the state for which the annotation was made.
     """
 
     panel_frame: int = -1
@@ -106,5 +106,5 @@ class Weights:
 
 
 def wants_vertex(view: Weights) -> bool:
-    """Return whether a click is meant for a vertex: with Alt, or while vertices are picked."""
+    """Return whether a click pins a vertex: with Alt, or while vertices are picked."""
     return view.picks_vertices or imgui.get_io().key_alt

@@ -1,4 +1,4 @@
-"""Vertex: every number that puts the pinned vertex where it is, to be checked by hand."""
+"""Vertex panel: all intermediate values of the skinning of the pinned vertex."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ __all__ = ["draw", "fitting", "matrix_text"]
 
 _DIGITS = 4
 _COPIED_DIGITS = 6
-_LONGEST = 40  # letters of a name
-_NUMBER, _LABEL = 3.8, 4.7  # widths of columns, letters' heights
-_DIGIT = 0.56  # width, letters' heights
-_SMALLEST, _FEWEST = 0.75, 3  # share of the usual letters, digits: in a narrow panel
+_LONGEST = 40  # characters of a name
+_NUMBER, _LABEL = 3.8, 4.7  # widths of columns, in font sizes
+_DIGIT = 0.56  # width of a digit, in font sizes
+_SMALLEST, _FEWEST = 0.75, 3  # smallest font scale and number of decimals, for a narrow panel
 _PADDING = 2.0  # points beside each number
-_SPARE = 6.0  # points: heights of letters are whole pixels
+_SPARE = 6.0  # points: font sizes are rounded to whole pixels
 
 
 def draw(state: AppState) -> None:
@@ -46,17 +46,17 @@ def draw(state: AppState) -> None:
     pinned = weights.pinned
     if explanation is None or pinned is None or pinned.figure.skeleton is None:
         imgui.text_wrapped("Alt+click a vertex to explain its position here.")
-        text = "Click without Alt"
+        text = "Pick vertices without Alt"
         if checkbox(state, text, weights.picks_vertices) != weights.picks_vertices:
             toggle_picking(state)
         return
     _draw_head(state, explanation)
-    # Numbers are not cut off in the narrowest panel either. Were the other scroll bar not always
-    # there, what is drawn smaller could make it go, and come back as it is drawn larger then.
+    # The horizontal scroll bar keeps numbers readable in the narrowest panel. If the vertical one
+    # were optional, the scaled text could hide it, grow in the space gained, and flicker.
     bars = imgui.WindowFlags_.horizontal_scrollbar | imgui.WindowFlags_.always_vertical_scrollbar
     if imgui.begin_child("numbers", (0.0, 0.0), 0, bars):
-        share, digits = fitting(imgui.get_content_region_avail().x, imgui.get_font_size())
-        imgui.push_font(None, share * imgui.get_style().font_size_base)
+        scale, digits = fitting(imgui.get_content_region_avail().x, imgui.get_font_size())
+        imgui.push_font(None, scale * imgui.get_style().font_size_base)
         imgui.push_style_var_x(imgui.StyleVar_.cell_padding, _PADDING)
         colors = influence_colors(explanation, pinned.figure.skeleton)
         _draw_steps(_Sheet(state, digits), explanation, colors)
@@ -65,48 +65,47 @@ def draw(state: AppState) -> None:
     imgui.end_child()
 
 
-def fitting(room: float, letters: float) -> tuple[float, int]:
-    """Return how much smaller letters are so that rows fit, and how many digits numbers have.
+def fitting(room: float, font_size: float) -> tuple[float, int]:
+    """Return the font scale and the number of decimals with which rows fit into the panel.
 
     Parameters
     ----------
     room : float
         Width of the panel, points.
-    letters : float
-        Usual height of the letters, points.
+    font_size : float
+        Normal font size, points.
 
     Returns
     -------
-    share : float
-        Of that height, 0.75 to 1.
+    scale : float
+        Scale of the font, 0.75 to 1.
     digits : int
-        Behind the point: four, or three where that is not small enough.
+        Number of decimals: four, or three if the smallest font is still too large.
 
     >>> fitting(300.0, 15.0), fitting(240.0, 15.0)[1], fitting(50.0, 15.0)
     ((1.0, 4), 4, (0.75, 3))
     """
-    share = 0.0
+    scale = 0.0
     for digits in range(_DIGITS, _FEWEST - 1, -1):
         number = _NUMBER - _DIGIT * (_DIGITS - digits)
         # Four numbers of a matrix, or a label and three of a point.
-        share = min(
-            (room - 8.0 * _PADDING - _SPARE) / (max(_LABEL, number) + 3.0 * number) / letters, 1.0
-        )
-        if share >= _SMALLEST:
+        widest = (max(_LABEL, number) + 3.0 * number) * font_size
+        scale = min((room - 8.0 * _PADDING - _SPARE) / widest, 1.0)
+        if scale >= _SMALLEST:
             break
-    return max(share, _SMALLEST), digits
+    return max(scale, _SMALLEST), digits
 
 
 @dataclass(frozen=True, slots=True)
 class _Sheet:
-    """Where rows of numbers are written, and with how many digits."""
+    """State of the window, and the number of decimals of all numbers."""
 
     state: AppState
     digits: int
 
 
 def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
-    """Draw what happens to the vertex, in the order in which it does."""
+    """Draw the steps of the skinning of the vertex in their order."""
     _draw_rest(sheet, one)
     if one.is_free:
         imgui.text_wrapped("No influence: the vertex stays at its bind position.")
@@ -122,7 +121,7 @@ def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
 def _draw_head(state: AppState, one: Explanation) -> None:
     weights = state.of(Weights)
     pinned = weights.pinned
-    assert pinned is not None  # it is explained
+    assert pinned is not None  # only a pinned vertex is explained
     name = printable(state.scene.actors[pinned.actor].name, _LONGEST)
     imgui.text_wrapped(f"Vertex {one.vertex} of {name}: {METHODS[one.skinning.method].title}")
     if button(state, "Copy as text"):
@@ -134,21 +133,21 @@ def _draw_head(state: AppState, one: Explanation) -> None:
     explain("unpin the vertex (Esc)")
     same_line_if_room("Lines")
     weights.draws_lines = checkbox(state, "Lines", weights.draws_lines)
-    explain("to where each joint alone would move the vertex; thicker for larger weights")
+    explain("draw lines to the vertex as moved by each joint alone; thicker for larger weights")
 
 
 def _draw_rest(sheet: _Sheet, one: Explanation) -> None:
-    """Draw how the file's vertex became p, what the joints move."""
+    """Draw the steps from the vertex in the file to p, the position before skinning."""
     rows = [("stored", one.stored)]
     if not np.array_equal(one.shaped, one.stored):
         rows.append(("+ shape", one.shaped))
     if not np.array_equal(one.rest, one.shaped):
-        rows.append(("+ pose", one.rest))
+        rows.append(("+ correctives", one.rest))
     _draw_rows(sheet, "rest", [*rows, ("p", one.rest)])
 
 
 def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) -> None:
-    """Draw what one joint does: its matrix, its image of the vertex, its term of the sum."""
+    """Draw one influence: its matrix, its image of the vertex, and its term of the sum."""
     state, number = sheet.state, index + 1
     imgui.separator()
     _draw_swatch(color)
@@ -156,7 +155,7 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
     is_chosen = pinned is not None and state.chosen_actor == pinned.actor
     joint, name = int(one.joints[index]), printable(one.names[index], _LONGEST)
     room, head = imgui.get_content_region_avail().x, f"{number}. {name}"
-    weight = f"w = {one.weights[index]:.{_DIGITS}f}"
+    weight = f"w{number} = {one.weights[index]:.{_DIGITS}f}"
     fits = imgui.calc_text_size(f"{head}: {weight}").x <= room
     text = f"{head}: {weight}" if fits else head
     is_chosen &= state.selected_joint == joint
@@ -170,7 +169,7 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
         imgui.text_unformatted(weight)
     _draw_rows(sheet, f"matrix {number}", [("", row) for row in one.matrices[index]])
     explain(f"M{number}, the skinning matrix")
-    terms = [(f"M{number} p", one.images[index]), (f"w M{number} p", one.terms[index])]
+    terms = [(f"M{number} p", one.images[index]), (f"w{number} M{number} p", one.terms[index])]
     _draw_rows(sheet, f"terms {number}", terms)
     if button(state, f"Copy M{number}"):
         imgui.set_clipboard_text(matrix_text(one.matrices[index]))
@@ -178,7 +177,7 @@ def _draw_influence(sheet: _Sheet, one: Explanation, index: int, color: Floats) 
 
 
 def _draw_swatch(color: Floats) -> None:
-    """Draw the colour that an influence has in the view, at the beginning of a line."""
+    """Draw the colour of an influence in the view, at the beginning of a line."""
     place, side = imgui.get_cursor_screen_pos(), imgui.get_text_line_height()
     r, g, b = color.tolist()
     ink = imgui.get_color_u32((r, g, b, 1.0))
@@ -189,12 +188,12 @@ def _draw_swatch(color: Floats) -> None:
 
 
 def matrix_text(matrix: Floats) -> str:
-    """Return a matrix as rows of numbers that read back as the same ones.
+    """Return a matrix as rows of numbers in full precision.
 
     Parameters
     ----------
     matrix : (4, 4)
-        Any.
+        Matrix to copy.
     """
     return "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
 
@@ -211,13 +210,14 @@ def _draw_dual(sheet: _Sheet, dual: DualTerms) -> None:
     imgui.separator_text("Dual quaternions")
     for index, values in enumerate(dual.duals):
         flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
-        imgui.text_wrapped(f"q{index + 1}: weight {dual.fractions[index]:.{_DIGITS}f}{flip}")
+        weight = f"{dual.fractions[index]:.{_DIGITS}f}"
+        imgui.text_wrapped(f"q{index + 1}: normalised weight {weight}{flip}")
         _draw_quaternions(sheet, f"dual {index}", values)
-    imgui.text_wrapped("q = sum of weight times q, negated as above")
+    imgui.text_wrapped("q = sum of normalised weight times q, with these signs")
     _draw_quaternions(sheet, "blended", dual.blended)
     _draw_rows(sheet, "length", [("length", np.array([dual.length]))])
-    explain("of the real part; both parts are divided by it")
-    _draw_rows(sheet, "moved", [("stretched", dual.stretched), ("by q", dual.position)])
+    explain("length of the real part, by which both parts are divided")
+    _draw_rows(sheet, "moved", [("stretched p", dual.stretched), ("moved by q", dual.position)])
 
 
 def _draw_quaternions(sheet: _Sheet, name: str, values: Floats) -> None:
@@ -227,7 +227,7 @@ def _draw_quaternions(sheet: _Sheet, name: str, values: Floats) -> None:
 
 
 def _draw_end(sheet: _Sheet, one: Explanation) -> None:
-    """Draw where the vertex ends up."""
+    """Draw the result of skinning, the figure's placement, and the final position."""
     imgui.separator()
     method = METHODS[one.skinning.method]
     if method.result:
@@ -237,7 +237,7 @@ def _draw_end(sheet: _Sheet, one: Explanation) -> None:
         _draw_rows(sheet, "result", [("skinned", one.skinned)])
     if not np.array_equal(one.placement, np.eye(4)):
         factor = one.placement[0, :1]
-        _draw_rows(sheet, "placed", [("times", factor), ("plus", one.placement[:3, 3])])
+        _draw_rows(sheet, "placed", [("scale", factor), ("translation", one.placement[:3, 3])])
     _draw_rows(sheet, "end", [("position", one.position)])
 
 

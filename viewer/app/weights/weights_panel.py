@@ -1,4 +1,4 @@
-"""Weights: numbers of the vertices as colours, and tools that describe and explain a vertex."""
+"""Weights panel: scalar quantities as colours, and tools to inspect single vertices."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from viewer.rig.scalars import SCALARS, length_unit, menu_title, shown_unit, spl
 
 __all__ = ["draw"]
 
-_LONGEST = 40  # letters of a name
+_LONGEST = 40  # characters of a name
 _WHOLE = ("discrete", "categorical")
 
 
@@ -49,7 +49,7 @@ def draw(state: AppState) -> None:
     if SCALARS[key].about == "field":
         _draw_fields(state, key)
     _draw_largest(state, key)
-    with disabled("" if options.shading == "scalar" else "no values are shown"):
+    with disabled("" if options.shading == "scalar" else "the heat map is off"):
         _draw_range(state, key)
         _draw_marks(state, key)
     imgui.separator()
@@ -57,7 +57,7 @@ def draw(state: AppState) -> None:
 
 
 def _draw_views(state: AppState) -> None:
-    """Draw the list of views; those that no figure here has are grey and say why."""
+    """Draw the list of quantities; unavailable ones are disabled, with the reason as tooltip."""
     key = split_name(state.options.scalar)[0]
     imgui.set_next_item_width(-1.0)
     whole = imgui.ComboFlags_.height_largest
@@ -69,7 +69,7 @@ def _draw_views(state: AppState) -> None:
     for name in SCALARS:
         why = no_view(state, name)
         with disabled(why):
-            # Choosing what is shown already keeps the joint that the command line named.
+            # Choosing the current quantity again keeps a joint named on the command line.
             if imgui.selectable(menu_title(name, skinning), name == key)[0]:
                 show_scalar(state, state.options.scalar if name == key else name)
             note_item(state, f"view {name}")
@@ -78,7 +78,7 @@ def _draw_views(state: AppState) -> None:
 
 
 def _draw_joint(state: AppState) -> None:
-    """Say whose weights are shown: the selected joint's, or those of one that was named."""
+    """Draw the name of the joint whose weights are shown, the selected or an explicit one."""
     joint, named = shown_joint(state), split_name(state.options.scalar)[1]
     if not joint:
         imgui.text_wrapped("Click the skin in the view, or a joint in the tree.")
@@ -86,7 +86,8 @@ def _draw_joint(state: AppState) -> None:
     imgui.text_wrapped(f"of {printable(joint, _LONGEST)}")
     if named and button(state, "Of the selected joint"):
         state.options.scalar = split_name(state.options.scalar)[0]
-    explain(f"now always of {printable(joint, _LONGEST)}" if named else "")
+    shown = printable(joint, _LONGEST)
+    explain(f"now {shown} is shown, whichever joint is selected" if named else "")
 
 
 def _draw_fields(state: AppState, key: str) -> None:
@@ -106,7 +107,7 @@ def _draw_fields(state: AppState, key: str) -> None:
 
 
 def _draw_largest(state: AppState, key: str) -> None:
-    """Say how large a length gets, in the figure's unit."""
+    """Draw the largest value of a length, in the figure's unit."""
     if state.options.shading == "scalar" and SCALARS[key].unit == "length":
         factor, unit = length_unit(state.actor.figure)
         most = short_number(factor * state.stats.scalar_range[1])
@@ -114,15 +115,15 @@ def _draw_largest(state: AppState, key: str) -> None:
 
 
 def _draw_range(state: AppState, key: str) -> None:
-    """Draw what the ends of the colours stand for: all that there is, or two numbers."""
+    """Draw the choice of the colours' range: automatic, or fixed by two numbers."""
     options = state.options
-    why = "it has one colour per integer" if SCALARS[key].kind in _WHOLE else ""
+    why = "this quantity has one colour per integer" if SCALARS[key].kind in _WHOLE else ""
     with disabled(why):
         if imgui.radio_button("Automatic", options.scalar_range is None):
             options.scalar_range = None
         note_item(state, "Automatic")
         explain(
-            f"the colours span {TYPICAL:.0%} of the nonzero values; larger ones take the "
+            f"the colours span {TYPICAL:.0%} of the nonzero values; values outside get the "
             "end colours"
             if SCALARS[key].robust
             else "the colours span all values",
@@ -132,7 +133,7 @@ def _draw_range(state: AppState, key: str) -> None:
         if imgui.radio_button("Fixed", options.scalar_range is not None):
             options.scalar_range = options.scalar_range or _present_range(state)
         note_item(state, "Fixed")
-        explain("the colours do not change with the pose; values outside take the end "
+        explain("the range does not change with the pose; values outside get the end "
                 "colours", why)  # fmt: skip
     if options.scalar_range is not None and not why:
         low, high = options.scalar_range
@@ -157,7 +158,7 @@ def _end_field(
 
 
 def _present_range(state: AppState) -> tuple[float, float]:
-    """Return the automatic range of this moment, in the unit of the legend."""
+    """Return the current automatic range, in the unit of the legend."""
     factor, _ = shown_unit(state.options.scalar, state.actor.figure)
     low, high = state.stats.scalar_ends
     return float(f"{factor * low:.3g}"), float(f"{factor * high:.3g}")
@@ -170,7 +171,7 @@ def _unit(figure: Figure, name: str) -> str:
 def _draw_marks(state: AppState, key: str) -> None:
     """Draw the check boxes for isolines and the legend."""
     options, view = state.options, SCALARS[key]
-    why = "there are no values between two colours" if view.kind in _WHOLE else ""
+    why = "isolines need a continuous quantity" if view.kind in _WHOLE else ""
     shown = view.isolines if options.isolines is None else options.isolines
     wanted = checkbox(state, "Isolines", shown and not why, why)
     if wanted != shown and not why:
@@ -182,10 +183,10 @@ def _draw_marks(state: AppState, key: str) -> None:
 
 
 def _draw_vertex_tools(state: AppState) -> None:
-    """Draw what describes and explains single vertices."""
+    """Draw the settings of hover text and vertex picking."""
     view, why = state.of(Weights), no_mesh(state)
-    imgui.text_wrapped("Rest the mouse on a surface to describe its vertex.")
-    text = "Also without this panel"
+    imgui.text_wrapped("Hover over a surface to see the properties of a vertex.")
+    text = "Even without this panel"
     view.tells_always = checkbox(state, text, view.tells_always, why)
     view.picks_vertices = checkbox(state, "Pick vertices", view.picks_vertices, why)
     explain("click to explain a vertex; Alt+click does so at any time")

@@ -133,7 +133,7 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnost
         "n": int(found.matched.sum()),
         "all": len(found.matched),
         "ratio": ratio,
-        "filled": int(inpainted.sum()),
+        "inpainted": int(inpainted.sum()),
     }
     lines = [Diagnostic("R005.matched", values=values)]
     if ratio < _FEW:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from viewer.diagnostics import Phrase
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
 
@@ -20,13 +21,13 @@ class Pairing:
     ----------
     pairs : tuple of (Actor, Actor)
         In the first scene's order; each with the motion to compare.
-    first, second : tuple of str
+    first, second : tuple of Phrase
         Labels of everything unpaired: actors, and motions that belong to unpaired actors only.
     """
 
     pairs: tuple[tuple[Actor, Actor], ...]
-    first: tuple[str, ...] = ()
-    second: tuple[str, ...] = ()
+    first: tuple[Phrase, ...] = ()
+    second: tuple[Phrase, ...] = ()
 
 
 # Each rule is tried for all actors before the next rule.
@@ -68,8 +69,8 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
     dealt_ones, clips = _with_clips(ones, left, [other.clip for other in dealt])
     return Pairing(
         tuple(zip(dealt_ones, dealt, strict=True)),
-        (*map(_described, left), *(f"motion {clip.name}" for clip in clips)),
-        (*map(_described, other_left), *(f"motion {clip.name}" for clip in other_clips)),
+        _lone(left, clips),
+        _lone(other_left, other_clips),
     )
 
 
@@ -82,14 +83,15 @@ def _kind(actor: Actor) -> tuple[bool, bool, bool]:
     return figure.skeleton is not None, figure.mesh is not None, figure.points is not None
 
 
-def _described(actor: Actor) -> str:
-    """Return an actor's name, and its kind unless it has both mesh and skeleton."""
+def _lone(actors: Sequence[Actor], clips: Sequence[Clip]) -> tuple[Phrase, ...]:
+    """Return unpaired clips, and actors with their kind unless they have mesh and skeleton."""
     kinds = {
-        (True, False, False): " (a skeleton)",
-        (False, True, False): " (a mesh)",
-        (False, False, True): " (captured points)",
+        (True, False, False): "lone-skeleton",
+        (False, True, False): "lone-mesh",
+        (False, False, True): "lone-points",
     }
-    return actor.name + kinds.get(_kind(actor), "")
+    figures = (Phrase(kinds.get(_kind(one), "lone-figure"), name=one.name) for one in actors)
+    return (*figures, *(Phrase("lone-motion", name=clip.name) for clip in clips))
 
 
 def _with_clips(

@@ -24,7 +24,7 @@ class Compared:
         The argument as given.
     differences : tuple of (str, Difference)
         One per actor, with the actor's name in the reference.
-    mismatches : tuple of str
+    mismatches : tuple of Diagnostic
         Actors on one side only, and on which side.
     error : str
         Why it could not be opened; empty if it could.
@@ -34,7 +34,7 @@ class Compared:
 
     name: str
     differences: tuple[tuple[str, Difference], ...] = ()
-    mismatches: tuple[str, ...] = ()
+    mismatches: tuple[Diagnostic, ...] = ()
     error: str = ""
     diagnostics: tuple[Diagnostic, ...] = field(default=())
 
@@ -52,8 +52,8 @@ def amount(value: float, kind: str, difference: Difference) -> str:
         return f"{value:.4g}"
     if difference.unit in METRES:
         return f"{1000.0 * METRES[difference.unit] * value:.4g} mm"
-    share = 100.0 * value / difference.size if difference.size > 0.0 else math.nan
-    return f"{value:.4g} ({share:.3g} % of the size)"
+    percent = 100.0 * value / difference.size if difference.size > 0.0 else math.nan
+    return f"{value:.4g} ({percent:.3g} % of the size)"
 
 
 def lines_of(compared: Compared, tolerance: float | None) -> list[str]:
@@ -131,9 +131,9 @@ def json_text(reference: str, rows: Sequence[Compared], tolerance: float | None)
                 "name": row.name,
                 "error": row.error or None,
                 "within": None if tolerance is None else not row.exceeds(tolerance),
-                "mismatches": row.mismatches,
+                "mismatches": [str(found) for found in row.mismatches],
                 "warnings": [str(found) for found in row.diagnostics],
-                "diagnostics": [described(found) for found in row.diagnostics],
+                "diagnostics": [described(found) for found in (*row.diagnostics, *row.mismatches)],
                 "actors": [_actor(name, difference) for name, difference in row.differences],
             }
             for row in rows
@@ -147,8 +147,9 @@ def _actor(name: str, difference: Difference) -> dict[str, object]:
         "name": name,
         "size": difference.size,
         "unit": difference.unit or None,
-        "mismatches": difference.mismatches,
-        "notes": difference.notes,
+        "mismatches": [str(found) for found in difference.mismatches],
+        "notes": [str(found) for found in difference.notes],
+        "diagnostics": [described(found) for found in (*difference.mismatches, *difference.notes)],
         "measures": [
             {
                 "name": measure.name,

@@ -14,6 +14,7 @@ from viewer.diagnostics.wording import (
     body_models,
     bvh,
     clips,
+    comparison,
     easymocap,
     joints,
     kinds,
@@ -36,9 +37,9 @@ from viewer.diagnostics.wording import (
 TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
     *(archives, body_models, easymocap, poses, pictures),
-    *(bindings, skeletons, meshes, clips, motion, loading, rigging),
+    *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison),
 )
-_CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging)
+_CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging, comparison)
 
 CODES: dict[str, Code] = {
     code: row for table in _CODED for code, row in sorted(table.CODES.items())

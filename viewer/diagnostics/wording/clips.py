@@ -7,7 +7,9 @@ CODES = {
     "C002": Code("warning", "duplicate key times", "keep one of them"),
     "C003": Code("warning", "joint jumps between frames", "look for a bad frame or a cut there"),
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
-    "C005": Code("warning", "missing frames", "interpolate them (--fill-gaps) or capture again"),
+    "C005": Code(
+        "warning", "missing frames", "interpolate them (--interpolate-gaps) or capture again"
+    ),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
     "C007": Code("warning", "foot sliding", "lock the foot or adjust the root motion"),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),
@@ -32,6 +34,8 @@ MESSAGES = {
     "C007.foot": "{n:#frame/{all}}: {joint:text} slides by {distance} in total, at up to {speed} "
     "(frame {frame})",
     "C008.foot": "{n:#frame/{all}}: {joint:text} is {depth} below the ground at frame {frame}",
+    "C009.channels": "clip {clip:text} has {n:#channel}, the skeleton {misfit}",
+    "C009.rig": "clip {clip:text}: the skeleton {misfit}",
     "C010.one-time": "starts and ends at {time:zg} s",
     "C011.point": "{name:text} has a confidence below {limit:g} in {percent:.0f} % of the {n} "
     "frames in which it is visible (first: frame {frame})",
@@ -40,10 +44,18 @@ MESSAGES = {
     "C012.points": "{n:#keypoint/{all}|is|are} never visible: {names:list}",
     "C013.heights": "feet rest at {n:#height} ({levels:list}): ground height unclear, feet not "
     "checked",
-    "C013.no-height": "feet rest at no height long enough: ground height unclear, feet not checked",
+    "C013.no-height": "feet never rest long enough at one height: ground height unclear, "
+    "feet not checked",
 }
 
 PHRASES = {
+    # Why a clip cannot move a skeleton, after its name
+    "clip-needs": "needs {n} (3 + 3 x {joints} joints)",
+    "not-course-rig": "is not a course rig, whose clips move the root along x, y, z and rotate "
+    "each joint about x, y, z: {reason}",
+    "joint-with-dofs": "joint {joint:text} has DOFs {kinds:all}",
+    "joint-without-dofs": "joint {joint:text} has no DOFs",
+    "dofs-unordered": "its DOFs are not in the order of its joints",
     "one-frame": "frame {frame}",
     "frame-range": "frames {first} to {last}",
     "resting-height": "{height:.4g} for {seconds:.2g} s",

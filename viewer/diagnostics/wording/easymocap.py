@@ -33,7 +33,7 @@ MESSAGES = {
     "folder are used",
     "F007.record-poses": "poses in this record and in a separate folder: those in the folder are "
     "used",
-    "F007.record-vertices": "vertices not needed and ignored",
+    "F007.record-vertices": "vertices are not needed: ignored",
     "F007.record-first": "no earlier record has {keys:or}: 0 is used there",
     "F007.record-last": "no {item} in this record: the person's last known values are used",
     "F007.record-no-last": "no {item} in this or earlier records of the same person: 0 is used",

@@ -10,6 +10,11 @@ MESSAGES = {
     "{other}) and {first} positions (line {line})",
     "F002.morph-vertices": "normals: expected vertex {expected} as in positions, found vertex "
     "{found}",
+    # Targets that do not match a figure
+    "F004.morph-mesh": "morph {morph:text}: {figure:text} has no mesh to change",
+    "F004.morph-shapes": "morph {morph:text}: {figure:text} has shapes of its own",
+    "F004.morph-vertex": "morph {morph:text}: vertex index {found} is outside {figure:text}, which "
+    "has {n:#vertex}",
     "F007.morph-empty": "empty: moves no vertex",
     "F007.morph-normals": "no normals section: normals unchanged",
 }

@@ -1,6 +1,18 @@
 """Messages about poses and motions applied to figures."""
 
 MESSAGES = {
+    "F004.body-joint": "{motion:text} moves the joint {joint:text}, which {figure:text} does not "
+    "have",
+    "F004.no-skeleton": "{figure:text} has no skeleton to move",
+    "F004.mirror": "figure {figure:text} has no skeleton to mirror",
+    "F004.mapping-joint": "the mapping names {joint:quoted}, which {figure:text} does not have",
+    "F004.mapping-joints": "the mapping names {joint:quoted}, of which {figure:text} has {n}",
+    "F004.joints-unmatched": "{motion:text} does not fit {figure:text}: expected hips and a leg or "
+    "an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
+    "{figure:text}: {idle:list8}",
+    "F004.no-common-joint": "{pose:text} and {figure:text} have no joint name in common",
+    "F004.asymmetric": "{joint:text} has no partner on the other side: the skeleton is not "
+    "symmetric",
     "F007.coefficient-left-out": "{group} coefficient {last} omitted (largest value "
     "{largest:.3g}): {figure:text} has {most}",
     "F007.coefficients-left-out": "{group} coefficients {first} to {last} omitted (largest value "
@@ -30,11 +42,13 @@ MESSAGES = {
 }
 
 PHRASES = {
+    "the-pose": "the pose",
+    "two-joints": "two joints",
     "joint-by-joint": "{joint:text} by {partner:text}",
     "ratio-of-legs": "leg lengths",
     "ratio-of-arms": "arm lengths",
     "ratio-of-bones": "bone lengths",
-    "ratio-of-nothing": "nothing",
+    "ratio-of-nothing": "unknown lengths",
     "left-moves": "joint translations",
     "left-place": "figure translation",
     "left-size": "figure scale",

@@ -9,7 +9,7 @@ CODES = {
     "R002": Code(
         "warning",
         "unreliable alignment",
-        "give --up, --facing or landmarks, or pose the template like the target",
+        "specify --up, --facing or landmarks, or pose the template like the target",
     ),
     "R003": Code("note", "fitted pose and proportions", "none if they match the target"),
     "R004": Code(
@@ -40,7 +40,7 @@ MESSAGES = {
     "{z:.4g}",
     "R001.error": "alignment error: {error:.3f} % of the target's size (RMS of the best 90 %; "
     "template to target {away:.3f} %)",
-    "R002.error": "unreliable alignment, error above {limit:g} %: give --up, --facing or "
+    "R002.error": "unreliable alignment, error above {limit:g} %: specify --up, --facing or "
     "landmarks, or pose the template like the target",
     "R003.gap": "result: {gap}",
     "R003.not-fitted": "pose: not fitted, as that would give {gap}",
@@ -56,7 +56,7 @@ MESSAGES = {
     "a gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use --scale axes",
     "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all take the weights of the "
     "nearest vertex",
-    "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {filled}",
+    "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
     "R005.nearest": "nearest vertex within the limit for {n} of {all} vertices",
     "R005.negative-weights": "negative weights of the template treated as 0: {n}",
     "R005.reversed": "{n:#part} of the target with winding opposite to the template: matched with "

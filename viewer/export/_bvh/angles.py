@@ -38,8 +38,8 @@ def unrolled(angles: Floats, order: str) -> Floats:
     (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation, and so are multiples of 2 pi
     more. If the middle angle is +-pi / 2, only the sum or difference of the outer two is defined.
 
-    ``angles`` (N, ..., 3): radians, by frames; as ``euler_angles`` gives them.
-    ``order``: of the axes.
+    ``angles`` (N, ..., 3): radians, one row per frame; result of ``euler_angles``.
+    ``order``: order of the axes.
     Returns (N, ..., 3): radians, of any size.
     """
     if len(angles) < 2:
@@ -60,9 +60,10 @@ def _wrapped(angles: Floats) -> Floats:
 
 
 def _unlocked(angles: Floats, order: str) -> Floats:
-    """Give frames in gimbal lock the first angle of the previous frame; the third compensates.
+    """Set the first angle of frames in gimbal lock to that of the previous frame.
 
-    R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined.
+    R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined, and the third
+    angle compensates.
     """
     locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
     if not locked.any():

@@ -1,13 +1,13 @@
 """A sampled animation in BVH form: offsets of an unrotated rest pose, and joint channels.
 
-With W the world rotation of a joint at rest and P its rest position, x the file's axes to the
-world's, e the figure's axes to the file's, R the local rotation of a frame, R_0 the one at rest::
+W is the world rotation of a joint at rest and P its rest position, x maps world axes to file axes
+and e figure axes to file axes, R is the local rotation in a frame and R_0 the one at rest::
 
     offset    o_j = e (P_j - P_parent)                       no rotations at rest
-    rotation  Q_j = e W_parent R R_0^-1 W_parent^-1 e^-1     x replaces the first e at the root
-    position  p_j = D_parent^-1 (place_j - place_parent)     D: product of Q from the root on
+    rotation  Q_j = e W_parent R R_0^-1 W_parent^-1 e^-1     at the root, x replaces the first e
+    position  p_j = D_parent^-1 (place_j - place_parent)     D: product of Q down from the root
 
-A joint whose p is o in every frame needs no position channels.
+A joint with p = o in every frame needs no position channels.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, rest_translatio
 from viewer.rig.pose import rest_pose
 
 _BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
-_NOISE = 1e-9  # of the skeleton's size: smaller motions count as none
+_NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,11 +35,11 @@ class Space:
     Attributes
     ----------
     rest : (3, 3)
-        The figure's axes to the file's, e.
+        Matrix from figure axes to file axes, e.
     world : (3, 3)
-        The world's axes to the file's, x.
+        Matrix from world axes to file axes, x.
     factor : float
-        Scale factor from the figure's lengths to the file's.
+        Scale factor from the figure's unit to the file's.
     """
 
     rest: Floats
@@ -49,16 +49,16 @@ class Space:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """Contents of a file: J joints, in the figure's order, in F frames.
+    """Contents of a file: J joints in the figure's order, F frames.
 
     Attributes
     ----------
     offsets : (J, 3)
-        At rest, from the parent; of roots from the figure's origin.
+        Offset at rest from the parent; for roots from the figure's origin.
     angles : (F, J, 3)
         Radians, in the order of the rotation channels.
     positions : (F, J, 3)
-        Within the parent, offset included; of roots in the file's space.
+        Relative to the parent, including the offset; for roots in the file's space.
     moves : (J,) bool
         Joints whose positions differ from the offset.
     places : (F, J, 3)
@@ -83,11 +83,11 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
 def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
     """Return the contents of a file for a figure's frames.
 
-    ``figure``: unshaped; the frames hold the shape.
-    ``frames``: all present.
-    ``reference``: the frame that defines shape and scale of all bones; roots keep each frame's own.
-    ``order``: of the rotation channels.
-    ``space``: to the file.
+    ``figure``: without its shape applied; the frames hold the shape weights.
+    ``frames``: without missing frames.
+    ``reference``: frame that defines the shape and scale of all bones; roots follow every frame.
+    ``order``: order of the rotation channels.
+    ``space``: transform to the file's space.
     """
     skeleton = figure.require_skeleton()
     parents, count = skeleton.parents, frames.n_frames
@@ -103,14 +103,16 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
         block = slice(start, min(start + _BLOCK, count))
         part = frames_between(frames, block)
         places[block] = _places(figure, part, weights, scale) @ space.world.T * space.factor
-        turns = _rotations(figure, part, space)
-        angles[block] = euler_angles(turns, order)
+        rotations = _rotations(figure, part, space)
+        angles[block] = euler_angles(rotations, order)
         world = np.swapaxes(
-            forward_kinematics(parents, np.ascontiguousarray(np.swapaxes(turns, 0, 1))), 0, 1
+            forward_kinematics(parents, np.ascontiguousarray(np.swapaxes(rotations, 0, 1))), 0, 1
         )
-        ways = places[block] - np.where(inner[:, None], places[block][:, parents], 0.0)
-        within = np.einsum("njba,njb->nja", world[:, parents], ways)
-        positions[block] = np.where(inner[:, None], within, ways)
+        offsets_from_parent = places[block] - np.where(
+            inner[:, None], places[block][:, parents], 0.0
+        )
+        within = np.einsum("njba,njb->nja", world[:, parents], offsets_from_parent)
+        positions[block] = np.where(inner[:, None], within, offsets_from_parent)
     size = float(np.ptp(points, axis=0).max())
     noise = _NOISE * (size + 1e-3 * float(np.abs(places).max(initial=0.0)))
     offsets, moves = _fixed(offsets, positions, inner, noise)
@@ -158,10 +160,10 @@ def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
     before = space.rest @ above
     after = np.swapaxes(rest, -1, -2) @ np.swapaxes(before, -1, -2)
     before[parents < 0] = space.world
-    turns = quaternion_to_matrix(frames.rotations)
+    rotations = quaternion_to_matrix(frames.rotations)
     if not (before == np.eye(3)).all():
-        turns = before @ turns
-    return turns if (after == np.eye(3)).all() else turns @ after
+        rotations = before @ rotations
+    return rotations if (after == np.eye(3)).all() else rotations @ after
 
 
 def _fixed(offsets: Floats, positions: Floats, inner: Bools, noise: float) -> tuple[Floats, Bools]:

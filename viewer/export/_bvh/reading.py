@@ -1,12 +1,12 @@
 """Poses of the original figure, read back from a written ``.bvh`` file.
 
-With D the product of a file's rotations down to a joint, p its place there, and x, e, s as in
-``_bvh_body``, a joint that rests with the matrix P is at::
+D is the product of a file's rotations down to a joint, p its position in the file, s the scale, and
+x and e are as in ``body``. A joint with the rest matrix P then has::
 
-    linear part  s x^-1 D e P        place  x^-1 p / factor
+    linear part  s x^-1 D e P        position  x^-1 p / factor
 
-A file has no mesh. Its vertices are those of the figure's own skin, in the shape that the file's
-bones have, blended linearly and corrected by the file's rotations.
+A file has no mesh. Its vertices are those of the figure's skin in the shape of the file's bones,
+skinned with LBS and with pose correctives from the file's rotations.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ class BvhFile:
     Attributes
     ----------
     path : Path
-        Name in messages of the reader.
+        File name in messages of the reader.
     text : bytes
         Contents.
     names : sequence of J str
         Names of the figure's joints in the file.
     space : Space
-        From the figure to the file.
+        Transform from the figure's space to the file's.
     reference : int
-        The figure's frame that defines shape and scale of the file's bones.
+        Frame that defines the shape and scale of the file's bones.
     ahead : int
-        Index in the file of the figure's first frame; below 0 if the file begins later.
+        Index in the file of the animation's first frame; negative if the file begins later.
     """
 
     path: Path
@@ -68,10 +68,10 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
     """Return the contents of a file as poses of a figure.
 
     ``file``: the written file.
-    ``figure``: the original, unshaped.
-    ``frames``: what was to be written. It gives the place of the whole figure, which comes after
-      skinning and is not weighted.
-    ``how``: whether pose correctives count.
+    ``figure``: the original, without its shape applied.
+    ``frames``: the written frames. They define the placement of the whole figure, which is applied
+      after skinning, without weights.
+    ``how``: skinning, whose correctives are applied if enabled.
     """
     space = file.space
     motion = bvh.read(Source(file.path, file.text))
@@ -97,17 +97,17 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
         places = world[..., :3, 3].copy()
         shifts = frames_between(frames, rows).figure_translations
         world[..., :3, 3] -= shifts[:, None]
-        turns = np.zeros((len(rows), 0))
+        corrective_rotations = np.zeros((len(rows), 0))
         if body is not None and body.correctives is not None:
-            turns = _corrective_rotations(figure, world / scale)
+            corrective_rotations = _corrective_rotations(figure, world / scale)
         palette = anchored(world @ bound, np.full(len(rows), scale))
-        return Poses(places, palette, shifts, np.zeros((1, 0)), turns)
+        return Poses(places, palette, shifts, np.zeros((1, 0)), corrective_rotations)
 
     return Side(body, poses)
 
 
 def _bound(figure: Figure, weights: Floats) -> Floats:
-    """Return the inverse bind matrices of a shape; identities without a skin."""
+    """Return the inverse bind matrices of a shape, identity matrices without a skin."""
     if figure.skin is None or not figure.is_attached:
         return np.tile(np.eye(4), (figure.require_skeleton().n_joints, 1, 1))
     bound = figure.skin.inverse_bind.copy()
@@ -117,8 +117,8 @@ def _bound(figure: Figure, weights: Floats) -> Floats:
 
 
 def _corrective_rotations(figure: Figure, world: Floats) -> Floats:
-    """Return the corrective weights: R - I of every joint within its parent, (F, P)."""
-    turned = world[:, 1:, :3, :3]
+    """Return the corrective weights: R - I of every joint relative to its parent, (F, P)."""
+    linear = world[:, 1:, :3, :3]
     above = world[:, figure.require_skeleton().parents[1:], :3, :3]
-    local = np.swapaxes(above, -1, -2) @ turned - np.eye(3)
+    local = np.swapaxes(above, -1, -2) @ linear - np.eye(3)
     return local.reshape(len(world), -1)

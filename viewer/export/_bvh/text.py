@@ -14,7 +14,7 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
 _DEEPEST = 32  # maximum indentation in tabs
-_SECONDS_DIGITS = 9  # of the frame time, at least: exact to 1e-8 of itself
+_SECONDS_DIGITS = 9  # minimum decimals of the frame time, for a relative error below 1e-8
 
 
 def bvh_text(
@@ -31,8 +31,8 @@ def bvh_text(
     """Return the text of a whole file.
 
     ``names``: unique, of letters, digits and underscores.
-    ``parents`` (J,): with one root, the first joint.
-    ``offsets`` (J, 3): within the parent; the root's is written as 0.
+    ``parents`` (J,): parent indices; the first joint is the only root.
+    ``offsets`` (J, 3): offsets from the parent; the root's is written as 0.
     ``ends``: offset of the End Site of every joint without children.
     ``moves`` (J,) bool: which joints have position channels.
     ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
@@ -62,7 +62,7 @@ def _hierarchy(
     digits: int,
 ) -> list[str]:
     lines = ["HIERARCHY"]
-    turns = " ".join(f"{axis.upper()}rotation" for axis in rotation_order)
+    rotations = " ".join(f"{axis.upper()}rotation" for axis in rotation_order)
     open_joints: list[int] = []
 
     def put(depth: int, text: str) -> None:
@@ -82,7 +82,7 @@ def _hierarchy(
         put(depth + 1, f"OFFSET {_vector(offsets[joint] if parent >= 0 else np.zeros(3), digits)}")
         has_positions = parent < 0 or moves[joint]
         count = "6 Xposition Yposition Zposition" if has_positions else "3"
-        put(depth + 1, f"CHANNELS {count} {turns}")
+        put(depth + 1, f"CHANNELS {count} {rotations}")
         open_joints.append(int(joint))
         if int(joint) in ends:
             put(depth + 1, "End Site")

@@ -19,9 +19,9 @@ VERTICES, INDICES = 34962, 34963  # targets of buffer views
 
 _TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_PADDING = 4  # every array begins at a multiple of the largest component
-_LONGEST = 2**32 - 1  # a .glb gives its length in 32 bits
-_HEADER = 28  # bytes of a .glb that are neither JSON nor arrays
+_PADDING = 4  # arrays are aligned to the size of the largest component
+_LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
+_HEADER = 28  # bytes of a .glb besides JSON and arrays
 
 
 class Document:
@@ -50,9 +50,9 @@ class Document:
     def array(self, values: NDArray[Any], kind: str, target: int = 0, bounds: bool = False) -> int:
         """Add an array; return its accessor.
 
-        ``values`` (N, ...): unsigned integers as they are, floating-point numbers in single
-          precision; one row per element, N > 0.
-        ``kind``: ``"SCALAR"``, ``"VEC3"`` ….
+        ``values`` (N, ...): one row per element, N > 0; unsigned integers are stored unchanged,
+          floating-point numbers in single precision.
+        ``kind``: ``"SCALAR"``, ``"VEC3"`` and so on.
         ``target``: ``VERTICES``, ``INDICES``, or 0 for data that no mesh draws.
         ``bounds``: store the minimum and maximum of each component.
         Raises RigError if a number is not finite or too large for single precision.
@@ -100,7 +100,7 @@ class Document:
         content += b" " * (-len(content) % _PADDING)
         length = _HEADER + len(content) + self._size
         if length > _LONGEST:
-            raise RigError(f"{self._name}: {length} bytes are more than a .glb can have")
+            raise RigError(f"{self._name}: {length} bytes exceed the maximum size of a .glb")
         chunks = struct.pack("<I4s", len(content), b"JSON") + content
         if self._parts:
             chunks += struct.pack("<I4s", self._size, b"BIN\0") + b"".join(self._parts)

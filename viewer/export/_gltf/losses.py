@@ -1,4 +1,4 @@
-"""Parts of a figure that glTF cannot hold, and differences of a file that is read back."""
+"""Parts of a figure that glTF cannot hold, and measured errors of a file that is read back."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Written:
     mesh_node : int or None
         Index of the mesh's node.
     start : int
-        The figure's frame that is the first of the file.
+        Frame of the figure that is the first in the file.
     """
 
     path: Path
@@ -56,10 +56,10 @@ def gltf_losses(
     influences: Influences | None,
     first_frame: int | None,
 ) -> list[str]:
-    """Return lines with the largest distances between the posed figure and a file.
+    """Return messages with the largest distances between the posed figure and a file.
 
     ``written``: the file.
-    ``figure``: the original, unshaped.
+    ``figure``: the original, without its shape applied.
     ``frames``: its poses.
     ``rows`` (F,): the frames to compare.
     ``how``: the requested skinning.
@@ -69,31 +69,31 @@ def gltf_losses(
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
     columns = changing(frames, still)
-    meant = figure_side(figure, frames, how, still)
+    expected = figure_side(figure, frames, how, still)
     sources = None
     if figure.mesh is not None and written.mesh_node is not None:
         sources = split_seams(figure.mesh)[0]
-        meant = _split(meant, sources)
+        expected = _split(expected, sources)
     else:
-        meant = replace(meant, body=None, exact=None)
+        expected = replace(expected, body=None, exact=None)
     least = negligible(figure, frames, rows)
     targets = np.flatnonzero(np.isin(shape.targets, columns))
     place = (written.file, written.tree, written.mesh_node, targets, written.start)
-    found = apart(meant, read_back(*place), rows, least)
+    found = apart(expected, read_back(*place), rows, least)
     why = []
     if found.vertices is not None:
         why = _reasons(figure, frames, rows, how, shape, influences, least)
     lines = apart_lines(written.path, figure, found, first_frame, sources)
     lines = [line + f": {'; '.join(why)}" * bool(why) for line in lines]
     if influences is not None and influences.most > PER_SET and sources is not None:
-        lines += _first_set(meant, read_back(*place, 1), figure, rows, least, influences)
+        lines += _first_set(expected, read_back(*place, 1), figure, rows, least, influences)
     return lines
 
 
 def _split(side: Side, sources: Ints) -> Side:
     """Return a side with its vertices duplicated as in a file."""
     whole = side.exact
-    assert side.body is not None  # it has a mesh
+    assert side.body is not None  # the caller checked for a mesh
     body = body_rows(side.body, sources)
     return replace(
         side, body=body, exact=None if whole is None else lambda row: whole(row)[sources]
@@ -101,16 +101,16 @@ def _split(side: Side, sources: Ints) -> Side:
 
 
 def _first_set(
-    meant: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
+    expected: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
 ) -> list[str]:
     """Return a message about the error of programs that read four influences per vertex."""
-    found = apart(meant, cut, rows, least)
+    found = apart(expected, cut, rows, least)
     text = f"up to {influences.most} influences per vertex, all of them written, strongest first"
     if found.vertices is None:
         return [text]
     off = length_text(figure, found.vertices.distance)
     extent = shared_extent(found)
-    return [f"{text}: programs that read only JOINTS_0 are off by up to {off}{extent}"]
+    return [f"{text}: programs that read only JOINTS_0 have errors of up to {off}{extent}"]
 
 
 def _reasons(
@@ -122,18 +122,20 @@ def _reasons(
     influences: Influences | None,
     least: float,
 ) -> list[str]:
-    """Return the reasons for differences of vertices."""
+    """Return the causes of vertex errors."""
     found = []
     if influences is not None and (influences.n_scaled or influences.n_negative):
         found.append(_weights_text(influences))
     if influences is not None and how.method != "lbs":
-        found.append(f"{METHODS[how.method].title} skinning cannot be held, glTF blends linearly")
+        found.append(
+            f"{METHODS[how.method].title} skinning is not supported, glTF uses linear blending"
+        )
     if influences is not None and figure.correctives is not None and how.correctives:
-        found.append("pose correctives cannot be held")
+        found.append("pose correctives are not supported")
     weights = frames.shape_weights
     weights = weights if len(weights) == 1 else weights[rows]
     if shape.baked is not None and np.ptp(weights, axis=0).any():
-        found.append("the shape changes over time, which cannot be held")
+        found.append("the shape changes over time, which is not supported")
     mesh = shape.figure.require_mesh()
     coarse = np.abs(mesh.positions - mesh.positions.astype(np.float32)).max(initial=0.0)
     if coarse > least:
@@ -147,8 +149,8 @@ def _weights_text(influences: Influences) -> str:
         parts.append(f"weights of {vertices_text(influences.n_scaled)} do not add up to 1")
     if influences.n_negative:
         parts.append(f"weights of {vertices_text(influences.n_negative)} are negative")
-    done = "left out and the others scaled" if influences.n_negative else "scaled"
-    return f"{' and '.join(parts)}: {done}, as glTF demands"
+    done = "omitted and the others scaled" if influences.n_negative else "scaled"
+    return f"{' and '.join(parts)}: {done}, as glTF requires"
 
 
 def vertices_text(count: int) -> str:
@@ -157,7 +159,7 @@ def vertices_text(count: int) -> str:
 
 
 def not_held(figure: Figure, shape: Shape) -> list[str]:
-    """Return a message about everything that the file does not hold."""
+    """Return a message that lists the parts of a figure that the file does not hold."""
     unused = figure.n_shapes - len(shape.targets)
     parts = {
         f"{unused} blend shapes": unused > 0 and shape.baked is None,

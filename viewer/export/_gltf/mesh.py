@@ -16,11 +16,11 @@ from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
 
-_PLAIN = (0.62, 0.60, 0.57)  # linear; what the viewer draws without a texture
+_PLAIN = (0.62, 0.60, 0.57)  # the viewer's colour of untextured surfaces, linear
 _POINTS = 0  # mode of a primitive without triangles
-_LONG = 65535  # the index itself is reserved, so so many vertices fit 16 bits
+_LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
 _CLAMP, _LINEAR, _MIPMAPS = 33071, 9729, 9987
-_NOT_UNIT = 1e-3  # normals too short or long for their squares to be numbers stay otherwise
+_NOT_UNIT = 1e-3  # tolerance of unit length; normals may under- or overflow when squared
 
 Color = tuple[float, float, float]
 
@@ -35,9 +35,9 @@ def add_mesh(
     """Add a figure's mesh.
 
     ``document``: changed.
-    ``name``: the figure's.
-    ``shape``: its figure has a mesh with vertices.
-    ``influences``: of the mesh; None if no joint moves it.
+    ``name``: name of the figure.
+    ``shape``: shape of a figure whose mesh has vertices.
+    ``influences``: influences of the mesh; None if it is not skinned.
     ``color`` (r, g, b): linear, of untextured surfaces.
     Returns ``mesh``: its index.
     Returns ``n_vertices``: number of written vertices; seams have several per vertex of the
@@ -68,14 +68,14 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
         "NORMAL": document.array(_normals(mesh)[sources], "VEC3", VERTICES),
     }
     if mesh.uvs is not None and len(mesh.uvs):
-        # The first row of a picture is at v = 0 in glTF, and at v = 1 here.
+        # glTF has the first row of a picture at v = 0, this program at v = 1.
         uvs = mesh.uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
         attributes["TEXCOORD_0"] = document.array(uvs, "VEC2", VERTICES)
     return attributes
 
 
 def _normals(mesh: Mesh) -> Floats:
-    """Return unit normals, computed from the surface if the figure's have no length."""
+    """Return unit normals, computed from the triangles where the figure's cannot be normalized."""
     with np.errstate(over="ignore", invalid="ignore"):
         normals = unit(mesh.normals)
         odd = ~(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _NOT_UNIT)
@@ -98,11 +98,11 @@ def _targets(
     for row in rows:
         one = np.zeros(shapes.n_shapes)
         one[row] = 1.0
-        moves = shapes.displacement(one)[sources]
-        target = {"POSITION": document.array(moves, "VEC3", VERTICES, bounds=True)}
-        turns = shapes.normal_displacement(one)
-        if turns is not None:
-            target["NORMAL"] = document.array((turns * scales)[sources], "VEC3", VERTICES)
+        offsets = shapes.displacement(one)[sources]
+        target = {"POSITION": document.array(offsets, "VEC3", VERTICES, bounds=True)}
+        normal_offsets = shapes.normal_displacement(one)
+        if normal_offsets is not None:
+            target["NORMAL"] = document.array((normal_offsets * scales)[sources], "VEC3", VERTICES)
         targets.append(target)
     return targets
 
@@ -163,7 +163,7 @@ def _plain(document: Document, name: str, color: Color | None) -> int:
 
 
 def _surface(document: Document, name: str, surface: dict[str, Any]) -> int:
-    # glTF surfaces are metallic by default. Files may wind triangles either way.
+    # glTF's default is metallic. Triangles may have either winding, so draw both sides.
     matte = {**surface, "metallicFactor": 0.0, "roughnessFactor": 0.8}
     return document.add(
         "materials",

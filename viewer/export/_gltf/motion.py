@@ -12,11 +12,11 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
-_NOISE = 1e-9  # of the skeleton's size: smaller motions count as none
+_NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
 
 
 def moving(skeleton: Skeleton, frames: Frames) -> Bools:
-    """Return which joints move within their parents: (J,)."""
+    """Return which joints translate relative to their parents: (J,) bool."""
     size = float(np.abs(skeleton.rest_translations).max())
     return np.asarray((np.ptp(frames.translations, axis=0) > _NOISE * size).any(axis=1))
 
@@ -38,26 +38,27 @@ def add_animation(
     tree: Tree,
     morph: tuple[int, Floats] | None,
 ) -> int:
-    """Add rotations of all joints, translations of those that move, and the figure's placement.
+    """Add rotations of all joints, translations where they change, and the figure's placement.
 
-    Quaternions have the sign nearest to the previous frame, for programs that blend components.
+    Quaternions have the sign nearest to the previous frame, since some programs interpolate
+    components.
     Times begin at 0.
 
     ``document``: changed.
-    ``name``: the motion's.
+    ``name``: name of the motion.
     ``rate``: frames per second.
-    ``skeleton``: in the written shape.
-    ``frames``: without gaps.
+    ``skeleton``: skeleton in the written shape.
+    ``frames``: frames without gaps.
     ``tree``: the nodes.
     ``morph``: the mesh's node and its targets' weights, if these change.
-    Returns: number of joints that have translations.
+    Returns: number of joints with translations.
     Raises RigError if numbers do not fit single precision.
     """
     # Single precision distinguishes eight million frames at any rate.
     times = (np.arange(frames.n_frames) / rate).astype(np.float32)
     keys = _Keys(document, document.array(times, "SCALAR", bounds=True))
-    turns = np.swapaxes(_continuous(frames.rotations), 0, 1)
-    for node, output in zip(tree.joints, document.arrays(turns, "VEC4"), strict=True):
+    rotations = np.swapaxes(_continuous(frames.rotations), 0, 1)
+    for node, output in zip(tree.joints, document.arrays(rotations, "VEC4"), strict=True):
         keys.add(node, "rotation", output)
     moves = np.flatnonzero(moving(skeleton, frames))
     if len(moves):

@@ -2,12 +2,12 @@
 
 ::
 
-    z up, centimetres        if z is up: turned by -90 degrees about x; if the unit is known and not
-    │                        the metre: scaled to metres; missing if it would do neither
+    z up, centimetres        rotated by -90 degrees about x if z is up, scaled to metres if the unit
+    │                        is known and not the metre; omitted if neither applies
     └── the figure's name    figure_translation and figure_scale
         ├── joints           T R S, by the figure's names
-        ├── fixed            only if vertices follow no joint: they follow this, which never moves
-        └── mesh             only if the mesh follows no joints; a skinned one is a root
+        ├── fixed            never moves; only if some vertices have no influence
+        └── mesh             only if the mesh is not skinned; a skinned mesh is a root node
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.units import METRES, WORDS
+from viewer.rig.units import METRES, UNIT_NAMES
 
 _HALF = float(np.sqrt(0.5))
 _Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
@@ -51,13 +51,13 @@ class Tree:
     Attributes
     ----------
     root : int
-        The topmost.
+        The topmost node.
     place : int
         The node that moves the whole figure.
     joints : list of J int
-        In the figure's order.
+        Nodes of the joints, in the figure's order.
     fixed : list of int
-        The node that vertices without a joint follow; one or none.
+        The node of vertices without influence; one or none.
     """
 
     root: int
@@ -67,9 +67,9 @@ class Tree:
 
 
 def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
-    """Return the joints of a pose.
+    """Return the local joint transforms of a pose.
 
-    ``skeleton``: already shaped.
+    ``skeleton``: with its shape applied.
     ``pose``: DOFs in lengths and radians.
     """
     rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
@@ -86,14 +86,14 @@ def add_nodes(
     still: Locals | None,
     fixes: bool,
 ) -> Tree:
-    """Add all nodes but that of the mesh.
+    """Add all nodes except that of the mesh.
 
     ``document``: changed.
-    ``name``: the figure's.
+    ``name``: name of the figure.
     ``up``: the up axis of the figure's world.
     ``unit``: as in ``Figure.unit``.
     ``skeleton``, ``still``: the joints and their transforms.
-    ``pose``: gives the figure's placement.
+    ``pose``: pose with the figure's placement.
     ``fixes``: whether vertices need a node that never moves.
     Raises RigError if a number is not finite.
     """
@@ -125,7 +125,7 @@ def _above(up: str, unit: str) -> dict[str, Any]:
         names.append("z up")
         node["rotation"] = _Z_TO_Y
     if METRES.get(unit, 1.0) != 1.0:
-        names.append(WORDS[unit])
+        names.append(UNIT_NAMES[unit])
         node["scale"] = [METRES[unit]] * 3
     return {"name": ", ".join(names), **node} if names else {}
 

@@ -1,8 +1,8 @@
-"""Reading back of written glTF files: arrays, nodes in every frame, the mesh and its skin.
+"""Reader of glTF files written here: arrays, nodes in every frame, the mesh and its skin.
 
-Only the output of ``viewer.export.gltf`` is supported: one buffer without strides, samplers whose
-keys are the frames. Joints and vertices are returned in the figure's space, below the node that
-rotates and scales the whole.
+Only the output of ``viewer.export.gltf`` is supported: one buffer without strides, and samplers
+whose keys are the frames. Joints and vertices are returned in the figure's space, below the node
+that rotates and scales the whole figure.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class GltfFile:
     buffer: bytes
 
     def array(self, accessor: int) -> NDArray[Any]:
-        """Return an array as it is stored: (N, components)."""
+        """Return an array in its stored type: (N, components)."""
         item = self.root["accessors"][accessor]
         view = self.root["bufferViews"][item["bufferView"]]
         start = view["byteOffset"] + item["byteOffset"]
@@ -74,8 +74,8 @@ def read_back(
     ``tree``: indices of the nodes of joints and figure.
     ``node``: index of the mesh's node.
     ``sources`` (M,): indices of the file's morph targets that change over time.
-    ``start``: the figure's frame that is the first of the file.
-    ``sets``: number of influence sets to use, scaled to a sum of 1; all if omitted.
+    ``start``: frame of the figure that is the first in the file.
+    ``sets``: number of influence sets to use, normalized to a sum of 1; all if omitted.
     """
     nodes = file.root["nodes"]
     parents = np.full(len(nodes), -1, dtype=np.int32)
@@ -134,8 +134,8 @@ def _world(
                 parts[path][node] = moved[rows]
     local = np.zeros((len(nodes), len(rows), 4, 4))
     local[..., 3, 3] = 1.0
-    turned = parts["rotation"] / np.linalg.norm(parts["rotation"], axis=-1, keepdims=True)
-    local[..., :3, :3] = quaternion_to_matrix(turned) * parts["scale"][..., None, :]
+    rotations = parts["rotation"] / np.linalg.norm(parts["rotation"], axis=-1, keepdims=True)
+    local[..., :3, :3] = quaternion_to_matrix(rotations) * parts["scale"][..., None, :]
     local[..., :3, 3] = parts["translation"]
     return np.swapaxes(forward_kinematics(parents, local), 0, 1)
 
@@ -150,7 +150,7 @@ def _body(
 ) -> tuple[Body, Floats]:
     """Return the mesh in the first frame's shape, and the weights that change it: (F, M)."""
     mesh = file.root["meshes"][file.root["nodes"][node]["mesh"]]
-    primitive = mesh["primitives"][0]  # all share their vertices
+    primitive = mesh["primitives"][0]  # all primitives share their vertices
     attributes = primitive["attributes"]
     positions = file.floats(attributes["POSITION"])
     weights, shapes = np.zeros((1, 0)), None
@@ -165,7 +165,7 @@ def _body(
 
 
 def _skin(file: GltfFile, attributes: dict[str, int], n_joints: int, sets: int | None) -> Skin:
-    """Return the influences of a mesh; without any it follows the last joint, its own node."""
+    """Return the influences of a mesh; an unskinned one follows the last joint, its own node."""
     count = file.root["accessors"][attributes["POSITION"]]["count"]
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.shape import shaped
 
-_MOST_TARGETS = 64  # each costs 12 bytes per vertex, and programs support few
+_MOST_TARGETS = 64  # each takes 12 bytes per vertex, and programs support few
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,11 +39,11 @@ class Shape:
 def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
     """Return the written form of a figure's shape.
 
-    Morph targets do not move joints, so a shape that affects the joints is baked in; the same
-    applies if there are too many targets.
+    Morph targets do not move joints, so a shape that affects the joints is baked into the mesh, and
+    so is one with too many targets.
 
-    ``figure``: unshaped.
-    ``weights`` (F, S) or (1, S): of its blend shapes, over time.
+    ``figure``: without its shape applied.
+    ``weights`` (F, S) or (1, S): weights of its blend shapes over time.
     ``reference``: the row to bake in.
     """
     used = np.flatnonzero(weights.any(axis=0))

@@ -1,4 +1,4 @@
-"""Influences in glTF form: sets of four, unique joints, non-negative weights that sum to 1."""
+"""Influences in glTF form: sets of four with unique joints and positive weights that sum to 1."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from viewer.rig.skin import (
 )
 
 PER_SET = 4
-_SUM = 1e-6  # smaller deviations from 1 are rounding in the figure's file
-_MOST_JOINTS = 65536  # they are numbered in 16 bits
+_SUM = 1e-6  # smaller deviations from 1 are rounding errors of the figure's file
+_MOST_JOINTS = 65536  # joint indices have 16 bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,13 +31,13 @@ class Influences:
     Attributes
     ----------
     skin : Skin
-        Each joint at most once per vertex, strongest first, positive weights with sums of 1.
+        Skin with unique joints per vertex, strongest first, and positive weights that sum to 1.
     n_scaled : int
-        Vertices whose weights did not add up to 1.
+        Number of vertices whose weights did not sum to 1.
     n_negative : int
-        Vertices that had negative weights, which glTF forbids.
+        Number of vertices with negative weights, which glTF forbids.
     n_fixed : int
-        Vertices without influence.
+        Number of vertices without influence.
     most : int
         Largest number of influences of a vertex.
     """
@@ -57,7 +57,7 @@ class Influences:
 def influences_of(skin: Skin) -> Influences:
     """Return a skin in the form that glTF can hold.
 
-    ``skin``: with any weights.
+    ``skin``: a skin with arbitrary weights.
     Raises RigError if there are more joints than a file can number.
     """
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
@@ -88,10 +88,10 @@ def influence_sets(
 ) -> Iterator[tuple[NDArray[np.unsignedinteger], Floats]]:
     """Yield JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, and so on.
 
-    ``influences``: of V vertices.
+    ``influences``: influences of V vertices.
     ``sources`` (R,): the vertices, or copies of them, that are written.
-    Yields ``joints`` (R, 4) uint8 or uint16: places in the skin's list of joints; the last one
-      there is what fixed vertices hold on to. 0 in unused slots, as the specification asks.
+    Yields ``joints`` (R, 4) uint8 or uint16: indices into the skin's list of joints; the last joint
+      is the node of fixed vertices. 0 in unused slots, as the specification requires.
     Yields ``weights`` (R, 4): 0 in unused slots.
     """
     skin = influences.skin
@@ -110,11 +110,11 @@ def influence_sets(
 
 
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
-    """Return the matrices of all joints that the skin lists, column after column: (N, 16).
+    """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
 
     ``influences``: tells whether vertices are fixed; their node is bound at the origin.
     ``inverse_bind`` (J, 4, 4): of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
-    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exactly, as readers expect
+    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exact, as readers expect
     return matrices.transpose(0, 2, 1).reshape(-1, 16)

@@ -1,1 +1,1 @@
-"""Differences between a motion and the file that was written of it."""
+"""Measured errors of exported files: differences from the original motion."""

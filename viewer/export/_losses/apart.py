@@ -21,14 +21,14 @@ from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
 _BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
-_CHUNK = 128  # poses estimated at once
-_LIKELY = 4  # of these, poses whose farthest vertex is measured before all others
-_SMALL = 0.05  # of what rest meshes are apart: joints that add less need not be skinned
-_MOST = 512  # poses compared one by one where vertices are not blended linearly
-_ROUNDING = 2e-6  # of the size: single precision through a chain of joints
-_EPSILON = 2.0**-22  # of a coordinate: two steps of single precision
-_SIZED = 256  # frames whose joints say how far from the origin a motion is
-_FAR = 5.0  # times the rounding; larger distances are always reported
+_CHUNK = 128  # poses per single-precision estimate
+_LIKELY = 4  # poses per chunk whose farthest vertex is measured first
+_SMALL = 0.05  # if joints add less than this fraction of the rest meshes' distance, skip skinning
+_MOST = 512  # poses compared one by one with nonlinear skinning
+_ROUNDING = 2e-6  # relative to the size: single precision through a chain of joints
+_EPSILON = 2.0**-22  # relative to a coordinate: two steps of single precision
+_SIZED = 256  # frames used to measure the distance of a motion from the origin
+_FAR = 5.0  # maximum factor on the tolerance far from the origin
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +47,9 @@ class Apart:
     Attributes
     ----------
     joints, vertices : Farthest or None
-        The largest distances; None if nothing is lost, or there are none.
+        The largest distances; None if negligible or if there are no joints or vertices.
     looked : int
-        Number of frames whose vertices were compared; fewer than all if that would take too long.
+        Number of frames whose vertices were compared; limited to keep the time short.
     frames : int
         Number of all frames.
     """
@@ -63,9 +63,9 @@ class Apart:
 def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
     """Return the distance, in figure units, up to which rounding errors are not reported.
 
-    ``figure``: gives the size.
-    ``frames``: give the distance of its joints from the origin, where numbers are coarser. The
-      tolerance grows with it up to five times the usual one.
+    ``figure``: defines the size.
+    ``frames``: define the distance of its joints from the origin. The tolerance grows with this
+      distance, since numbers have larger rounding errors there, up to five times the usual one.
     ``rows`` (F,): the frames to use.
     """
     size, reach = 0.0, 0.0
@@ -80,15 +80,15 @@ def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
 
 
 def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | None = None) -> Apart:
-    """Return the largest distances of joints and vertices over poses of two sides.
+    """Return the largest distances between joints and vertices of two sides over all poses.
 
-    Poses and vertices that cannot be the farthest are skipped, so that the result is exact in
-    double precision although few vertices are skinned in it.
+    Poses and vertices that cannot have the largest distance are skipped: the result is exact in
+    double precision, although only few vertices are skinned in it.
 
-    ``first``, ``second``: with the same joints and vertices, in the same space.
-    ``rows`` (F,): the first's frames.
-    ``least``: smaller distances count as none.
-    ``frames`` (F,): the second's frames; the same if omitted.
+    ``first``, ``second``: sides with the same joints and vertices, in the same space.
+    ``rows`` (F,): frames of the first.
+    ``least``: threshold below which distances are ignored.
+    ``frames`` (F,): frames of the second; the same if omitted.
     """
     others = rows if frames is None else frames
     if first.exact is not None or second.exact is not None:
@@ -107,7 +107,7 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
 
 
 def _farther(known: Farthest, off: NDArray[np.floating], frames: Rows) -> Farthest:
-    """Return what is farthest, known already or among the rows (F, N) of some frames."""
+    """Return the larger of a known distance and the largest one in rows (F, N) of frames."""
     if off.size == 0 or not off.max() > known.distance:
         return known
     row, index = np.unravel_index(int(off.argmax()), off.shape)
@@ -121,7 +121,7 @@ def _told(found: Farthest) -> Farthest | None:
 class _Search:
     """Exact search for the farthest vertex with little work.
 
-    Bounds select the candidate poses, and single precision their candidate vertices.
+    Upper bounds select candidate poses, and single-precision estimates their candidate vertices.
     """
 
     def __init__(self, first: Body, second: Body, least: float) -> None:
@@ -131,7 +131,7 @@ class _Search:
         self._estimator: Estimator | None = None
 
     def look(self, first: Poses, second: Poses, frames: Rows) -> None:
-        """Search poses of both; ``frames`` are their numbers."""
+        """Search poses of both sides; ``frames`` are their indices."""
         bounds = self._bounds.of(first, second)
         order = np.argsort(-bounds, kind="stable")
         for start in range(0, len(order), _CHUNK):
@@ -142,7 +142,7 @@ class _Search:
             self._estimate(poses_of(first, rows), poses_of(second, rows), frames[rows])
 
     def _estimate(self, first: Poses, second: Poses, frames: Rows) -> None:
-        """Search some poses: first the likeliest candidates, then the remaining ones."""
+        """Search a chunk of poses: first the most likely candidates, then the others."""
         most = self._most(first, second)
         likely = np.argsort(-most.max(axis=1), kind="stable")[:_LIKELY]
         self._measure(first, second, frames, likely, np.unique(most[likely].argmax(axis=1)))
@@ -152,7 +152,7 @@ class _Search:
             self._measure(first, second, frames, rows, chosen)
 
     def _most(self, first: Poses, second: Poses) -> NDArray[np.float32]:
-        """Return how far vertices may be apart: (F, V)."""
+        """Return upper bounds of the distances of vertices: (F, V)."""
         if self._estimator is None:
             self._estimator = Estimator(*self._bodies)
         by_joints = self._bounds.by_joints(first, second)
@@ -175,7 +175,7 @@ class _Search:
 
 
 def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least: float) -> Apart:
-    """Compare sides without linear blending, for which no bound is known."""
+    """Compare sides with nonlinear skinning, for which there is no bound."""
     count = min(len(rows), _MOST)
     chosen = np.linspace(0, len(rows) - 1, count).round().astype(int)
     plain = [replace(side, body=None, exact=None) for side in (first, second)]
@@ -190,13 +190,13 @@ def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least
 def _vertices(side: Side, row: int) -> Floats:
     if side.exact is not None:
         return side.exact(row)
-    assert side.body is not None  # only meshes are compared so
+    assert side.body is not None  # only sides with meshes are compared this way
     poses = side.poses(np.array([row]))
     return vertices(side.body, poses)[0]
 
 
 def shared_extent(found: Apart) -> str:
-    """Return the number of compared frames as text, if these are not all."""
+    """Return the number of compared frames as text; empty if all were compared."""
     if found.looked == found.frames:
         return ""
     return f" (vertices compared in {found.looked} of {found.frames} frames)"
@@ -211,13 +211,13 @@ def apart_lines(
     meshes: str = "vertices",
     versus: str = "",
 ) -> list[str]:
-    """Return a line about the difference of a file, or none if there is none.
+    """Return a message about the errors of a file, or an empty list if there are none.
 
     ``path``: the file.
     ``figure``: the original.
     ``found``: the measured distances.
-    ``first_frame``: what the first frame is called; None for a single pose.
-    ``sources`` (V,): the figure's vertex for each that was compared.
+    ``first_frame``: number of the first frame; None for a single pose.
+    ``sources`` (V,): vertex of the figure for each compared vertex.
     ``meshes``: description of these vertices.
     ``versus``: description of the original; the motion or pose if empty.
     """

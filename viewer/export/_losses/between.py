@@ -1,4 +1,4 @@
-"""Differences between the frames that are written."""
+"""Errors of an exported motion at times between its frames."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
 
 _PLACES = "between frames"
-_ON_FRAME = 1e-6  # of a frame: nearer than this to a frame is that frame
+_ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
 
 
 def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[str]:
-    """Return a line that says what frames at a fixed rate leave out of a motion, or none.
+    """Return a message about the error of sampling a motion at a fixed rate, if there is one.
 
-    What is between the frames that are written has rotations on the shorter arc, and all else in
-    straight lines.
+    Between written frames, rotations are interpolated along the shorter arc and everything else
+    linearly.
 
-    ``path``: what was written.
-    ``animation``: what was written into it.
-    ``how``: what moves the mesh.
+    ``path``: the written file.
+    ``animation``: its contents.
+    ``how``: skinning of the mesh.
     """
     motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
     written = SampledClip(
@@ -47,7 +47,7 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
         return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
 
     lines = between_losses(path, animation, found, how)
-    return [f"{line}: written at {rate:g} per second" for line in lines]
+    return [f"{line}: written at {rate:g} fps" for line in lines]
 
 
 def between_losses(
@@ -57,16 +57,16 @@ def between_losses(
     how: Skinning,
     also: Floats | None = None,
 ) -> list[str]:
-    """Return a line with the largest differences between an animation's frames, or none.
+    """Return a message with the largest errors between an animation's frames, if there are any.
 
-    Keyed curves are searched for the times at which they differ most. A capture is known on its
-    own frames alone, and is compared there.
+    Keyframed curves are searched for the times of the largest error. A capture is defined only on
+    its own frames, and is compared there.
 
-    ``path``: what was written.
-    ``animation``: what was written into it.
-    ``found``: from seconds (T,) to the poses that a reader of the file makes of it.
-    ``how``: what moves the mesh.
-    ``also`` (T,): seconds at which captures are compared, too.
+    ``path``: the written file.
+    ``animation``: its contents.
+    ``found``: function from seconds (T,) to the poses that the file gives.
+    ``how``: skinning of the mesh.
+    ``also`` (T,): additional times at which captures are compared, seconds.
     """
     note = ""
     if isinstance(animation.motion, Clip):
@@ -84,7 +84,7 @@ def between_losses(
         )
         times = worst.times
         if worst.is_estimate:
-            note = f" (an estimate: {worst.looked} times were looked at)"
+            note = f" (an estimate from {worst.looked} times)"
     else:
         times = _own_times(animation, animation.motion)
         times = times if also is None else np.union1d(times, also)
@@ -99,7 +99,7 @@ def between_losses(
 
 
 def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
-    """Return the seconds of a capture's own frames that lie between frames of an animation."""
+    """Return the times of a capture's frames that lie between frames of an animation, seconds."""
     own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
     place = (own - animation.frames.times[0]) * animation.frame_rate
     is_between = np.abs(place - np.round(place)) > _ON_FRAME

@@ -1,12 +1,12 @@
-"""Cheap upper bounds of the distance between two bodies' vertices, one per pose.
+"""Inexpensive upper bounds of the distance between the vertices of two bodies, one per pose.
 
-With palettes M and N, rest meshes a and b, weights v and w, T = max sum_j |v_j|::
+With palettes M and N, rest meshes a and b, weights v and w, and T = max sum_j |v_j|::
 
     |sum v_j M_j a - sum w_j N_j b| <= T max_j |(M_j - N_j) b| + T max_j |M_j| max |a - b|
                                      + max_v sum_j |v_j - w_j| max_j |N_j b|
 
-A joint's vertices are taken as a sphere, so that a pose costs a few numbers a joint. Poses whose
-bound is below rounding, or below what was found elsewhere, need not be skinned.
+The vertices of each joint are bounded by a sphere, so a bound takes only a few operations per
+joint. Poses whose bound is below the tolerance, or below the largest distance so far, are skipped.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
 
-_NUMBERS = 9  # of a joint's rotation, which drive the correctives
+_NUMBERS = 9  # entries of a joint's rotation matrix, which drive the correctives
 
 
 class Bounds:
-    """Of two bodies with the same vertices and joints.
+    """Bounds for two bodies with the same vertices and joints.
 
-    ``first``, ``second``: correctives are those of the first, or none.
+    ``first``, ``second``: the bodies; the second has the first's correctives, or none.
     """
 
     def __init__(self, first: Body, second: Body) -> None:
@@ -44,16 +44,16 @@ class Bounds:
         self._stretches = _stretches(first.correctives)
 
     def of(self, first: Poses, second: Poses) -> Floats:
-        """Return a number for each pose that the distance of no vertex exceeds: (F,)."""
+        """Return an upper bound of the vertex distance for each pose: (F,)."""
         rest = self.stretches(first) * self._rest(first, second)
         return self.by_joints(first, second) + rest
 
     def stretches(self, first: Poses) -> Floats:
-        """Return by how much |a - b| may grow when it is skinned: (F,)."""
+        """Return the largest factor by which skinning can enlarge |a - b|: (F,)."""
         return self._most * _largest_stretch(first.palette)
 
     def by_joints(self, first: Poses, second: Poses) -> Floats:
-        """Return the part of a bound that comes of joints and weights: (F,)."""
+        """Return the part of the bound that is due to joints and weights: (F,)."""
         shift = first.shifts - second.shifts
         other = second.palette.copy()
         other[..., :3, 3] -= shift[:, None]
@@ -65,7 +65,7 @@ class Bounds:
         return found
 
     def _farthest(self, palette: Floats, reach: Floats) -> Floats:
-        """Return how far matrices carry any of their joints' vertices: (F,)."""
+        """Return the largest length to which matrices map vertices of their joints: (F,)."""
         at_center = np.einsum("fjab,jb->fja", palette[..., :3, :3], self._centers)
         at_center += palette[..., :3, 3]
         sizes = np.linalg.norm(palette[..., :3, :3], axis=(2, 3))
@@ -73,7 +73,7 @@ class Bounds:
         return np.asarray(far.max(axis=1))
 
     def _moved(self, poses: Poses) -> Floats:
-        """Return how far vertices of the second may be from its rest mesh: (F,)."""
+        """Return the largest displacement by shapes and correctives of the second body: (F,)."""
         far = np.zeros(len(poses.palette))
         if self._other_shapes is not None:
             far = far + np.abs(poses.weights) @ _lengths(self._other_shapes)
@@ -82,7 +82,7 @@ class Bounds:
         return far
 
     def _rest(self, first: Poses, second: Poses) -> Floats:
-        """Return the bound of |a - b|: (F,)."""
+        """Return the upper bound of |a - b|: (F,)."""
         found = np.full(len(first.palette), self._apart)
         if self._shapes is not None:
             both = self._other_shapes is not None
@@ -97,7 +97,7 @@ class Bounds:
 
 
 def _spheres(body: Body, skin: Skin) -> tuple[Floats, Floats]:
-    """Return a sphere around the vertices of each joint: centres (J, 3) and radii (J,)."""
+    """Return bounding spheres of each joint's vertices: centres (J, 3) and radii (J,)."""
     order = np.argsort(skin.joints, kind="stable")
     joints, points = skin.joints[order], body.positions[owners(skin)[order]]
     found, starts = np.unique(joints, return_index=True)
@@ -111,7 +111,7 @@ def _spheres(body: Body, skin: Skin) -> tuple[Floats, Floats]:
 
 
 def _joined(first: Skin, second: Skin, factor: float) -> Skin:
-    """Return the first's weights plus so many times the second's."""
+    """Return the sum of the first skin's weights and ``factor`` times the second's."""
     return merged(
         skin_from_entries(
             first.n_vertices,
@@ -124,24 +124,24 @@ def _joined(first: Skin, second: Skin, factor: float) -> Skin:
 
 
 def _sums(skin: Skin) -> Floats:
-    """Return each vertex's sum of the amounts of its weights: (V,)."""
+    """Return the sum of absolute weights of each vertex: (V,)."""
     return np.bincount(owners(skin), np.abs(skin.weights), skin.n_vertices).astype(np.float64)
 
 
 def _lengths(directions: Floats | None) -> Floats:
-    """Return how far each direction moves any vertex: (S,)."""
+    """Return the largest displacement of a vertex by each blend shape: (S,)."""
     if directions is None:
         return np.zeros(0)
     return np.sqrt(np.einsum("sva,sva->sv", directions, directions).max(axis=1, initial=0.0))
 
 
 def _norms(turns: Floats) -> Floats:
-    """Return the length of each joint's nine numbers: (F, J)."""
+    """Return the norm of the nine numbers of each joint: (F, J)."""
     return np.asarray(np.linalg.norm(turns.reshape(len(turns), -1, _NUMBERS), axis=2))
 
 
 def _stretches(correctives: Floats | None) -> Floats:
-    """Return how far nine numbers of length 1 move any vertex at most: (J,), from above."""
+    """Return upper bounds of the displacement by nine numbers of norm 1: (J,)."""
     if correctives is None:
         return np.zeros(0)
     squares = np.einsum("pva,pva->pv", correctives, correctives)
@@ -150,7 +150,7 @@ def _stretches(correctives: Floats | None) -> Floats:
 
 
 def _largest_stretch(palette: Floats) -> Floats:
-    """Return the most that any joint's matrix stretches lengths: (F,), exact where it rotates."""
+    """Return upper bounds of the palettes' spectral norms: (F,), exact for rotations."""
     linear = palette[..., :3, :3]
     squares = np.swapaxes(linear, -1, -2) @ linear
     return np.asarray(np.sqrt(np.abs(squares).sum(axis=-1).max(axis=(1, 2))))

@@ -1,7 +1,7 @@
-"""Single-precision estimates of distances: the frames and vertices worth measuring.
+"""Single-precision estimates of vertex distances, which select candidates for exact measurement.
 
 Many frames are skinned at once, a few hundred vertices at a time, so that their matrices stay in
-the processor's cache. What is so found to be far apart is measured in double precision afterwards.
+the CPU cache. Candidates are then measured in double precision.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from viewer.rig.skinning._blocks import blocks_of
 
 Single = NDArray[np.float32]
 
-_STEPS = 2.0**-18  # of the largest number in a sum: what sums in single precision may be off
+_STEPS = 2.0**-18  # error bound of single-precision sums, relative to the largest term
 
 
 class Estimator:
-    """Of two bodies with the same vertices.
+    """Estimator for two bodies with the same vertices.
 
-    ``first``, ``second``: their arrays are kept in single precision.
+    ``first``, ``second``: the bodies, stored in single precision.
     """
 
     def __init__(self, first: Body, second: Body) -> None:
@@ -37,7 +37,7 @@ class Estimator:
         self._left = 1.0 - _sums(second)
 
     def of_rest(self, first: Poses, second: Poses) -> Single:
-        """Return how far the rest meshes are apart, no less than it is: (F, V)."""
+        """Return upper bounds of the distances between the rest meshes: (F, V)."""
         turns = first.turns
         if second.turns.shape[1]:
             turns = turns - second.turns
@@ -52,8 +52,8 @@ class Estimator:
         return np.broadcast_to(found * (1.0 + _STEPS), (len(first.palette), found.shape[1]))
 
     def of_skinned(self, first: Poses, second: Poses) -> Single:
-        """Return how far the skinned vertices are apart, no less than it is: (F, V)."""
-        # Near the origin numbers are finer: both palettes are moved there by the same way.
+        """Return upper bounds of the distances between the skinned vertices: (F, V)."""
+        # Move both palettes near the origin, where single precision is more accurate.
         shift = first.shifts - second.shifts
         away = first.palette[:, 0, :3, 3]
         palettes = first.palette.copy(), second.palette.copy()
@@ -87,7 +87,7 @@ class _Rest:
         self.correctives = _rows(body.correctives)
 
     def moves(self, poses: Poses) -> Single:
-        """Return what shapes and correctives add: (F, 3 V), or (1, 3 V) if that never changes."""
+        """Return displacements by shapes and correctives: (F, 3 V), or (1, 3 V) if constant."""
         found = np.zeros((1, self.positions.size), np.float32)
         for directions, weights in (
             (self.shapes, poses.weights),
@@ -98,14 +98,14 @@ class _Rest:
         return found
 
     def of(self, poses: Poses) -> Single:
-        """Return the mesh that each pose skins: (F, 3, V)."""
+        """Return the rest mesh of each pose: (F, 3, V)."""
         moved = self.moves(poses)
         rest = moved.reshape(len(moved), 3, -1) + self.positions
         return np.broadcast_to(rest, (len(poses.palette), *self.positions.shape))
 
 
 def _rows(directions: Floats | None) -> Single | None:
-    """Return directions (S, V, 3) as rows in which all x come first: (S, 3 V)."""
+    """Return directions (S, V, 3) as rows of all x, then y, then z: (S, 3 V)."""
     if directions is None:
         return None
     turned = directions.transpose(0, 2, 1).astype(np.float32, order="C")
@@ -121,14 +121,14 @@ def _lengths(vectors: Single) -> Single:
 
 
 def _sums(body: Body) -> Floats:
-    """Return each vertex's sum of weights less rounding: (V,)."""
+    """Return the sum of weights of each vertex in double precision: (V,)."""
     skin = body.skin
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
     return np.bincount(owners, skin.weights, skin.n_vertices).astype(np.float64)
 
 
 def _doubts(palettes: tuple[Floats, Floats], rests: tuple[Single, Single]) -> Floats:
-    """Return how much single precision may be off: (F,)."""
+    """Return error bounds of single precision: (F,)."""
     found = np.zeros(len(palettes[0]))
     for palette, rest in zip(palettes, rests, strict=True):
         linear = np.abs(palette[..., :3, :3]).sum(axis=3).max(axis=(1, 2))

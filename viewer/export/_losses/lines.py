@@ -1,4 +1,4 @@
-"""Lines about a motion that was read back: largest differences of joints and vertices."""
+"""Messages about a motion that was read back: largest errors of joints and vertices."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.skinning import Skinning
 
 
 def shape_changes(frames: Frames) -> bool:
-    """Return whether the shape of a figure changes over the frames that are present."""
+    """Return whether the shape of a figure changes over its present frames."""
     weights = frames.shape_weights
     weights = weights if len(weights) == 1 else weights[frames.present]
     return bool(np.ptp(weights, axis=0).any())
@@ -30,18 +30,18 @@ def driven_losses(
     span: tuple[int, int],
     shape: Floats,
 ) -> list[str]:
-    """Return a line with the largest differences of a file without a mesh, or none.
+    """Return a message with the largest errors of a file without a mesh, if there are any.
 
-    ``path``: what was written.
-    ``animation``: what was to be written; frames that are missing are not compared.
-    ``written``: what the file says, by the animation's frames.
-    ``how``: what moves the mesh here; blended linearly.
-    ``span``: the frames that are in the file: the first, and the one behind the last.
-    ``shape`` (S,): weights of the shape that the file's skeleton has.
+    ``path``: the written file.
+    ``animation``: the original; missing frames are not compared.
+    ``written``: contents of the file, indexed by the animation's frames.
+    ``how``: skinning of the mesh; LBS replaces its method.
+    ``span``: half-open range of frames in the file.
+    ``shape`` (S,): shape weights of the file's skeleton.
     """
     rows = span[0] + np.flatnonzero(animation.frames.present[slice(*span)])
-    meant = figure_side(animation.figure, animation.frames, replace(how, method="lbs"), shape)
-    found = apart(meant, written, rows, negligible(animation.figure, animation.frames, rows))
+    expected = figure_side(animation.figure, animation.frames, replace(how, method="lbs"), shape)
+    found = apart(expected, written, rows, negligible(animation.figure, animation.frames, rows))
     meshes = "vertices of a skin driven by it"
     return apart_lines(path, animation.figure, found, animation.first_frame, meshes=meshes)
 
@@ -54,16 +54,15 @@ def frames_losses(
     span: tuple[int, int] | None = None,
     places: str = "",
 ) -> list[str]:
-    """Return a line with the largest differences of poses that were read back, or none.
+    """Return a message with the largest errors of poses that were read back, if there are any.
 
-    ``path``: what was written.
-    ``animation``: what was to be written; frames that are missing are not compared.
-    ``written``: what the file says: poses of the animation's figure, as many as the span has.
-    ``how``: what moves the mesh; blended linearly, by the motion here and the one that was read
-      alike.
-    ``span``: the frames that are in the file: the first, and the one behind the last; all if
+    ``path``: the written file.
+    ``animation``: the original; missing frames are not compared.
+    ``written``: contents of the file: poses of the animation's figure, one per frame of the span.
+    ``how``: skinning of the mesh; for both motions LBS replaces its method.
+    ``span``: half-open range of frames in the file; all if
       omitted.
-    ``places``: where these poses are, in words, if not on the frames.
+    ``places``: description of the times of these poses if they are not frames.
     """
     figure, frames = animation.figure, animation.frames
     first, stop = (0, frames.n_frames) if span is None else span
@@ -71,10 +70,10 @@ def frames_losses(
     still = written.shape_weights[0]
     columns = np.union1d(changing(frames, still), changing(written, still))
     linear = replace(how, method="lbs")
-    meant = figure_side(figure, frames, linear, still, columns)
+    expected = figure_side(figure, frames, linear, still, columns)
     found_side = figure_side(figure, written, linear, still, columns)
     least = negligible(figure, frames, rows)
-    found = apart(meant, found_side, rows, least, rows - first)
+    found = apart(expected, found_side, rows, least, rows - first)
     versus = f"the motion {places}" if places else ""
     return apart_lines(
         path, figure, found, None if places else animation.first_frame, versus=versus

@@ -1,10 +1,10 @@
-"""Bodies in many poses as plain arrays: joints, skinning matrices, changes of the rest mesh.
+"""Bodies in many poses as plain arrays: joints, skinning matrices, rest mesh displacements.
 
-With a palette M, a rest mesh v, changes of shape d and pose correctives p::
+With a palette M, a rest mesh v, blend shapes d and pose correctives p::
 
     v'_f = sum_j w_j M_fj [v + sum_s b_fs d_s + sum_p c_fp d_p, 1] + t_f
 
-All of it is float64, whether it comes from a figure here or from a file that was read back.
+All arrays are float64, whether they come from a figure or from a file that was read back.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """What is the same in all poses.
+    """The pose-independent data of a body.
 
     Attributes
     ----------
     positions : (V, 3)
-        The rest mesh in the shape of reference.
+        Rest mesh in the reference shape.
     skin : Skin
-        Every vertex has an influence; the last joint is the figure as a whole.
+        Skin in which every vertex has an influence; the last joint is the whole figure.
     shapes : (S, V, 3) or None
-        Directions in which the rest mesh changes over time.
+        Blend shapes whose weights change over time.
     correctives : (P, V, 3) or None
         Pose correctives.
     """
@@ -51,20 +51,20 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Poses:
-    """What changes, F poses.
+    """The pose-dependent data of a body in F poses.
 
     Attributes
     ----------
     places : (F, J, 3)
-        Joints.
+        Joint positions.
     palette : (F, J + 1, 4, 4)
-        Skinning matrices, that of the figure as a whole last.
+        Skinning matrices; the last one is that of the whole figure.
     shifts : (F, 3)
-        Added to the vertices afterwards, whatever their weights add up to.
+        Translations added to the vertices after skinning, without weights.
     weights : (F, S) or (1, S)
-        Of the shapes, less those of reference.
+        Weights of the blend shapes, relative to the reference shape.
     turns : (F, P)
-        Of the correctives; no columns where there are none.
+        Weights of the correctives; no columns if there are none.
     """
 
     places: Floats
@@ -76,16 +76,16 @@ class Poses:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """One of two things that are compared.
+    """One of two compared bodies.
 
     Attributes
     ----------
     body : Body or None
-        None without a mesh.
+        The body; None without a mesh.
     poses : callable
-        From indices of frames.
+        Function from frame indices to poses.
     exact : callable or None
-        From the index of one frame to its vertices (V, 3), where they are not blended linearly.
+        Function from one frame index to its vertices (V, 3), if skinning is not linear.
     """
 
     body: Body | None
@@ -100,13 +100,13 @@ def figure_side(
     reference: Floats,
     columns: Rows | None = None,
 ) -> Side:
-    """Return a figure as it moves here.
+    """Return an animated figure as a comparable side.
 
-    ``figure``: unshaped.
+    ``figure``: without its shape applied.
     ``frames``: its poses.
-    ``how``: what moves the mesh.
-    ``reference`` (S,): weights of the shape that changes count from.
-    ``columns`` (M,): the blend shapes that change; those that do in these frames if omitted.
+    ``how``: skinning of the mesh.
+    ``reference`` (S,): weights of the reference shape.
+    ``columns`` (M,): changing blend shapes; determined from these frames if omitted.
     """
     chosen = changing(frames, reference) if columns is None else columns
     body = None if figure.mesh is None else _body(figure, how, reference, chosen)
@@ -134,12 +134,12 @@ def figure_side(
 
 
 def changing(frames: Frames, still: Floats) -> Rows:
-    """Return which blend shapes ever have another weight than in the shape of reference."""
+    """Return the blend shapes whose weights ever differ from the reference shape: indices."""
     return np.flatnonzero((frames.shape_weights != still).any(axis=0))
 
 
 def anchored(palette: Floats, scales: Floats) -> Floats:
-    """Return skinning matrices (F, J, 4, 4) and, last, that of the figure as a whole."""
+    """Return skinning matrices (F, J, 4, 4) with that of the whole figure appended."""
     whole = np.zeros((len(palette), 1, 4, 4))
     whole[:, 0, [0, 1, 2], [0, 1, 2]] = scales[:, None]
     whole[..., 3, 3] = 1.0
@@ -168,7 +168,7 @@ def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
 
 
 def _held(skin: Skin | None, n_vertices: int, n_joints: int) -> Skin:
-    """Return a skin in which vertices that nothing moves follow the figure as a whole."""
+    """Return a skin in which vertices without influence follow the whole figure."""
     if skin is None:
         bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
         rows = np.arange(n_vertices, dtype=np.int32)
@@ -186,7 +186,7 @@ def _held(skin: Skin | None, n_vertices: int, n_joints: int) -> Skin:
 
 
 def _skinning(figure: Figure, frames: Frames, world: Floats) -> Floats:
-    """Return what carries a bound vertex with each joint, bindings in the frames' shapes."""
+    """Return skinning matrices, with inverse bind matrices for the shapes of the frames."""
     if figure.skin is None or not figure.is_attached:
         return np.broadcast_to(np.eye(4), world.shape)
     bound = figure.skin.inverse_bind
@@ -199,7 +199,7 @@ def _skinning(figure: Figure, frames: Frames, world: Floats) -> Floats:
 
 
 def body_rows(body: Body, rows: Ints) -> Body:
-    """Return some of a body's vertices, or copies of them."""
+    """Return a body with a selection of its vertices, possibly repeated."""
     every = len(rows) == len(body.positions) and (rows == np.arange(len(rows))).all()
     if every:
         return body
@@ -212,7 +212,7 @@ def body_rows(body: Body, rows: Ints) -> Body:
 
 
 def poses_of(poses: Poses, rows: Rows) -> Poses:
-    """Return some of the poses."""
+    """Return a selection of the poses."""
     weights = poses.weights if len(poses.weights) == 1 else poses.weights[rows]
     return Poses(
         poses.places[rows], poses.palette[rows], poses.shifts[rows], weights, poses.turns[rows]

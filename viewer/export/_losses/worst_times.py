@@ -1,7 +1,7 @@
-"""Times at which two motions of one figure, both given as curves, are farthest apart.
+"""Search for the times at which two motions of one figure, given as curves, differ most.
 
-Curves are smooth between their keys, so the differences are sampled there, and the highest
-samples are refined.
+Curves are smooth between their keys, so the difference is sampled there, and the highest samples
+are refined.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from viewer.rig.skinning import Skinning
 
 Sampler = Callable[[Floats], Frames]
 
-_MOST = 8192  # times looked at in all, before the highest are refined
-_STEPS = 16  # of these, at most so many between two keys or frames
-_FEWEST = 4  # with fewer, only spans whose middle is far apart are sampled
-_LIKELY = 256  # of these, for joints and vertices each
-_INSET = 1e-6  # of the span between two keys: curves may jump on a key itself
-_SHORT = 1e-6  # of a frame: spans that are shorter are none
+_MOST = 8192  # total number of samples before refinement
+_STEPS = 16  # maximum number of samples between two keys or frames
+_FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
+_LIKELY = 256  # number of likely spans, for joints and vertices each
+_INSET = 1e-6  # fraction of a span kept away from its keys, where curves may jump
+_SHORT = 1e-6  # in frames: shorter spans are ignored
 _BLOCK = 1024  # poses at a time
-_NAMING = 1024  # times, more or less, at which all vertices are looked at
-_GROUPS = 32  # stretches of time, each of which names its farthest vertex
-_PEAKS = 64  # peaks refined at most
-_HOPEFUL = 0.75  # of the highest sample: lower ones cannot be refined to be the highest
-_PARTS = 8  # of the time around a peak that is narrowed down to two of these
-_ROUNDS = 4  # of narrowing
+_NAMING = 1024  # approximate number of times at which all vertices are compared
+_GROUPS = 32  # time intervals, each of which contributes its farthest vertex
+_PEAKS = 64  # maximum number of refined peaks
+_HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
+_PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
+_ROUNDS = 4  # rounds of refinement
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,11 +52,11 @@ class WorstTimes:
     Attributes
     ----------
     times : (T,)
-        Seconds, one of them the worst.
+        Candidate times, seconds.
     looked : int
         Number of sampled times.
     is_estimate : bool
-        Whether these were too few for certainty.
+        Whether there were too few samples to be certain.
     """
 
     times: Floats
@@ -65,7 +65,7 @@ class WorstTimes:
 
 
 def key_times(clip: Clip, start: float, stop: float) -> Floats:
-    """Return the seconds of all keys within a range, those of repeated curves included."""
+    """Return the times of all keys within a range, including repetitions of curves, seconds."""
     every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
     times = np.unique(np.concatenate([np.zeros(0), *every]))
     return times[(times > start) & (times < stop)]
@@ -90,13 +90,13 @@ def _repeated(channel: Channel, start: float, stop: float) -> Floats:
 def worst_times(
     figure: Figure, one: Sampler, other: Sampler, edges: Floats, rate: float, how: Skinning
 ) -> WorstTimes:
-    """Return the times at which joints or vertices of two motions are farthest apart.
+    """Return candidate times of the largest distance between two motions.
 
-    ``figure``: unshaped.
-    ``one``, ``other``: from seconds (T,) to poses of the figure, none of them missing.
-    ``edges`` (E,): seconds between which both are smooth, rising.
-    ``rate``: frames per second; gives the shortest relevant span.
-    ``how``: what moves the mesh; blended linearly.
+    ``figure``: without its shape applied.
+    ``one``, ``other``: functions from seconds (T,) to poses of the figure, without missing ones.
+    ``edges`` (E,): ascending times between which both are smooth, seconds.
+    ``rate``: frames per second; defines the shortest relevant span.
+    ``how``: skinning of the mesh; LBS replaces its method.
     """
     spans = _spans(edges, _SHORT / rate)
     if len(spans) == 0:
@@ -126,12 +126,12 @@ def _spans(edges: Floats, short: float) -> Floats:
 
 
 def _within(spans: Floats, places: Floats) -> Floats:
-    """Return times at some places of all spans, 0 to 1."""
+    """Return times at relative positions, 0 to 1, within all spans."""
     return np.asarray(spans[:, :1] + np.diff(spans, axis=1) * places).ravel()
 
 
 def _likely(pair: _Pair, spans: Floats) -> Floats:
-    """Return the spans with the largest distances in their middle, in time order."""
+    """Return the spans with the largest distances at their centres, in time order."""
     if len(spans) > _MOST:
         spans = spans[np.linspace(0, len(spans) - 1, _MOST).astype(int)]
     middles = _within(spans, np.array([0.5]))
@@ -140,7 +140,7 @@ def _likely(pair: _Pair, spans: Floats) -> Floats:
 
 
 def _peaks(heights: Floats) -> Rows:
-    """Return where the highest peaks may be: samples no lower than those beside them."""
+    """Return the indices of the highest local maxima among the samples."""
     padded = np.concatenate([[-np.inf], heights, [-np.inf]])
     is_peak = (heights >= padded[:-2]) & (heights >= padded[2:]) & (heights > 0.0)
     rows = np.flatnonzero(is_peak & (heights >= _HOPEFUL * heights.max(initial=0.0)))
@@ -148,7 +148,7 @@ def _peaks(heights: Floats) -> Rows:
 
 
 def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
-    """Return the times at which joints (0) or vertices (1) are farthest apart around peaks."""
+    """Return refined times of peaks of the distance of joints (0) or vertices (1)."""
     best = times[peaks, None]
     low = times[np.maximum(peaks - 1, 0), None]
     high = times[np.minimum(peaks + 1, len(times) - 1), None]
@@ -163,7 +163,7 @@ def _refined(pair: _Pair, kind: int, times: Floats, peaks: Rows) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """Two motions of a figure, and the few vertices that are compared."""
+    """Two motions of a figure, and the few compared vertices."""
 
     figure: Figure
     one: Sampler
@@ -181,12 +181,12 @@ class _Pair:
         return sides[0], sides[1], first
 
     def watching(self, times: Floats) -> _Pair:
-        """Return the same with the vertices that are farthest apart in stretches of some times."""
+        """Return the pair restricted to the vertices that are farthest apart at some times."""
         if self.figure.mesh is None:
             return self
         times = times[:: max(1, len(times) // _NAMING)]
         first, second, frames = self._sides(times)
-        assert first.body is not None and second.body is not None  # there is a mesh
+        assert first.body is not None and second.body is not None  # both sides have the mesh
         every = np.arange(len(times))
         least = negligible(self.figure, frames, every)
         found = set()
@@ -199,7 +199,7 @@ class _Pair:
         return replace(self, body=bodies)
 
     def heights(self, times: Floats) -> NDArray[np.float64]:
-        """Return how far joints, and the vertices if there are any, are apart: (1 or 2, T)."""
+        """Return the largest distances of joints and, if any, vertices: (1 or 2, T)."""
         blocks = [times[start : start + _BLOCK] for start in range(0, len(times), _BLOCK)]
         return np.concatenate([np.zeros((self._kinds, 0)), *map(self._block, blocks)], axis=1)
 

@@ -44,12 +44,12 @@ __all__ = ["array_dtype", "item_count", "open_npy", "open_npz", "shaped"]
 _DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
 _LONGEST_TEXT = 1 << 20  # characters in one element
 _MAX_AXES = 32
-_MAX_BYTES = 1 << 60  # of an array; numpy cannot count beyond, even if an axis is 0
-_LAST_LETTER = 0x10FFFF  # of Unicode; numpy stores 4 bytes without checking them
+_MAX_BYTES = 1 << 60  # elements of an array; numpy cannot count more, even if an axis is 0
+_LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes without checking them
 
-_LONGEST_DIRECTORY = 2 << 20  # bytes, about 30,000 members, each of which takes memory
-_MAX_RATIO = 100  # of unpacked to packed size; smooth motions reach 10 to 20
-_SMALL = 64 << 20  # bytes; below that any ratio is accepted, for arrays of zeros
+_LONGEST_DIRECTORY = 2 << 20  # bytes, about 30,000 members, as each member takes memory
+_MAX_RATIO = 100  # ratio of unpacked to packed size; smooth motions reach 10 to 20
+_SMALL = 64 << 20  # bytes; below this any ratio is accepted, as arrays of zeros compress well
 _ENCRYPTED = 0x41  # flag bits 0 and 6
 _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
 _CHUNK = 1 << 20
@@ -67,7 +67,7 @@ _DAMAGE = (
 )
 
 _LONGEST_HEADER = 1 << 16
-_LEAD = {b"\1\0": "<H", b"\2\0": "<I", b"\3\0": "<I"}  # length of the header, by version
+_LEAD = {b"\1\0": "<H", b"\2\0": "<I", b"\3\0": "<I"}  # format of the header's length, by version
 _RECORD = re.compile(rb"'descr'\s*:\s*[\[(]")
 _ITEM = re.compile(
     rb"'(?P<key>descr|fortran_order|shape)'\s*:\s*"
@@ -111,7 +111,7 @@ def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDAr
     Raises
     ------
     MisfitError
-        If an element of a text is not a valid character.
+        If an element of a string array is not a valid character.
     """
     if flat.dtype.kind == "b" and flat.size and int(flat.view(np.uint8).max()) > 1:
         # numpy accepts any byte as bool, and then computes wrong results.
@@ -131,14 +131,14 @@ class _Header:
     shape: tuple[int, ...]
     is_fortran: bool
     n_items: int
-    offset: int  # of the values, in bytes
+    offset: int  # size of the values, in bytes
 
     def deferred(self, load: Callable[[], NDArray[Any]]) -> Deferred:
         return Deferred(self.shape, self.dtype.newbyteorder("="), load)
 
 
 class _Reader(io.BufferedReader):
-    """A file with a limit on single reads: zipfile trusts the stated size of a directory."""
+    """A file with a limit on single reads, as zipfile trusts the stated size of the directory."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is None or size < 0:

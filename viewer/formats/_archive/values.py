@@ -1,7 +1,7 @@
 """Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without running code in them.
 
 A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever given to
-Python's own unpickler: ``_pickle/`` supports the few steps needed for arrays and plain data, and
+Python's own unpickler: ``_pickle/`` supports the few opcodes needed for arrays and plain data, and
 refuses all others by name. All other values are returned as ``Opaque``.
 """
 
@@ -239,7 +239,7 @@ class Archive:
         return Sparse(dense.shape, dense[rows, columns], columns, starts, "csr")
 
     def text(self, key: str) -> str:
-        """Return a single text, which may be stored as text, bytes, or an array of one.
+        """Return a single string, which may be stored as a string, bytes, or an array of one.
 
         Raises
         ------
@@ -323,7 +323,7 @@ def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
 
 def _from_lists(value: Value) -> Deferred | None:
     """Return numbers in nested lists as an array, None if they are not numbers or ragged."""
-    # Only numbers are given to numpy: one long text would make all elements as long.
+    # Only numbers are given to numpy: one long string would make all elements as long.
     if not _is_numbers(value):
         return None
     try:

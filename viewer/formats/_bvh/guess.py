@@ -13,7 +13,7 @@ from viewer.rig.motion.evaluation import DEFAULT_RATE, frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
 from viewer.rig.retargeting.joint_names import canonical_names
-from viewer.rig.units import METRES, SIZES, WORDS
+from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 
 __all__ = ["frame_rate", "guess_unit", "guess_up"]
 
@@ -33,9 +33,9 @@ _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
 
 
 def frame_rate(source: Source, frame_time: bytes | None) -> float:
-    """Return frames a second: the standard rate that rounds to the frame time as written.
+    """Return frames per second: the standard rate that rounds to the frame time as written.
 
-    ``0.0333333`` is 30 a second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
+    ``0.0333333`` is 30 per second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
     """
     if frame_time is None:
         source.warn("F007.bvh-no-time", rate=DEFAULT_RATE)
@@ -79,7 +79,7 @@ def guess_unit(points: Floats) -> tuple[str, Facts, str]:
     for unit, (low, high) in SIZES.items():
         if low <= size <= high:
             fact = f"{unit}, taken from the skeleton's size of {size:.4g}{inches}"
-            note = f"taken for {WORDS[unit]} (skeleton {size:.4g} high{inches})"
+            note = f"taken for {UNIT_NAMES[unit]} (skeleton {size:.4g} high{inches})"
             return unit, (("unit", fact),), note * (unit != "m")
     fact = f"unknown, the skeleton's size is {size:.4g}{inches}"
     note = f"unit unknown (skeleton {size:.4g} high{inches})"
@@ -108,7 +108,7 @@ def guess_up(
         As in ``SkeletonMotion.up_notes``; empty if y is up in the rest pose and in the frames.
     """
     skeleton = figure.skeleton
-    assert skeleton is not None  # the reader made it
+    assert skeleton is not None  # created by the reader
     names = canonical_names(skeleton.names, skeleton.parents)
     upper, lower = (
         [names.index(name) for name in part if name in names] for part in (_UPPER, _LOWER)

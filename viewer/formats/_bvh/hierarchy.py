@@ -144,7 +144,7 @@ class _Parser:
         self._advance()
 
     def _begins_item(self) -> bool:
-        """Return whether a name ends here because its "{" is missing: a keyword with its number."""
+        """Return whether a keyword with its number ends a name whose "{" is missing."""
         assert self.word is not None  # the caller checked it
         if self.keyword not in _ITEMS[:2]:
             return False

@@ -144,7 +144,7 @@ def _held_frames(source: Source, start: int, width: int, declared: int | None) -
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
     rest = 0
-    if (sizes == width).sum() * 2 > len(sizes):  # a frame per line
+    if (sizes == width).sum() * 2 > len(sizes):  # one frame per line
         begins, sizes, rest = _without_rest(words, begins, sizes, width)
         begins, sizes = begins[:declared], sizes[:declared]
     else:
@@ -203,7 +203,7 @@ def _refuse_sizes(source: Source, offsets: Places, sizes: Places, width: int) ->
 
 
 def _check_lines(source: Source, start: int, width: int, declared: int | None) -> None:
-    """Refuse a file with a frame per line where a row other than the last has a wrong length."""
+    """Refuse a file with one frame per line if a row other than the last has a wrong length."""
     lines = [
         (line.start(), len(line.group().split())) for line in _LINE.finditer(source.data, start)
     ]

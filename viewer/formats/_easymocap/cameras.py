@@ -47,9 +47,9 @@ _PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
 _ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
 _MOST = 100_000  # elements of a matrix
 _NEAR = 1e-3  # tolerance for a rotation matrix; calibrations have few digits
-_LARGEST = 1e9  # pixels of a calibration, and scene units to a camera
-_SHORTEST = 1e-3  # focal length, pixels
-_MOST_BENT = 1e6  # distortion coefficient of a lens
+_LARGEST = 1e9  # largest number of pixels in a calibration, and of scene units to a camera
+_SHORTEST = 1e-3  # smallest focal length, pixels
+_MOST_BENT = 1e6  # largest distortion coefficient
 
 Value = Floats | list[str] | str
 
@@ -63,7 +63,7 @@ class Storage:
     source : Source
         The file.
     values : dict
-        Matrices, lists of texts and single texts by name.
+        Matrices, lists of strings and single strings by name.
     lines : dict of str to int
         Line of each key.
     """

@@ -104,7 +104,7 @@ def load_people(path: str, max_size: int) -> list[Any]:
         found = repeated_key(text)
         line = _line(text, found[1] if found else None)
         raise _fault("F002.json-twice", path, line, found=str(problem)) from None
-    except ValueError:  # the only other one that decoding raises
+    except ValueError:  # the only other error that decoding raises
         line = _line(text, long_number_place(text))
         raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:
@@ -133,7 +133,7 @@ def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
     """
     try:
         text = _text(path, max_size)
-    except FormatError:  # the file has changed since
+    except FormatError:  # the file has changed since it was read
         return None
     where: Keys = (place, key) if key else (place,)
     if text.lstrip().startswith("{"):

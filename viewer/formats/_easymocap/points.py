@@ -164,7 +164,7 @@ class PointRows(Rows):
 
 
 def _is_odd(points: Floats) -> Bools:
-    """Return a mask of points, (N, K, 4), that are invalid in spite of their confidence."""
+    """Return a mask of the invalid points, (N, K, 4), whose confidence is not 0."""
     confidence = points[..., 3]
     is_good = (np.abs(points) <= LARGEST).all(axis=-1) & (confidence >= 0.0)
     return ~is_good & (confidence != 0.0)

@@ -37,7 +37,7 @@ from viewer.rig.motion.body_motion import BodyMotion
 
 __all__ = ["Options", "Reading"]
 
-_SIZES = (64, 256, 1024, 4096)  # frames of a part; all further parts have the last size
+_SIZES = (64, 256, 1024, 4096)  # frames per part; all further parts have the last size
 _MOST_WARNINGS = 20
 
 
@@ -128,7 +128,7 @@ class Reading:
             except RecordError as problem:
                 self._fault_of(path, place, problem, problem.key)
                 continue
-            if person < 0:  # unknown identity: distinct only within the frame
+            if person < 0:  # identity unknown: unique only within the frame
                 person = min(seen) - 1 if -1 in seen else -1
                 self.note("F007.record-untracked", path)
             if person in seen:

@@ -31,7 +31,7 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     keyword : str
         v, vt or vn.
     width : int
-        Smallest number of values in a line.
+        Minimum number of values in a line.
     first : int
         Number of earlier lines with this keyword.
 
@@ -50,7 +50,7 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     part: Part = "positions" if keyword == "v" else ""
     bad = words.bad
     is_used = bad - firsts[owners[bad]] < width
-    parts: tuple[Part, Part] = (part, "")  # checks do not use further numbers
+    parts: tuple[Part, Part] = (part, "")  # the checks use no further numbers
     for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
         owned = owners[bad[chosen]] + first
         refuse_words(

@@ -1,7 +1,7 @@
-"""The lines of an ``.obj`` by keyword, some hundred thousand bytes at a time.
+"""Lines of an ``.obj`` grouped by keyword, in pieces of some hundred thousand bytes.
 
-All lines of one keyword are parsed at once; pieces that fit into the processor's cache make that
-several times faster than whole files would.
+All lines with the same keyword are parsed at once. Pieces that fit into the processor's cache make
+this several times faster than parsing the whole file in one go.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Places = NDArray[np.int64]
 Letters = NDArray[np.uint8]
 
 KEYWORDS = ("v", "vt", "vn", "f")
-"""Of the lines that hold numbers."""
+"""Keywords of the lines that contain numbers."""
 
 _PIECE = 1 << 18  # bytes
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _LINE_END = re.compile(rb"[\r\n]")
-_PAD = b"\n\n\n"  # so that three letters can be looked at wherever a line begins
+_PAD = b"\n\n\n"  # padding, so that three letters can be read at every start of a line
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +38,17 @@ class Lines:
     Attributes
     ----------
     base : int
-        Where they begin in the file.
+        Offset of the first line in the file.
     data : bytes
-        Their text; continued lines are joined by blanks.
+        Their text; continued lines are joined with spaces.
     letters : (N,) uint8
-        The same.
+        ``data`` as an array.
     starts, ends : (L,)
-        Of every line, from its first letter that is not blank to behind its end.
+        First non-blank character of each line, and the offset after its end.
     of : dict of str to (n,)
         Indices of the lines with each of ``KEYWORDS``.
     others : (n,)
-        Indices of the lines that are neither those, nor comments, nor empty.
+        Indices of all other lines, without comments and empty lines.
     """
 
     base: int
@@ -60,24 +60,24 @@ class Lines:
     others: Places
 
     def text(self, line: int) -> bytes:
-        """Return one line without blanks at its ends."""
+        """Return one line without surrounding white space."""
         return self.data[self.starts[line] : self.ends[line]].strip()
 
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """The text after the keyword in all lines with one keyword.
+    """The text after the keyword of all lines with the same keyword.
 
     Attributes
     ----------
     body : bytes
         One line after the other.
     letters : (N,) uint8
-        The same.
+        ``body`` as an array.
     starts : (n + 1,)
-        Where each begins in ``body``.
+        Start of each line in ``body``.
     origins : (n,)
-        Where each begins in the file.
+        Start of each line in the file.
     """
 
     body: bytes
@@ -86,13 +86,13 @@ class Rows:
     origins: Places
 
     def offset(self, place: int) -> int:
-        """Return where in the file a place of the body is."""
+        """Return the offset in the file of a position in the body."""
         row = int(np.searchsorted(self.starts, place, side="right")) - 1
         return int(self.origins[row] + place - self.starts[row])
 
 
 def pieces(source: Source) -> Iterator[Lines]:
-    """Yield the whole file, piece by piece; every offset is the file's own."""
+    """Yield the whole file, piece by piece, with offsets relative to the file."""
     data = source.data
     if b"\\\n" in data or b"\\\r" in data:
         data = _CONTINUED.sub(lambda found: b" " * len(found.group()), data)
@@ -112,7 +112,7 @@ def _split(data: bytes, base: int) -> Lines:
     if len(indented):
         inked = np.append(np.flatnonzero(~_is_blank(letters)), len(letters))
         first = inked[np.searchsorted(inked, starts[indented])]
-        starts[indented] = np.minimum(first, ends[indented] - 1)  # of empty lines, their end
+        starts[indented] = np.minimum(first, ends[indented] - 1)  # for an empty line, its end
     first, second, third = (letters.take(starts + k, mode="clip") for k in range(3))
     ends_at_1, ends_at_2 = _is_blank(second), _is_blank(third)
     is_v = first == ord("v")
@@ -131,7 +131,7 @@ def _split(data: bytes, base: int) -> Lines:
 
 
 def _is_blank(letters: Letters) -> Bools:
-    # The subtraction wraps around, so that one comparison finds 9 to 13.
+    # The subtraction wraps around, so that one comparison finds the characters 9 to 13.
     return (letters == 32) | (letters - np.uint8(9) < 5)
 
 
@@ -163,20 +163,20 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     keyword : str
         v, vt or vn.
     width : int
-        Smallest number of values in a line.
+        Minimum number of values in a line.
 
     Returns
     -------
     table : (n, width)
         The first numbers of each line.
     counts : (n,)
-        How many numbers each line has.
+        Number of values in each line.
     values : (N,)
-        All of them, one line after the other.
+        All values, one line after the other.
     rows : Rows
-        Where they come from.
+        The text that they were parsed from.
 
-    None instead if a line has too few numbers, or a word is not a number.
+    None instead of all if a line has too few numbers, or a word is not a number.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)

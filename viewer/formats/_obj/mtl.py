@@ -1,4 +1,4 @@
-"""Material libraries (``.mtl``) that an ``.obj`` names: the picture of each material.
+"""Material libraries (``.mtl``) referenced by an ``.obj``: the picture of each material.
 
 ::
 
@@ -37,7 +37,7 @@ def read_libraries(
     source : Source
         The ``.obj``; warned of libraries, materials and pictures that are missing.
     libraries : list of (bytes, int)
-        What follows each ``mtllib``, and where.
+        Text after each ``mtllib``, and its offset.
     names : list of str
         The materials that faces use.
     """
@@ -63,7 +63,7 @@ def read_libraries(
 
 
 def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
-    """Return the libraries of one ``mtllib``: one whose name may hold blanks, or several."""
+    """Return the libraries of one ``mtllib``: one whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     names = [whole]
     path = referenced_path(source.path.parent, whole)

@@ -1,4 +1,4 @@
-"""The content of an ``.obj`` as arrays, before a mesh is made of it."""
+"""Contents of an ``.obj`` as arrays, before they are converted to a mesh."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class ObjParts:
     counts : (F,)
         Corners of each face.
     corners : (C, 3)
-        Vertex, texture coordinate and normal of each; -1 where it has none.
+        Vertex, texture coordinate and normal of each; -1 if missing.
     offsets : (F,)
-        Where each face is in the file.
+        Offset of each face in the file.
     runs : dict of bytes to list of (int, str)
-        For ``usemtl``, ``g`` and ``o`` the names, and before which face each stands.
+        For ``usemtl``, ``g`` and ``o`` the names, and the index of the first face after each.
     libraries : list of (bytes, int)
-        What follows each ``mtllib``, and where.
+        Text after each ``mtllib``, and its offset.
     """
 
     positions: Floats
@@ -85,7 +85,7 @@ def read_parts(source: Source) -> ObjParts:
     Raises
     ------
     FormatError
-        For a line that breaks the grammar, or has an index out of range.
+        If a line violates the grammar or has an index out of range.
     """
     gathered = _Gathered()
     for lines in pieces(source):

@@ -1,1 +1,1 @@
-"""A pickle reader that runs no code."""
+"""A pickle reader that executes no code."""

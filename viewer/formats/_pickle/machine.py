@@ -1,8 +1,8 @@
-"""The state of the pickle machine: the bytes, a stack with marks, the memo, and a budget.
+"""State of the pickle machine: the bytes, a stack with marks, the memo, and a budget.
 
-A pickle is a list of steps for a machine with a stack. The steps are in
-``steps.py``; this module has the state they share. Nothing is recursive, no length is trusted
-before the bytes are known to exist, and the budget bounds time and memory whatever the steps do.
+A pickle is a program for a stack machine. The opcodes are implemented in ``steps.py``; this module
+holds the state that they share. Nothing is recursive, no length is trusted before the bytes are
+known to exist, and the budget bounds time and memory for any sequence of opcodes.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from viewer.formats._source import Source
 
 __all__ = ["Machine"]
 
-_MAX_STEPS = 1_000_000  # a body model takes a few hundred, a motion in plain lists some 100,000
-_LONGEST_LINE = 256  # letters of a name or number in the text protocols
+# Items; a body model needs a few hundred, a motion in plain lists some 100,000.
+_MAX_STEPS = 1_000_000
+_LONGEST_LINE = 256  # characters of a name or number in the text protocols
 _INTEGER = re.compile(rb"[+-]?[0-9]+")
 
 
@@ -31,9 +32,9 @@ class Machine:
     at : int
         Offset of the next byte.
     stack : list
-        Values, and below each mark those that are not reachable at the moment.
+        Values; those below the last mark cannot be reached at the moment.
     memo : dict
-        Values by number; a dict, so that a large number costs nothing.
+        Values by index; a dict, so that a large index takes no memory.
     """
 
     def __init__(self, source: Source) -> None:
@@ -46,11 +47,11 @@ class Machine:
         self._step_at = 0
 
     def fail(self, problem: Phrase) -> FormatError:
-        """Return an error that names the place of the current step."""
+        """Return an error with the offset of the current opcode."""
         return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
 
     def next_step(self) -> int:
-        """Return the code of the next step, and charge it to the budget."""
+        """Return the next opcode, and charge it to the budget."""
         self._step_at = self.at
         if self.at >= len(self.data):
             raise self.cut_short(1, 0)
@@ -64,7 +65,7 @@ class Machine:
         if self._budget < 0:
             raise self.fail(Phrase("pickle-steps", most=_MAX_STEPS))
 
-    # Bytes of the file.
+    # Reading bytes.
 
     def number(self, size: int, *, is_signed: bool = False) -> int:
         """Read an integer of ``size`` bytes, least significant first."""
@@ -72,7 +73,7 @@ class Machine:
         return int.from_bytes(self.data[start : self.at], "little", signed=is_signed)
 
     def skip(self, size: int) -> int:
-        """Step over bytes that must be there, and return where they began."""
+        """Skip bytes that must exist, and return the offset of the first."""
         start = self.at
         if size < 0 or size > len(self.data) - start:
             raise self.cut_short(size, len(self.data) - start)
@@ -80,12 +81,12 @@ class Machine:
         return start
 
     def span(self, width: int, coding: str | None = None, *, is_signed: bool = False) -> Span:
-        """Read a length of ``width`` bytes, and return the span of that many bytes after it."""
+        """Read a length stored in ``width`` bytes, and return the span of that length after it."""
         start = self.skip(self.number(width, is_signed=is_signed))
         return Span(self.data, start, self.at, coding)
 
     def line(self, longest: int | None = _LONGEST_LINE) -> tuple[int, int]:
-        """Step over a line, and return where its text begins and ends."""
+        """Skip a line, and return the start and end of its text."""
         start = self.at
         end = self.data.find(b"\n", start)
         if end < 0:
@@ -103,44 +104,44 @@ class Machine:
         return self.data[start:end]
 
     def decimal(self, word: bytes) -> int:
-        """Return a number of the text protocols; their length is bounded already."""
+        """Return a number of the text protocols, whose length has been checked."""
         if not _INTEGER.fullmatch(word):
             raise self.fail(Phrase("pickle-decimal", found=word))
         return int(word)
 
     def cut_short(self, wanted: int, found: int) -> FormatError:
-        """Return the error of a length that goes beyond the end of the file."""
+        """Return the error of a length that exceeds the rest of the file."""
         return self.fail(Phrase("pickle-cut", expected=wanted, found=found))
 
     def damaged_line_ends(self) -> FormatError:
-        """Return the error of a file that passed through a text-mode transfer."""
+        """Return the error of a file that was damaged by a transfer in text mode."""
         return self.source.fault("F002.pickle-line-ends")
 
     # The stack.
 
     def push(self, value: object) -> None:
-        """Put a value on the stack."""
+        """Push a value onto the stack."""
         self.stack.append(value)
 
     def top(self) -> object:
-        """Return the last value."""
+        """Return the topmost value."""
         if len(self.stack) <= self._floor:
             raise self.fail(Phrase("pickle-stack"))
         return self.stack[-1]
 
     def pop(self) -> object:
-        """Take the last value, but none below a mark."""
+        """Pop the topmost value, but none below a mark."""
         value = self.top()
         self.stack.pop()
         return value
 
     def mark(self) -> None:
-        """Begin a list of values of any number."""
+        """Set a mark, the start of a list of values."""
         self._marks.append(self._floor)
         self._floor = len(self.stack)
 
     def pop_mark(self) -> list[object]:
-        """Take all values since the last mark, and the mark."""
+        """Pop all values since the last mark, and the mark."""
         if not self._marks:
             raise self.fail(Phrase("pickle-mark"))
         values = self.stack[self._floor :]
@@ -149,7 +150,7 @@ class Machine:
         return values
 
     def drop(self) -> None:
-        """Take the last value or, if there is none since it, the last mark."""
+        """Pop the topmost value, or the last mark if there is no value above it."""
         if self._marks and len(self.stack) == self._floor:
             self.pop_mark()
         else:
@@ -158,13 +159,13 @@ class Machine:
     # The memo.
 
     def remember(self, index: int) -> None:
-        """Give the last value a number."""
+        """Store the topmost value in the memo."""
         if index < 0:
             raise self.fail(Phrase("pickle-memo", found=index))
         self.memo[index] = self.top()
 
     def recall(self, index: int) -> None:
-        """Put the value of a number on the stack."""
+        """Push a value of the memo onto the stack."""
         if index not in self.memo:
             raise self.fail(Phrase("pickle-recall", found=index))
         self.stack.append(self.memo[index])

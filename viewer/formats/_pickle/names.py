@@ -1,8 +1,8 @@
-"""The only names that a pickle may use, and the only ways to use them.
+"""Allowlist of the names that a pickle may use, and of their uses.
 
-``find`` looks a pair of module and name up in a literal table. It imports nothing, and what it
-returns is a stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy
-and Python themselves write. All four raise ``MisfitError`` for everything else.
+``find`` looks up a pair of module and name in a literal table. It imports nothing and returns a
+stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy and Python
+themselves write. All four raise ``MisfitError`` for everything else.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from viewer.phrases import printable
 
 __all__ = ["as_key", "build", "call", "create", "find"]
 
-# Numpy 2 and scipy 1.8 renamed modules; files keep the names of their day. Never a prefix rule:
-# numpy.testing.runstring runs any text.
+# Numpy 2 and scipy 1.8 renamed modules; files keep the old names. A rule for prefixes would be
+# unsafe: numpy.testing.runstring executes any string.
 _ROLES = {
     ("numpy", "ndarray"): "ndarray",
     ("numpy", "dtype"): "dtype",
@@ -50,7 +50,7 @@ _ROLES = {
     ("builtins", "object"): "object",
     ("__builtin__", "set"): "set",
     ("builtins", "set"): "set",
-    ("__builtin__", "bytes"): "bytes",  # how Python 3 writes b"" in old protocols
+    ("__builtin__", "bytes"): "bytes",  # Python 3 writes b"" like this in old protocols
     ("builtins", "bytes"): "bytes",
     ("collections", "OrderedDict"): "dict",
     ("_codecs", "encode"): "encode",
@@ -61,7 +61,7 @@ _LONGEST_NAME = 200
 _LONGEST_KEY = 1 << 16
 _LARGEST_KEY = 1 << 60
 _MOST_ARGUMENTS = 6
-_WRONG = object()  # what a call returns for unusual arguments
+_WRONG = object()  # returned by a call for unusual arguments
 
 
 def find(module: str, name: str) -> StandIn:
@@ -85,9 +85,8 @@ def call(function: object, arguments: object) -> tuple[object, int]:
     Parameters
     ----------
     function : object
-        A ``StandIn``; everything else is refused.
-    arguments : object
-        A tuple; everything else is refused.
+        A ``StandIn``; all other objects are refused. arguments : object
+        A tuple; all other objects are refused.
     """
     if not isinstance(function, StandIn) or function.role not in _CALLS:
         raise MisfitError(Phrase("pickle-call", found=noun(function)))
@@ -102,14 +101,14 @@ def call(function: object, arguments: object) -> tuple[object, int]:
 
 
 def create(of: object, arguments: object) -> Instance:
-    """Return a new object of a class, whose state is still to come."""
+    """Return a new object of a class, whose state is set later by ``build``."""
     if not isinstance(of, StandIn) or of.role not in _CLASSES or arguments != ():
         raise MisfitError(Phrase("pickle-create", found=noun(of)))
     return Instance(of)
 
 
 def build(target: object, state: object) -> None:
-    """Give an object its state. No attribute is ever set and no method called by this."""
+    """Set the state of an object, without setting attributes or calling methods."""
     if isinstance(target, Array):
         _build_array(target, state)
     elif isinstance(target, Dtype):
@@ -124,13 +123,13 @@ def build(target: object, state: object) -> None:
 
 
 def as_key(value: object) -> str | bytes | int:
-    """Return something as the key of a dict: a text, bytes, or a number that hashes to itself.
+    """Return a value as the key of a dict: a string, bytes, or a number that hashes to itself.
 
     Raises
     ------
     MisfitError
-        If it is something else. Objects never are keys, so none is ever asked for its hash; and
-        large numbers, which can be chosen so that all of them collide, are none either.
+        If it has another type. Objects are refused so that no hash of theirs is ever computed,
+        large numbers because they can be chosen so that all of them collide.
     """
     if isinstance(value, str | bytes):
         return value
@@ -142,7 +141,7 @@ def as_key(value: object) -> str | bytes | int:
 
 
 def _is_text(value: object, text: str) -> bool:
-    """Return whether something is this text; a long one is not even looked at."""
+    """Return whether a value is this string; long values are not decoded."""
     return isinstance(value, Span) and len(value) == len(text) and value.raw() == text.encode()
 
 
@@ -205,7 +204,7 @@ def _set(arguments: tuple[object, ...]) -> object:
         case ():
             return []
         case (list() as items,):
-            return list(items)  # a list, so that nothing of the file is ever hashed
+            return list(items)  # a list, so that no value of the file is ever hashed
     return _WRONG
 
 
@@ -273,7 +272,7 @@ def _build_dtype(target: Dtype, state: object) -> None:
             if letter is None or letter not in _ORDERS:
                 raise MisfitError(Phrase("pickle-byte-order", found=noun(order)))
             if any(part is not None for part in (sub, names, fields)):
-                target.code = "V"  # records, whatever their size
+                target.code = "V"  # records of any size
             target.order = letter
             dtype = target.dtype()
             if dtype is None or size in (-1, dtype.itemsize):

@@ -2,12 +2,12 @@
 
 ::
 
-    reading.py      this file: the whole must be a dict of named values
-    steps.py        the steps of protocols 0 to 5
-    machine.py      bytes, stack, memo and budget of the machine that executes the steps
-    names.py        the only names allowed, and the only arguments they take
-    values.py       inert values that the names stand for
-    resolving.py    these values turned into arrays, sparse matrices and plain data, key by key
+    reading.py this file: the pickle must be a dict of named values
+    steps.py        the opcodes of protocols 0 to 5
+    machine.py      bytes, stack, memo and budget of the machine that executes them
+    names.py        the names that are allowed, and the arguments that they take
+    values.py       inert values that represent these names
+    resolving.py    conversion of values to arrays, sparse matrices and plain data, key by key
 
 Arrays are views of the file's bytes. They are often unaligned, so an array that is used in a loop
 should be copied first.
@@ -32,7 +32,7 @@ def open_pickle(source: Source) -> Archive:
     Parameters
     ----------
     source : Source
-        Its bytes stay in memory as long as one of the arrays does.
+        Its bytes stay in memory as long as any of the arrays exists.
     """
     machine = Machine(source)
     whole = run(machine)
@@ -49,7 +49,7 @@ def open_pickle(source: Source) -> Archive:
 
 
 def _named(source: Source, whole: object) -> dict[str, object]:
-    """Return the values by name; names may be bytes, as Python 3 writes those of Python 2."""
+    """Return the values by name; names may be bytes, as Python 3 writes strings of Python 2."""
     if not isinstance(whole, dict):
         raise source.fault("F002.pickle-named", found=noun(whole))
     values: dict[str, object] = {}

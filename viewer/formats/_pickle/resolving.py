@@ -24,8 +24,8 @@ from viewer.rig.arrays import Deferred
 
 __all__ = ["resolve"]
 
-_DEEPEST = 32  # containers in containers
-_DEEPEST_EXPRESSION = 8  # a release has two
+_DEEPEST = 32  # nested containers
+_DEEPEST_EXPRESSION = 8  # nested expressions; a released model has two
 _SMALLEST_BUDGET = 1000
 _NUMBERS = "biuf"
 
@@ -35,23 +35,23 @@ class _EndlessError(Exception):
 
 
 def resolve(path: Path, size: int, key: str, value: object) -> Value:
-    """Return a value of the pickle as ``Archive.get`` promises it.
+    """Return a value of the pickle as specified by ``Archive.get``.
 
     Parameters
     ----------
     path : Path
         The file, for messages.
     size : int
-        Its length in bytes; without sharing, no value has more items.
+        Its length in bytes; without shared values, no value can have more items.
     key : str
         The name of the value, for messages.
     value : object
-        Value that the machine built.
+        Value built by the machine.
 
     Raises
     ------
     FormatError
-        If an array, matrix or expression is inconsistent, or a text cannot be decoded.
+        If an array, matrix or expression is inconsistent, or a string cannot be decoded.
     """
     try:
         return _Resolver(path, key, max(size, _SMALLEST_BUDGET)).value(value, 0)
@@ -85,7 +85,7 @@ class _Resolver:
 
     def text(self, span: Span) -> str | bytes:
         if span.coding is None:
-            self.budget -= len(span)  # copied for each use, where a text is shared
+            self.budget -= len(span)  # bytes are copied for each use, whereas a string is shared
             return span.raw() if self.budget >= 0 else b""
         try:
             return span.text()
@@ -148,7 +148,7 @@ class _Resolver:
     def selection(
         self, state: dict[str | bytes | int, object], whole: Deferred, name: str
     ) -> Deferred | Opaque:
-        """Return ``whole.ravel()[idxs].reshape(preferred_shape)``, for later."""
+        """Return ``whole.ravel()[idxs].reshape(preferred_shape)``, evaluated on demand."""
         idxs, shape = state.get("idxs"), state.get("preferred_shape")
         chosen = idxs.deferred(self.fail) if isinstance(idxs, Array) else None
         if chosen is None or chosen.dtype.kind not in "iu" or whole.dtype.kind not in _NUMBERS:

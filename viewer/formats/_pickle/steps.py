@@ -1,6 +1,6 @@
-r"""The steps of a pickle, protocols 0 to 5.
+r"""Opcodes of pickles, protocols 0 to 5.
 
-Steps are named as in Python's ``pickletools``. Those that reach outside the file are refused:
+They are named as in Python's ``pickletools``. Those that reach outside the file are refused:
 persistent ids, extension codes and out-of-band buffers. Names are resolved in ``names.py``.
 """
 
@@ -28,17 +28,17 @@ _LAST_PROTOCOL = 5
 _MAX_INTEGER = 1024  # bytes
 _LONGEST_NAME = 256
 _FLOAT = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|-?inf|-?nan")
-# Escapes of Python 2's repr(). Others are refused, because the decoder warns about some of them.
+# Escapes of Python 2's repr(). Others are refused, as Python's decoder warns about some of them.
 _ODD_ESCAPE = re.compile(rb"\\(?!x[0-9a-fA-F]{2}|[nrt'\"])")
 
 
 def run(machine: Machine) -> object:
-    """Take all steps up to STOP, and return the value that is left.
+    """Execute all opcodes up to STOP, and return the remaining value.
 
     Raises
     ------
     FormatError
-        At the first step that is damaged, or refused.
+        At the first opcode that is damaged or refused.
     """
     code = machine.next_step()
     while code != _STOP:
@@ -51,7 +51,7 @@ def run(machine: Machine) -> object:
 
 
 def _guarded(machine: Machine, action: Callable[[], Result]) -> Result:
-    """Turn the refusals of names, arguments and texts into errors that name the file."""
+    """Convert refusals of names, arguments and strings to errors that name the file."""
     try:
         return action()
     except UnicodeError:
@@ -128,7 +128,7 @@ def _quoted(machine: Machine) -> None:
     if b"\\" not in text:
         machine.push(Span(machine.data, start + 1, end - 1, "latin-1"))
         return
-    # Pairs of backslashes go first, so that each of the others begins an escape.
+    # Pairs of backslashes are matched first, so that every other backslash begins an escape.
     if _ODD_ESCAPE.search(text[1:-1].replace(b"\\\\", b"..")):
         raise machine.fail(Phrase("pickle-escape"))
     data = codecs.escape_decode(text[1:-1])[0]
@@ -193,7 +193,7 @@ def _dict(machine: Machine) -> None:
     _put_pairs(machine, values)
 
 
-# Names, and what is done with them.
+# Names and their uses.
 
 
 def _find(machine: Machine, module: str, name: str) -> object:
@@ -314,7 +314,7 @@ _STEPS: dict[int, Step] = {
     ord("d"): _dict,
     ord("s"): _set_item,
     ord("u"): _set_items,
-    # Sets are kept as lists, so that nothing in them is asked for its hash
+    # Sets become lists, so that no hash of an item is computed
     0x8F: lambda machine: machine.push([]),
     0x90: _appends,
     0x91: lambda machine: machine.push(machine.pop_mark()),
@@ -342,7 +342,7 @@ _STEPS: dict[int, Step] = {
     # Framing
     0x80: _protocol,
     0x95: _frame,
-    # Steps that reach outside the file
+    # Opcodes that reach outside the file
     ord("P"): _refused(Phrase("noun-persistent")),
     ord("Q"): _refused(Phrase("noun-persistent")),
     0x82: _refused(Phrase("noun-extension")),

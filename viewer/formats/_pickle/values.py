@@ -1,7 +1,7 @@
-"""Inert values on the stack of the pickle machine, which stand for classes and objects.
+"""Inert values on the stack of the pickle machine that represent classes and objects.
 
-Numbers, None, lists, tuples and dicts are Python's own. Everything with a name in the pickle is one
-of the classes here, made anew for each file, so nothing a pickle does to them outlives it.
+Numbers, None, lists, tuples and dicts are Python's own. Everything that a pickle names is an
+instance of a class in this module, created for each file, so that no pickle can affect another.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from viewer.rig.arrays import Deferred
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
 
 _MOST_AXES = 32
-_PIECE = 1 << 20  # bytes recoded at a time
-_LONGEST_SIDE = 1 << 62  # so that a product of them can still be printed
+_PIECE = 1 << 20  # bytes converted at a time
+_LONGEST_SIDE = 1 << 62  # bounds products of sizes, so that they can be printed
 
 
 class Span:
-    """Bytes or a text in the file, not copied until someone needs it.
+    """Bytes or a string in the file, copied only on demand.
 
     Parameters
     ----------
     data : bytes
         The file, or bytes decoded from it.
     start, stop : int
-        The part that is meant.
+        The range of the bytes.
     coding : str, optional
-        For a text. ``"latin-1"`` marks a string of Python 2, which may be text or bytes.
+        Encoding of a string. ``"latin-1"`` marks a string of Python 2, which may be text or bytes.
     """
 
     __slots__ = ("_packed", "_text", "coding", "data", "start", "stop")
@@ -56,24 +56,24 @@ class Span:
         return self.data[self.start : self.stop]
 
     def text(self) -> str:
-        """Return the text, decoded once however often it is asked for.
+        """Return the string, which is decoded only once.
 
         Raises
         ------
         ValueError
-            If the bytes are no text.
+            If the bytes cannot be decoded.
         """
         if self._text is None:
             self._text = self._decoded()
         return self._text
 
     def packed(self) -> Span:
-        """Return the bytes of an array, which Python 3 may write as letters 0 to 255.
+        """Return the bytes of an array, which Python 3 may write as characters 0 to 255.
 
         Raises
         ------
         ValueError
-            If there are other letters.
+            If there are other characters.
         """
         if self.coding in (None, "latin-1"):
             return self
@@ -83,7 +83,7 @@ class Span:
         return self._packed
 
     def _recoded(self) -> bytes:
-        """Return the letters as bytes, piece by piece: a whole text would double the memory."""
+        """Return the characters as bytes; decoding in pieces avoids doubling the memory."""
         decoder = codecs.getincrementaldecoder(self.coding or "latin-1")()
         packed = io.BytesIO()
         for start in range(self.start, self.stop, _PIECE):
@@ -99,7 +99,7 @@ class Span:
 
 @dataclass(slots=True, eq=False)
 class StandIn:
-    """Stands for a class or function of the table of allowed names; does nothing itself."""
+    """An inert stand-in for a class or function in the table of allowed names."""
 
     name: str  # "scipy.sparse.csc.csc_matrix", for messages
     role: str
@@ -107,7 +107,7 @@ class StandIn:
 
 @dataclass(slots=True, eq=False)
 class Instance:
-    """An object of one of the classes, with the state that the pickle gave it."""
+    """An object of one of the classes, with its state from the pickle."""
 
     of: StandIn
     state: dict[str | bytes | int, object] | None = None
@@ -115,24 +115,24 @@ class Instance:
 
 @dataclass(slots=True, eq=False)
 class Dtype:
-    """A numpy element type, as kind and size with the byte order beside them."""
+    """A numpy element type: kind and size, and the byte order."""
 
     code: str
     order: str = "="
 
     def dtype(self) -> np.dtype[Any] | None:
-        """Return numpy's type, or None if it is none of numbers or text."""
+        """Return numpy's type, or None if its elements are neither numbers nor strings."""
         return array_dtype(self.order + self.code)
 
     def what(self) -> Phrase:
-        """Return why it is not evaluated."""
+        """Return the reason why it is not evaluated."""
         known = {"O": Phrase("unread-objects"), "V": Phrase("unread-records")}
         return known.get(self.code[:1]) or Phrase("unread-dtype", dtype=self.code[:20])
 
 
 @dataclass(slots=True, eq=False)
 class Array:
-    """A numpy array, whose values stay in the file until they are asked for.
+    """A numpy array whose values stay in the file until they are needed.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class Array:
     dtype : dtype or None
         None if the array is not evaluated; then ``what`` says why.
     axes : tuple of int, optional
-        Order in which the stored axes are to be taken.
+        Order of the stored axes in the array.
     """
 
     shape: tuple[int, ...] = ()
@@ -152,12 +152,12 @@ class Array:
     what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
-        """Take shape and values, which must have the same number of bytes.
+        """Set shape and values, which must have the same number of bytes.
 
         Raises
         ------
         MisfitError
-            If they have not.
+            If they differ.
         """
         found = dtype.dtype()
         if found is None:
@@ -172,7 +172,7 @@ class Array:
         self.is_fortran = is_fortran
 
     def deferred(self, fail: Callable[[Phrase], Exception]) -> Deferred | None:
-        """Return the array for later, or None if it is not evaluated."""
+        """Return the deferred array, or None if it is not evaluated."""
         if self.dtype is None or self.payload is None:
             return None
         shape = self.shape
@@ -181,17 +181,17 @@ class Array:
         return Deferred(shape, self.dtype.newbyteorder("="), partial(self._load, fail))
 
     def values(self) -> NDArray[Any]:
-        """Return the values; a view of the file where byte and memory order allow it.
+        """Return the values, as a view of the file if byte and memory order allow it.
 
         Raises
         ------
         MisfitError
-            If a text holds something else than letters.
+            If a string contains invalid code points.
         """
         if self.payload is None or self.dtype is None:
             raise MisfitError(Phrase("array-not-numbers", found=self.what))
         flat = np.empty(0, self.dtype)
-        if len(self.payload):  # numpy makes no view of nothing
+        if len(self.payload):  # numpy cannot create a view of zero bytes
             n_items = len(self.payload) // self.dtype.itemsize
             flat = np.frombuffer(self.payload.data, self.dtype, n_items, self.payload.start)
         array = shaped(flat, self.shape, self.is_fortran)
@@ -205,7 +205,7 @@ class Array:
 
 
 def is_sizes(value: object) -> TypeGuard[tuple[int, ...]]:
-    """Return whether something is the shape of an array."""
+    """Return whether a value is a valid shape of an array."""
     return (
         isinstance(value, tuple)
         and len(value) <= _MOST_AXES

@@ -1,4 +1,4 @@
-"""The arrays of a PIG model, from its text folder or an archive, with the same checks."""
+"""Arrays of a PIG model, read from a folder of texts or an archive with the same checks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CORE = {
     "skinning_weights": 3,
     "faces_vert": 3,
 }
-"""Arrays without which there is no figure, with their columns in a text file."""
+"""Required arrays, with their columns in a text file."""
 
 OPTIONAL = {
     "J_regressor": 3,
@@ -38,7 +38,7 @@ OPTIONAL = {
     "reduced_faces": 3,
     "sym": 1,
 }
-"""Arrays that a model may lack."""
+"""Optional arrays."""
 
 _SPARSE = ("skinning_weights", "J_regressor")
 _WIDTHS = {**CORE, **OPTIONAL}
@@ -63,7 +63,7 @@ class Part:
     source : Source
         The file, which records faults.
     offset_of : callable or None
-        Returns where a row is in a text; None for archives, which have no lines.
+        Returns the offset of a row in a text; None for archives, which have no lines.
     """
 
     name: str
@@ -72,22 +72,22 @@ class Part:
     offset_of: Callable[[int], int] | None = None
 
     def offset(self, row: int) -> int | None:
-        """Return where a row is in the file, None for archives."""
+        """Return the offset of a row in the file, None for archives."""
         return None if self.offset_of is None else self.offset_of(row)
 
     def item(self, row: int | None = None) -> Phrase | str:
-        """Return what messages call a row, or the whole: nothing where the file tells."""
+        """Return the name of a row or of the array in messages; empty if the file identifies it."""
         if self.offset_of is not None:
             return ""
         name = printable(self.name, 60)
         return name if row is None else Phrase("row-of", name=name, index=row)
 
     def odd_offset(self, wanted: int) -> int | None:
-        """Return where the first row too many is, or the last row if some are missing."""
+        """Return the offset of the first surplus row, or of the last row if rows are missing."""
         return self.offset(min(wanted, len(self.values) - 1))
 
     def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
-        """Let the source remember in which row a thing of a kind is, see ``Source.remember``."""
+        """Register a function that finds the row of an element, see ``Source.remember``."""
         offset_of = self.offset_of
         if offset_of is not None:
             self.source.remember(kind, lambda index: offset_of(row_of(index)))
@@ -103,12 +103,12 @@ class PigFiles:
 
 
 def open_parts(source: Source) -> PigFiles:
-    """Read every array of a text folder, pickle or ``.npz``.
+    """Read all arrays of a text folder, pickle or ``.npz``.
 
     Raises
     ------
     FormatError
-        If one of the core is missing; all that are missing are named.
+        If a required array is missing; the message names all missing ones.
     """
     return _from_folder(source) if source.is_folder else _from_archive(source)
 
@@ -137,7 +137,7 @@ def _from_folder(source: Source) -> PigFiles:
 def _text_part(source: Source, name: str, columns: int) -> Part:
     rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
     if name not in CORE and np.isnan(rows.sum()):
-        rows = rows[:0]  # an incomplete array is of no use
+        rows = rows[:0]  # an incomplete array cannot be used
     return Part(f"{name}.txt", rows, source, offset_of)
 
 
@@ -184,7 +184,7 @@ def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], F
 
 
 def _is_entries(archive: Archive, name: str) -> bool:
-    """Return whether a matrix is stored as rows of (joint, vertex, weight), as in the folder."""
+    """Return whether a matrix is stored as rows of (joint, vertex, weight), as in text folders."""
     shape: tuple[int, ...] = getattr(archive.get(name), "shape", ())
     sides = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
     return shape[1:] == (3,) and shape not in (sides, sides[::-1])

@@ -1,4 +1,4 @@
-"""The header of a ``.ply``: its elements, their properties, and where the numbers begin."""
+"""Header of a ``.ply``: its elements, their properties, and the start of the data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.formats._source import Source
 __all__ = ["CORNERS", "Element", "Header", "Property", "read_header"]
 
 CORNERS = ("vertex_indices", "vertex_index")
-"""Names of the list of a face's vertices."""
+"""Names of the property that lists a face's vertices."""
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -20,12 +20,12 @@ TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _LINE = re.compile(rb"([^\r\n]*)(\r\n|\r+\n|\n|\r|\Z)")
-_LONGEST = 1 << 20  # bytes of a header
+_LONGEST = 1 << 20  # maximum size of a header, bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """One property: its type as numpy has it, and that of its count if it is a list."""
+    """One property: its type in numpy's notation, and the type of the count if it is a list."""
 
     name: str
     kind: str
@@ -34,7 +34,7 @@ class Property:
 
 @dataclass(slots=True)
 class Element:
-    """Rows of the same properties, one after the other."""
+    """Consecutive rows with the same properties."""
 
     name: str
     count: int
@@ -43,24 +43,24 @@ class Element:
 
     @property
     def has_lists(self) -> bool:
-        """Whether rows may differ in size."""
+        """Whether rows may have different sizes."""
         return any(prop.count_kind for prop in self.properties)
 
 
 @dataclass(slots=True)
 class Header:
-    """What a file holds, and where.
+    """Contents of a file.
 
     Attributes
     ----------
     order : "", "<" or ">"
-        Empty for text, else the order of bytes.
+        Empty for text, else the byte order.
     elements : list of Element
         In file order.
     comments : list of (str, int)
-        And where they are.
+        Texts and their offsets.
     end : int
-        Where the numbers begin.
+        Offset of the data.
     """
 
     order: str = ""
@@ -75,13 +75,13 @@ def read_header(source: Source) -> Header:
     Raises
     ------
     FormatError
-        For a line that is not understood; gives the line.
+        If a line is invalid; gives the line.
     """
     header = Header()
     position, number, has_format = 0, 0, False
     while position < min(len(source.data), _LONGEST):
         match = _LINE.match(source.data, position)
-        assert match is not None  # the pattern matches anything
+        assert match is not None  # the pattern matches any text
         words = match[1].decode("utf-8", "surrogateescape").split()
         if number == 0 and words != ["ply"]:
             raise _no_ply(source, match[1])
@@ -99,7 +99,7 @@ def read_header(source: Source) -> Header:
 
 
 def _no_ply(source: Source, line: bytes) -> FormatError:
-    """Return the error of a file of another kind."""
+    """Return the error of a file in another format."""
     looks = source.looks_like()
     if looks is not None:
         return source.fault("F002.ply-looks", 0, looks=looks)
@@ -107,7 +107,7 @@ def _no_ply(source: Source, line: bytes) -> FormatError:
 
 
 def _behind(data: bytes, match: re.Match[bytes]) -> int:
-    """Return where numbers begin: the first may look like the second half of a line's end."""
+    """Return the offset of the data, whose first byte may look like the LF of a CR LF."""
     if match[2] == b"\r\n" and not data.startswith((b"ply\r\n", b"ply \r\n")):
         return match.end() - 1
     return match.end()
@@ -121,7 +121,7 @@ def _order(source: Source, words: list[str], offset: int) -> str:
 
 
 def _take(source: Source, header: Header, words: list[str], line: bytes, offset: int) -> None:
-    """Take in one line behind the first two."""
+    """Parse one line after the first two."""
     keyword = words[0] if words else ""
     if keyword in ("comment", "obj_info"):
         text = line.decode("utf-8", "surrogateescape").strip()

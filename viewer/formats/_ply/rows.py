@@ -33,11 +33,11 @@ class Table:
     columns : dict of str to (N,)
         Its properties that are not lists.
     lists : dict of str to ((N,), (M,))
-        Its lists: how many values each row has, and the values of all rows.
+        Its lists: the number of values of each row, and the values of all rows.
     offsets : (N,) or None
-        Where each row is in a text.
+        Offset of each row in a text.
     is_first : bool
-        Whether no element before it has its name; the others are read and dropped.
+        Whether it is the first element of its name; further ones are read and dropped.
     """
 
     element: Element
@@ -47,7 +47,7 @@ class Table:
     is_first: bool = True
 
     def offset(self, row: int) -> int | None:
-        """Return where in the file a row is; None in one of bytes, which has no lines."""
+        """Return the offset of a row in the file; None in a binary file, which has no lines."""
         return None if self.offsets is None else int(self.offsets[row])
 
 
@@ -79,13 +79,13 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
 
 
 def _flat(starts: Places, counts: Places, step: int) -> Places:
-    """Return the places of all values of lists that begin at ``starts``."""
+    """Return the positions of all values of lists that begin at ``starts``."""
     total = np.cumsum(counts) - counts
     return np.repeat(starts - total * step, counts) + np.arange(counts.sum()) * step
 
 
 class _Text:
-    """Numbers as words, one row per line; NaN stands for words that are not numbers."""
+    """Rows of a text file, one per line; words that are not numbers become NaN."""
 
     def __init__(self, source: Source, header: Header) -> None:
         self.source, self.start = source, header.end
@@ -99,7 +99,7 @@ class _Text:
         ends = np.flatnonzero((letters == 10) | (letters == 13))
         self.lines = lines = np.searchsorted(ends, self.begins)
         self.has_bad = bad >= 0
-        # The first word of every line with words, and how many it has.
+        # The first word of every non-empty line, and its number of words.
         is_first = np.concatenate([[True], lines[1:] != lines[:-1]]) if len(lines) else lines > 0
         self.firsts = np.flatnonzero(is_first)
         self.counts = np.diff(np.append(self.firsts, len(self.begins)))
@@ -122,7 +122,7 @@ class _Text:
         return self.firsts[rows]
 
     def offsets(self, cursor: Places) -> Places | None:
-        """Return where in the file words are."""
+        """Return the offsets of words in the file."""
         return self.begins[cursor] + self.start
 
     def take(self, table: Table, cursor: Places, prop: Property) -> tuple[Numbers, Places]:
@@ -177,7 +177,7 @@ class _Text:
         )
 
     def _no_count(self, table: Table, row: int, word: int) -> FormatError:
-        """Return the error of a list without the number of its entries."""
+        """Return the error of a list without a valid count."""
         item = Phrase("ply-row", element=table.element.name, row=row)
         found = float(self.values[word])
         if np.isnan(found):
@@ -186,7 +186,7 @@ class _Text:
         return self.source.fault("F002.ply-list", self._offset(word), item=item, found=found)
 
     def end(self, element: Element, cursor: Places) -> None:
-        """Refuse rows with more numbers than their properties take."""
+        """Refuse rows with more numbers than their properties need."""
         more = np.flatnonzero(cursor[: len(self.rows_left)] < self.rows_left)
         if len(more) and element.properties:
             self._refuse(int(more[0]), int(cursor[more[0]]))
@@ -222,14 +222,14 @@ class _Text:
 
 
 class _Binary:
-    """Numbers as bytes."""
+    """Rows of a binary file."""
 
     def __init__(self, source: Source, header: Header) -> None:
         self.source, self.order = source, header.order
         self.data, self.position = source.data, header.end
 
     def begin(self, element: Element) -> Places:
-        """Return where each row begins: rows of one size at once, others by their counts."""
+        """Return the offset of each row: at once if all have one size, else by following counts."""
         sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
         sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
         left = len(self.data) - self.position
@@ -241,11 +241,11 @@ class _Binary:
         return self._walked(element) if starts is None else starts
 
     def offsets(self, cursor: Places) -> Places | None:
-        """Return nothing: bytes have no lines."""
+        """Return None, as binary files have no lines."""
         return None
 
     def _even(self, element: Element) -> Places | None:
-        """Return where rows begin if the lists of all are as long as those of the first."""
+        """Return the offsets of rows if all their lists are as long as those of the first."""
         if element.count == 0:
             return np.zeros(0, np.int64)
         size = self._row_size(element, self.position)
@@ -264,7 +264,7 @@ class _Binary:
         return starts
 
     def _row_size(self, element: Element, start: int) -> int:
-        """Return the bytes of one row; past the end of the file counts are 0."""
+        """Return the size of one row in bytes; counts beyond the end of the file are 0."""
         place = start
         for prop in element.properties:
             size = int(prop.kind[1])
@@ -283,7 +283,7 @@ class _Binary:
     def _walked(self, element: Element) -> Places:
         """Return the starts of rows, followed one by one because their lists differ in length.
 
-        A step per face, not per vertex; files of triangles alone never come here.
+        One iteration per face; files with triangles only never need this.
         """
         starts = np.empty(element.count, dtype=np.int64)
         place, end = self.position, len(self.data)
@@ -299,11 +299,11 @@ class _Binary:
         return self._numbers(cursor, prop.kind)
 
     def _numbers(self, cursor: Places, kind: str) -> tuple[Numbers, Places]:
-        """Return the number at each offset, in the machine's own order of bytes."""
+        """Return the number at each offset, in native byte order."""
         size = int(kind[1])
         if len(cursor) == 0:
             return np.zeros(0, dtype=kind), cursor
-        # A window of one number at every byte: rows need not be aligned.
+        # A window the size of a number at every byte, as rows need not be aligned.
         windows = np.ndarray(
             len(self.data) - size + 1, dtype=self.order + kind, buffer=self.data, strides=(1,)
         )

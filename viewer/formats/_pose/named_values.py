@@ -1,4 +1,4 @@
-"""Values by name, from a JSON text or an archive, with the places of faults in them."""
+"""Values by name from a JSON text or an archive, with the locations of faults."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from viewer.rig.arrays import Deferred, Floats
 
 __all__ = ["NamedValues", "described", "parse_json"]
 
-_DEEPEST = 500  # brackets: where a text that is too deeply nested for Python is taken to be so
-_MOST_DIGITS = 18  # of whole numbers that surely fit 64 bits; longer ones are taken for floats
+_DEEPEST = 500  # nesting level at which a text too deeply nested for Python is reported
+_MOST_DIGITS = 18  # digits of integers that certainly fit 64 bits; longer ones are read as floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,9 +39,9 @@ class NamedValues:
     source : Source
         The file.
     values : mapping of str to object
-        Numbers, texts, lists and dicts, or arrays.
+        Numbers, strings, lists and dicts, or arrays.
     text : str or None
-        The JSON text that they come from; None for archives, which have no lines.
+        The JSON text; None for archives, which have no lines.
     """
 
     source: Source
@@ -51,7 +51,7 @@ class NamedValues:
     def offset(self, *path: str | int) -> int | None:
         """Return the offset of a value by the keys and indices that lead to it.
 
-        Without that value it is that of the nearest one around it; None for archives.
+        If the value is missing, this is the offset of the nearest container; None for archives.
         """
         if self.text is None:
             return None
@@ -60,34 +60,34 @@ class NamedValues:
         return _byte_offset(self.text, place)
 
     def fault(self, key: str, *path: str | int, **values: Any) -> FormatError:
-        """Return an error that names the file, and the line of a value if it has lines."""
+        """Return an error with the file, and the line of a value if the file has lines."""
         return self.source.fault(key, self.offset(*path), **values)
 
     def warn(self, key: str, *path: str | int, **values: Any) -> None:
-        """Add a warning that names the file, and the line of a value if it has lines."""
+        """Add a warning with the file, and the line of a value if the file has lines."""
         self.source.warn(key, self.offset(*path), **values)
 
     def array(self, key: str, kinds: str, expected: Phrase) -> NDArray[Any]:
-        """Return an array of some kinds of values, written as an array or as lists.
+        """Return an array of certain kinds of values, stored as an array or as lists.
 
         Parameters
         ----------
         key : str
-            Of the value.
+            Key of the value.
         kinds : str
-            Of numpy: ``"iuf"``, ``"bi"`` or ``"U"``.
+            Numpy's letters of the kinds: ``"iuf"``, ``"bi"`` or ``"U"``.
         expected : Phrase
-            What is expected, for the message.
+            Description of the expected value, for the message.
 
         Raises
         ------
         FormatError
-            With the line of the first value that is none of these.
+            If a value is of another kind; gives the line of the first.
         """
         value = self.values.get(key)
         try:
             array = np.asarray(value)
-        except ValueError:  # lists of different lengths, or more deeply nested than arrays can be
+        except ValueError:  # ragged lists, or more nested than an array can be
             array = np.zeros(0, dtype=object)
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return array
@@ -114,10 +114,10 @@ def parse_json(source: Source) -> NamedValues:
     Raises
     ------
     FormatError
-        For invalid JSON, a number like NaN, or a repeated key; gives the line.
+        If the JSON is invalid or contains NaN, an infinity or a repeated key; gives the line.
     """
     text = source.data.decode("utf-8", "surrogateescape")
-    odd: set[str] = set()  # what Python takes and JSON does not
+    odd: set[str] = set()  # accepted by Python but not by JSON
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
@@ -145,7 +145,8 @@ def parse_json(source: Source) -> NamedValues:
 
 
 def _whole(digits: str) -> int | float:
-    # Python refuses to read very long ones at all. As infinite floats they are found in their line.
+    # Python refuses to convert very long integers. As infinite floats they are reported with a
+    # line.
     return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
 
 
@@ -156,7 +157,7 @@ def _odd_json(source: Source, text: str) -> FormatError:
         return source.fault(
             "F002.json-constant", _byte_offset(text, constant[1]), found=constant[0]
         )
-    assert repeated is not None  # one of the two was noticed
+    assert repeated is not None  # one of these has been detected
     found = printable(repeated[0], 40)
     return source.fault("F002.json-twice", _byte_offset(text, repeated[1]), found=found)
 
@@ -166,9 +167,9 @@ def _byte_offset(text: str, place: int) -> int:
 
 
 def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
-    """Return the indices of the first value in lists that is of no such kind, and the value.
+    """Return the indices of the first value of another kind in nested lists, and the value.
 
-    None instead of the indices if there is none: then the lists do not make an array.
+    The indices are None if there is no such value, so that the lists are ragged.
     """
     if not isinstance(value, list | tuple):
         return (), value
@@ -183,7 +184,7 @@ def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
 
 
 def _is_of(one: Any, kinds: str) -> bool:
-    """Return whether a single value is of a kind, by numpy's letters."""
+    """Return whether a single value is of one of the kinds, given by numpy's letters."""
     if kinds == "U":
         return isinstance(one, str)
     if kinds == "bi":

@@ -27,7 +27,7 @@ KEYS = (
 """Keys that are read; all are ignored if the first is missing."""
 
 _UPS = ("y", "z")
-_SHORTEST = 1e-6  # length of a quaternion; a shorter one has no reliable direction
+_SHORTEST = 1e-6  # length of a quaternion; a shorter one defines no reliable rotation
 _LONGEST_WORD = 200  # characters
 
 
@@ -64,19 +64,19 @@ def read_rotations(named: NamedValues) -> JointRotations | None:
     )
 
 
-def named_rotations(turns: JointRotations) -> dict[str, Any]:
+def named_rotations(rotations: JointRotations) -> dict[str, Any]:
     """Return joint rotations by their keys in files; transforms at rest are omitted."""
     named: dict[str, Any] = {
-        "figure": printable(turns.figure, _LONGEST_WORD),
-        "up": turns.up,
-        "dof_layout": turns.layout,
-        "joint_names": list(turns.names),
-        "joint_turns": turns.relative.tolist(),
+        "figure": printable(rotations.figure, _LONGEST_WORD),
+        "up": rotations.up,
+        "dof_layout": rotations.layout,
+        "joint_names": list(rotations.names),
+        "joint_turns": rotations.relative.tolist(),
     }
-    if turns.rotations is not None:
-        named["joint_rotations"] = turns.rotations.tolist()
-    if turns.shifts.any():
-        named["joint_shifts"] = turns.shifts.tolist()
+    if rotations.rotations is not None:
+        named["joint_rotations"] = rotations.rotations.tolist()
+    if rotations.shifts.any():
+        named["joint_shifts"] = rotations.shifts.tolist()
     return named
 
 

@@ -25,7 +25,7 @@ KEYWORDS = frozenset(
 ) | {b"balljoint"}
 """Words that begin an item of a joint, and cannot be part of a name."""
 
-_DEEPEST = 32  # tabs that a line begins with
+_DEEPEST = 32  # maximum number of tabs at the beginning of a line
 
 
 def write(figure: Figure, path: str | Path) -> None:
@@ -34,7 +34,7 @@ def write(figure: Figure, path: str | Path) -> None:
     Parameters
     ----------
     figure : Figure
-        With a skeleton in depth-first order, of rotation DOFs and unrotated rest joints.
+        With a skeleton in depth-first order, with rotation DOFs and without rest rotations.
     path : str or Path
         Replaced only when the whole text has been written.
 

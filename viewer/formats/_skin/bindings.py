@@ -15,13 +15,13 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
 
-_NEUTRAL: Floats = np.eye(4, 3).ravel()  # as the file has it, row by row
+_NEUTRAL: Floats = np.eye(4, 3).ravel()  # four rows of three, as in the file
 
 Word = re.Match[bytes]
 
 
 def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, int]:
-    """Return B = [a b c d; 0 0 0 1] for each binding, (count, 4, 4), and the offset behind."""
+    """Return each B = [a b c d; 0 0 0 1], (count, 4, 4), and the offset after the section."""
     stated = position - 1
     word = source.next_word(position)
     if word is not None and word.group() == b"{":
@@ -38,7 +38,7 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
         end = source.end if word is None else word.start()
         then = word and word.group()
         found = len(matrices)
-        # A wrong count is the fault; if the text is truncated, its end is.
+        # The fault is the wrong count or, if the text is truncated, its end.
         if not is_whole:
             line = source.line(stated)
             raise source.fault(

@@ -18,7 +18,7 @@ __all__ = ["KEYWORDS", "Block", "find_block", "read_count", "to_whole", "unclose
 KEYWORDS = frozenset(
     (b"positions", b"normals", b"texcoords", b"skinweights", b"material", b"triangles", b"bindings")
 )
-"""Words that begin a section."""
+"""Keywords of sections."""
 
 _INT32 = 2.0**31
 
@@ -27,18 +27,18 @@ Word = re.Match[bytes]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Where the numbers of a section are, to find a word again when an error needs its line.
+    """Range of a section's numbers, by which an error finds the line of a word.
 
     Attributes
     ----------
     name : str
-        The section's.
+        Keyword of the section.
     header, count : int
-        Where its keyword and the number of its entries are.
+        Offsets of the keyword and of the number of entries.
     start, end : int
-        Of the numbers.
+        Range of the numbers.
     closed : bool
-        Whether a brace follows them.
+        Whether a closing brace follows them.
     """
 
     name: str
@@ -50,9 +50,9 @@ class Block:
 
 
 def find_block(source: Source, name: str, header: Word, position: int) -> Block:
-    """Return where a section's numbers are; only weights may leave out the opening brace.
+    """Return the range of a section's numbers; only weights may omit the opening brace.
 
-    ``position`` is behind the section's count, or behind its keyword if it has none.
+    ``position`` is the offset after the section's count, or after its keyword without a count.
     """
     stated = position - 1
     brace = source.next_word(position)
@@ -69,13 +69,13 @@ def find_block(source: Source, name: str, header: Word, position: int) -> Block:
 
 
 def read_count(source: Source, name: str, word: Word) -> tuple[int, int]:
-    """Read a section's count and the offset behind it; refuse one that the file cannot hold."""
+    """Return a section's count and the offset after it; refuse counts that do not fit the file."""
     found = source.next_word(word.end())
     value = None if found is None else to_number(found.group())
     if found is None or value is None or value != int(value) or value < 0:
         at = word.start() if found is None else found.start()
         raise source.fault("F002.count", at, item=name, found=found and found.group())
-    # Even an entry of one letter needs white space before it.
+    # An entry takes at least two bytes: one character, and white space before it.
     left = len(source.data) - found.end()
     if value * 2 > left + 1:
         raise source.fault(
@@ -85,7 +85,7 @@ def read_count(source: Source, name: str, word: Word) -> tuple[int, int]:
 
 
 def words_of(source: Source, block: Block) -> Words:
-    """Return the words of a block, of which none may begin another section.
+    """Return the words of a block, which must not contain the keyword of another section.
 
     Raises
     ------
@@ -101,13 +101,13 @@ def words_of(source: Source, block: Block) -> Words:
 
 
 def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
-    """Return the error that something else follows before a block ends; None is the file's end."""
+    """Return the error of a block interrupted by ``found``; None stands for the end of the file."""
     line = source.line(block.header)
     return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
 
 
 def to_whole(values: Floats) -> tuple[Ints, int]:
-    """Return numbers as int32, and the place of the first that this changes, -1 for none."""
+    """Return numbers as int32, and the index of the first that this changes, -1 for none."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
     whole.flags.writeable = False  # so that it need not be copied

@@ -24,16 +24,16 @@ __all__ = [
     "unbound_skin",
 ]
 
-WEIGHT_TOLERANCE = 0.01  # the format's own: a sum further from 1 is worth a warning
+WEIGHT_TOLERANCE = 0.01  # tolerance of the format; sums further from 1 cause a warning
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
 _NEARLY_SINGULAR = 1e6  # condition number
-_FAR = 1e6  # a vertex this many times the median distance away is no part of the figure
+_FAR = 1e6  # a vertex this many times the median distance away is stray
 
 
 def even_counts(source: Source, sections: Sections) -> None:
-    """Refuse sections of more or fewer vertices than there are positions.
+    """Refuse sections whose number of vertices differs from that of the positions.
 
-    Where all others agree, the positions are those at fault.
+    If all other sections agree, the positions are at fault.
     """
     tables = sections.tables
     counts = {name: len(table) for name, table in tables.items()}
@@ -82,7 +82,7 @@ def even_counts(source: Source, sections: Sections) -> None:
 
 
 def _fit_weights(sections: Sections, count: int) -> None:
-    """Leave out the influences of further vertices, or give missing vertices none."""
+    """Drop the influences of surplus vertices, and add missing vertices without influences."""
     assert sections.starts is not None  # the caller checked it
     starts = sections.starts[: count + 1]
     sections.starts = np.pad(starts, (0, count + 1 - len(starts)), mode="edge")
@@ -91,7 +91,7 @@ def _fit_weights(sections: Sections, count: int) -> None:
 
 
 def unbound_skin(sections: Sections) -> Skin:
-    """Return a skin of a file without bindings, its joints bound where they are at rest."""
+    """Return the skin of a file without bindings, with the joints bound at their rest positions."""
     assert sections.starts is not None  # the caller checked it
     fits = sections.joints >= 0
     joints = np.where(fits, sections.joints, 0).astype(np.int32)
@@ -101,7 +101,7 @@ def unbound_skin(sections: Sections) -> Skin:
 
 
 def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
-    """Warn of textures that cannot be drawn and of vertices that are far from all others."""
+    """Warn about textures that cannot be drawn and vertices far from all others."""
     has_texture = any(material.texture for material in mesh.materials)
     if mesh.uvs is not None and not has_texture:
         source.warn("F007.skin-texcoords", sections.offsets["texcoords"])
@@ -109,7 +109,7 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
         source.warn("F005.skin-texture", sections.offsets["material"])
     # A sample of a few thousand vertices is enough to locate the figure.
     some = mesh.positions[:: max(1, mesh.n_vertices // 4096)]
-    # The middle value instead of np.median, which imports numpy.ma: 14 ms at the start.
+    # The middle value instead of np.median, whose import of numpy.ma takes 14 ms at start-up.
     middle = len(some) // 2
     center = np.partition(some, middle, axis=0)[middle]
     typical = float(np.partition(np.abs(some - center).max(axis=1), middle)[middle])
@@ -129,7 +129,7 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
 
 
 def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> Ints:
-    """Return all triangles, (T, 3); refuse indices of vertices that do not exist."""
+    """Return all triangles, (T, 3); refuse indices of nonexistent vertices."""
     first, tables = 0, []
     for run in sections.triangles:
         rows = run.triangles
@@ -155,7 +155,7 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
 
 
 def invert_bindings(source: Source, sections: Sections) -> Floats:
-    """Return the inverse bind matrices, (J, 4, 4); refuse bindings that a float32 has none for."""
+    """Return the inverse bind matrices, (J, 4, 4); refuse bindings not invertible in float32."""
     assert sections.bindings is not None  # the caller checked it
     linear = sections.bindings[:, :3, :3]
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
@@ -196,7 +196,7 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
 
 
 def checked_influences(source: Source, sections: Sections, n_joints: int) -> tuple[Ints, Floats]:
-    """Return joints and weights of all influences; refuse indices of joints that are not bound."""
+    """Return joints and weights of all influences; refuse indices of joints without binding."""
     joints, weights = sections.joints, sections.weights
     fits = (joints >= 0) & (joints < n_joints)
     if fits.all():
@@ -219,7 +219,7 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
 
 
 def check_weights(source: Source, skin: Skin) -> None:
-    """Warn, once each, of weights that are negative, missing, or do not sum to 1."""
+    """Warn, once each, about weights that are negative, missing, or do not sum to 1."""
     moved = has_influence(skin)
     if not moved.all():
         first = int((~moved).argmax())

@@ -1,4 +1,4 @@
-"""Places of the vertices' influence counts in a ``skinweights`` section."""
+"""Positions of the vertices' influence counts in a ``skinweights`` section."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["find_heads"]
 
-_LEAP = 16  # vertices that one step of the Python loop passes over
-_SMALL = 1 << 29  # numbers for which three times their count is an int32
+_LEAP = 16  # vertices that each step of the Python loop skips
+_SMALL = 1 << 29  # up to this many numbers, three times their count fits an int32
 
 
 def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
-    """Return the places of the vertices' counts, (V,), or None if they do not fill the block.
+    """Return the positions of the vertices' counts, (V,); None if they do not fill the block.
 
-    Each count determines the place of the next, so they must be followed one by one. Squaring
-    the map "place to next place" four times makes each step of that loop pass 16 vertices.
+    Each count determines the position of the next, so they form a linked list. Composing the map
+    from each position to the next with itself four times lets each step of the loop skip 16.
     """
     size = len(values)
     if count == 0:
         return None if size else np.zeros(0, np.int32)
-    # Two places behind the last: the end of the block, and beyond it; they lead to the latter.
+    # Two extra positions, the end of the block and one beyond it; both map to the latter.
     kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
     after = np.full(size + 2, size + 1, dtype=kind)
     counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)

@@ -1,4 +1,4 @@
-"""The ``material`` section of a ``.skin`` file and the picture it names."""
+"""The ``material`` section of a ``.skin`` file, and the picture that it references."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.material import Material, Texture
 
 __all__ = ["read_material"]
 
-# A file name may hold blanks: it reaches to the end of its line.
+# A file name may contain spaces: it extends to the end of the line.
 _FILE_NAME = re.compile(rb"[ \t\n\r\v\f]*([^\r\n{}]*)")
 
 Word = re.Match[bytes]
@@ -31,16 +31,16 @@ def read_material(
     header : Word
         The word ``material``.
     keywords : container of bytes
-        Words that begin a section, and so are no part of a name.
+        Keywords of sections, which cannot be part of a name.
     pictures : dict
-        Those loaded so far, by name; this material's is added.
+        Pictures loaded so far, by name; this material's is added.
 
     Returns
     -------
     material : Material
         With its picture, if that can be read.
     end : int
-        Offset behind it.
+        Offset after the section.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _name(source: Source, header: Word, keywords: Container[bytes]) -> tuple[str
 
 
 def _skip(source: Source, word: Word) -> int:
-    """Return the offset behind an unknown item: its numbers, or its whole balanced block."""
+    """Return the offset after an unknown item: after its numbers or its balanced block."""
     position, depth = word.end(), int(word.group() == b"{")
     while (following := source.next_word(position)) is not None:
         text = following.group()

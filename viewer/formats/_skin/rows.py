@@ -1,8 +1,8 @@
 """Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
 
 A block without faults is parsed at once. Otherwise every word is examined: each fault is recorded
-and replaced by NaN. Lines have no meaning in the format, but most files have one vertex or triangle
-per line, so that a line of a wrong length does not affect others.
+and replaced by NaN. Line breaks have no meaning in the format, but most files have one vertex or
+triangle per line. If so, a line of a wrong length does not affect the others.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from viewer.rig.arrays import Floats, Ints
 __all__ = ["LOST", "OffsetOf", "read_rows", "whole_corners"]
 
 LOST = -(2**31)
-"""Stands for a corner that is not a whole number."""
+"""Placeholder for a corner that is not an integer."""
 
 Places = NDArray[np.int64]
 OffsetOf = Callable[[int], int]
-"""Gives the offset of the index-th thing; slow."""
+"""Returns the offset of the element with an index; slow, for errors only."""
 
 _PARTS: dict[str, Part] = {"positions": "positions", "triangles": "triangles"}
 
@@ -47,11 +47,11 @@ def read_rows(
     source : Source
         The file, which records the faults.
     block : Block
-        Where the numbers are.
+        Range of the numbers.
     count : int
-        Rows that the file declares; if it has others, those count.
+        Number of rows declared by the file; the actual number has precedence.
     width : int
-        Numbers in a row.
+        Numbers per row.
     first : int
         Index of the first row, for messages.
     item : str
@@ -60,18 +60,18 @@ def read_rows(
     Returns
     -------
     rows : (N, width)
-        NaN for numbers that are none, and in rows with more or fewer numbers.
+        NaN for words that are not numbers, and in rows with more or fewer numbers.
     offset_of : callable
-        Gives the offset of a row.
+        Returns the offset of a row.
 
     Raises
     ------
     FormatError
-        If the rows cannot be told apart.
+        If it is unknown where the rows begin.
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
-        values.flags.writeable = False  # so that it need not be copied
+        values.flags.writeable = False  # allows the mesh to use it without a copy
         begin, end = block.start, block.end
         return values.reshape(count, width), lambda row: source.number_offset(
             begin, end, width * row
@@ -115,7 +115,7 @@ def _faulty_rows(
 def _row_begins(
     source: Source, block: Block, words: Words, count: int, width: int
 ) -> tuple[Places, Places]:
-    """Return the first word of each row, and how many words it has."""
+    """Return the first word and the number of words of each row."""
     total = len(words.values)
     if total != count * width:
         begins, sizes = words.rows()
@@ -150,14 +150,14 @@ def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -
 
 
 def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
-    """Return triangles as whole numbers, ``LOST`` for corners that are none: (T, 3).
+    """Return triangles as integers, ``LOST`` for corners that are not: (T, 3).
 
     Parameters
     ----------
     source : Source
         The file, which records the faults.
     rows, offset_of : (T, 3), callable
-        As ``read_rows`` gives them: its own faults are known.
+        Results of ``read_rows``, which has recorded the faults that it found.
     first : int
         Index of the first triangle, for messages.
     """

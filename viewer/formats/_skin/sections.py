@@ -1,4 +1,4 @@
-"""Parser for the sections of a ``.skin`` file, as arrays before any check."""
+"""Parser for the sections of a ``.skin`` file; returns unchecked arrays."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class TriangleRun:
     triangles : (M, 3)
         Vertex indices.
     material : int
-        That before it, -1 for none.
+        Index of the preceding material, -1 for none.
     offset_of : callable
-        Gives the offset of a triangle.
+        Returns the offset of a triangle.
     """
 
     triangles: Ints
@@ -43,7 +43,7 @@ class TriangleRun:
 
 @dataclass(slots=True)
 class Sections:
-    """Everything a ``.skin`` file holds; None or empty where a section is missing."""
+    """All sections of a ``.skin`` file; None or empty if a section is missing."""
 
     tables: dict[str, Floats] = field(default_factory=dict)
     starts: Ints | None = None
@@ -55,10 +55,10 @@ class Sections:
     n_triangles: int = 0  # of all sections read so far
     bindings: Floats | None = None
     offsets: dict[str, int] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)  # as declared
+    counts: dict[str, int] = field(default_factory=dict)  # as declared by the file
 
     def triangle_offset(self, triangle: int) -> int:
-        """Return where in the file a triangle is, counted through all sections."""
+        """Return the offset of a triangle, counted through all sections."""
         ends = np.cumsum([len(run.triangles) for run in self.triangles])
         run = int(np.searchsorted(ends, triangle, side="right"))
         first = int(ends[run]) - len(self.triangles[run].triangles)
@@ -97,7 +97,7 @@ def read_sections(source: Source) -> Sections:
 
 
 def _read_section(source: Source, sections: Sections, word: Word) -> int:
-    """Read one section and return the offset behind it."""
+    """Read one section and return the offset after it."""
     name = word.group().decode()
     if name in sections.offsets and name not in ("triangles", "material"):
         source.warn("F007.skin-again", word.start(), section=name)
@@ -127,7 +127,7 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
 
 
 def _read_table(source: Source, block: Block, count: int) -> Floats:
-    """Parse a table, NaN where it has faults, and remember its rows."""
+    """Parse a table, NaN where it has faults, and register its rows."""
     rows, offset_of = read_rows(source, block, count, _WIDTHS[block.name])
     source.remember(block.name, offset_of)
     return rows
@@ -147,7 +147,7 @@ def _read_weights(source: Source, sections: Sections, block: Block, count: int) 
 
 
 def check_declared(source: Source, sections: Sections, name: str) -> None:
-    """Refuse a table or weights that has more or fewer vertices than its count says."""
+    """Refuse a table or weights whose number of vertices differs from the declared count."""
     if name not in sections.counts or name == "triangles":
         return
     found = len(sections.tables.get(name, ()))
@@ -160,7 +160,7 @@ def check_declared(source: Source, sections: Sections, name: str) -> None:
 
 
 def _skip(source: Source, word: Word) -> int:
-    """Return the offset behind an unknown section: its numbers, or its whole balanced block."""
+    """Return the offset after an unknown section: after its numbers or its balanced block."""
     depth = 0
     position = word.start()
     while (following := source.next_word(position)) is not None:

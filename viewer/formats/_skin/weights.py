@@ -1,7 +1,8 @@
 """The ``skinweights`` section of a ``.skin`` file.
 
-A count for each vertex, and that many pairs of joint and weight. Without faults the numbers are
-parsed at once; otherwise every word is examined, and an unreadable vertex gets no influence.
+It has a count for each vertex, followed by that many pairs of joint and weight. Without faults the
+numbers are parsed at once; otherwise every word is examined, and an unreadable vertex gets no
+influence.
 """
 
 from __future__ import annotations
@@ -33,23 +34,23 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
     source : Source
         The file, which records the faults.
     block : Block
-        Where the numbers are.
+        Range of the numbers.
     count : int
-        Vertices that the file declares; if it has others, those count.
+        Number of vertices declared by the file; the actual number has precedence.
 
     Returns
     -------
     starts : (N + 1,)
-        Where the influences of each vertex begin; one that cannot be told has none.
+        First influence of each vertex; an unreadable vertex has none.
     joints, weights : (M,)
-        Both 0 where either is not a number.
+        Both 0 if either is not a number.
     offset_of : callable
-        Gives the offset of a vertex.
+        Returns the offset of a vertex.
 
     Raises
     ------
     FormatError
-        If it cannot be told which numbers belong to which vertex.
+        If the numbers cannot be assigned to vertices.
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     heads = find_heads(values, count) if bad < 0 else None
@@ -60,7 +61,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
 def _whole_influences(
     source: Source, block: Block, values: Floats, heads: NDArray[np.integer]
 ) -> Influences | None:
-    """Return all influences, None if a joint is no whole number."""
+    """Return all influences, None if a joint is not an integer."""
     is_pair = np.ones(len(values), dtype=bool)
     is_pair[heads] = False
     pairs = values[is_pair].reshape(-1, 2)
@@ -70,11 +71,12 @@ def _whole_influences(
     starts = np.zeros(len(heads) + 1, dtype=np.int32)
     np.cumsum(values[heads].astype(np.int32), out=starts[1:])
     weights = pairs[:, 1].copy()
-    starts.flags.writeable = weights.flags.writeable = False  # so that nobody has to copy them
+    # Allows the skin to use them without a copy.
+    starts.flags.writeable = weights.flags.writeable = False
     begin, end = block.start, block.end
 
     def offset_of(vertex: int) -> int:
-        # Words before it: a count for each vertex, and two for each influence.
+        # It is preceded by one count per vertex and two words per influence.
         return source.number_offset(begin, end, vertex + 2 * int(starts[vertex]))
 
     return starts, joints, weights, offset_of
@@ -89,7 +91,7 @@ def _faulty_influences(source: Source, block: Block, count: int) -> Influences:
         fits = np.ones(len(heads), dtype=np.bool_)
     else:
         heads, sizes = words.rows()
-        # A line holds how many follow, and pairs.
+        # Each line has a count, followed by pairs.
         fits = known[heads] * 2 + 1 == sizes
         if not block.closed or fits.sum() * 2 <= len(fits):
             raise _no_influences(source, block, words, known, count)
@@ -98,7 +100,7 @@ def _faulty_influences(source: Source, block: Block, count: int) -> Influences:
     counts = np.where(fits, known[heads], 0).astype(np.int32)
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     owners = np.repeat(np.arange(len(heads)), counts)
-    # The joint of each influence follows the head of its vertex and two words for each before it.
+    # The joint of an influence comes after the vertex's count and two words per earlier influence.
     places = heads[owners] + 1 + 2 * (np.arange(len(owners)) - starts[owners])
     joints, weights = _faulty_pairs(source, words, places, owners)
     offsets = words.offsets[heads]
@@ -108,7 +110,7 @@ def _faulty_influences(source: Source, block: Block, count: int) -> Influences:
 def _refuse_lines(
     source: Source, words: Words, heads: Places, vertices: Places, after: Places
 ) -> None:
-    """Refuse lines whose number of words is not what their first word says."""
+    """Refuse lines whose number of words contradicts their first word."""
     if len(vertices) == 0:
         return
     vertex = int(vertices[0])
@@ -140,7 +142,7 @@ def _refuse_lines(
 def _faulty_pairs(
     source: Source, words: Words, places: Places, owners: Places
 ) -> tuple[Ints, Floats]:
-    """Return joints and weights, both 0 where either is not a number."""
+    """Return joints and weights, both 0 if either is not a number."""
     joints, weights = words.values[places], words.values[places + 1]
     bad = np.flatnonzero(np.isnan(np.stack([joints, weights], axis=1)).any(axis=1))
     at = np.where(np.isnan(joints[bad]), places[bad], places[bad] + 1)
@@ -173,7 +175,7 @@ def _faulty_pairs(
 def _no_influences(
     source: Source, block: Block, words: Words, known: Floats, count: int
 ) -> FormatError:
-    """Return the error of the first wrong count, found by following the counts slowly."""
+    """Return the error of the first wrong count, found by following the counts one by one."""
     numbers = known.tolist()
     heads: list[int] = []
     position = 0

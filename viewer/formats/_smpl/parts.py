@@ -29,16 +29,16 @@ _NOT_NEEDED = (
     "dynamic_lmk_bary_coords joint2num part2num allow_pickle gender"
 )
 IGNORED = frozenset(_NOT_NEEDED.split())
-"""Keys that models have and posing does not need."""
+"""Keys of models that are not needed for posing."""
 
-_SHAPES = 300  # of models with at least 400 columns; the expressions follow
-_FEW_SHAPES = 10  # of the older models
+_SHAPES = 300  # shapes of models with at least 400 columns; the expressions follow
+_FEW_SHAPES = 10  # shapes of older models
 
 
 def model_shapes(
     source: Source, archive: Archive, n_vertices: int, member: Member | None, used: list[str]
 ) -> BlendShapes | None:
-    """Return shape and expression directions, read when first used."""
+    """Return shape and expression directions, read on first use."""
     if not archive.has("shapedirs"):
         source.warn("F007.smpl-shapedirs")
         return None
@@ -62,7 +62,7 @@ def model_shapes(
 
 
 def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
-    """Return the names of the coefficients if the file has them, as the bundled body does."""
+    """Return the names of the coefficients if the file has them, like the bundled body."""
     if archive.has("shape_names"):
         values = archive.array("shape_names", (count,), "SU").values()
         used.append("shape_names")
@@ -87,7 +87,7 @@ def model_hands(archive: Archive, member: Member | None, used: list[str]) -> tup
 def model_uvs(
     source: Source, archive: Archive, n_triangles: int, used: list[str]
 ) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates and the triangles over them, if the file has both."""
+    """Return texture coordinates and their triangles, if the file has both."""
     if not (archive.has("vt") and archive.has("ft")):
         return None, None
     uvs = finite(archive, "vt", archive.array("vt", ("U", 2)).values())
@@ -102,7 +102,7 @@ def model_uvs(
 def model_symmetry(
     source: Source, archive: Archive, n_vertices: int, used: list[str]
 ) -> Ints | None:
-    """Return each vertex's mirror partner, if the file has a map that is one."""
+    """Return each vertex's mirror partner, if the file has a valid map."""
     if not archive.has("vert_sym_idxs"):
         return None
     partners = archive.array("vert_sym_idxs", (n_vertices,)).values()

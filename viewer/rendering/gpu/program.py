@@ -70,6 +70,7 @@ class Programs:
         skin: str = "",
         geometry: str = "",
         affine: bool = False,
+        effects: tuple[str, ...] = (),
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
 
@@ -87,13 +88,15 @@ class Programs:
             Name of the geometry shader between the two, if any.
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
+        effects : tuple of str
+            Macros of the fragment shader, see ``viewer.rendering.effects``.
 
         Raises
         ------
         RenderError
             If the driver rejects a shader; the message names the file and its line.
         """
-        return self._get((name, skin, fragment or name, chunk, geometry, affine), ())
+        return self._get((name, skin, fragment or name, chunk, geometry, affine, *effects), ())
 
     def feedback(
         self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
@@ -104,14 +107,15 @@ class Programs:
         """
         return self._get((name, chunk, "", "", "", affine), outputs)
 
-    def _get(
-        self, key: tuple[str, str, str, str, str, bool], outputs: tuple[str, ...]
-    ) -> moderngl.Program:
+    def _get(self, key: tuple[str | bool, ...], outputs: tuple[str, ...]) -> moderngl.Program:
         if key not in self._cache:
-            name, skin, fragment_name, chunk, middle, affine = key
+            name, skin, fragment_name, chunk, middle = (str(part) for part in key[:5])
+            affine, effects = key[5], tuple(str(part) for part in key[6:])
             files: list[str] = []
-            vertex = _compose(f"{name}.vert", skin, files, "AFFINE_PALETTE" if affine else "")
-            fragment = _compose(f"{fragment_name}.frag", chunk, files) if fragment_name else None
+            vertex = _compose(f"{name}.vert", skin, files, ("AFFINE_PALETTE",) if affine else ())
+            fragment = (
+                _compose(f"{fragment_name}.frag", chunk, files, effects) if fragment_name else None
+            )
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
                 # Both stages output the fragment shader's inputs: the vertex shader's are renamed.
@@ -153,7 +157,7 @@ class Programs:
         self._cache.clear()
 
 
-def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
+def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] = ()) -> str:
     """Return a shader's text with its chunk and includes, with line numbers of the original files.
 
     Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
@@ -171,8 +175,8 @@ def _compose(name: str, chunk: str, files: list[str], define: str = "") -> str:
             parts.append(_chunk(folder, chunk, files))
         else:
             parts.append(f"{line}\n")
-        if define and line.startswith("#version"):
-            parts.append(f"#define {define}\n")
+        if line.startswith("#version"):
+            parts += [f"#define {macro}\n" for macro in defines]
         if include or line.startswith(("#version", _CHUNK_MARK)):
             parts.append(f"#line {base + number + 1}\n")
     return "".join(parts)

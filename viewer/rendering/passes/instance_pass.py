@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import moderngl
+
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.mesh_pass import draw_runs, set_surface
@@ -14,7 +16,7 @@ from viewer.rig.scene import Actor
 if TYPE_CHECKING:
     from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 
-__all__ = ["FEWEST", "draw_instances", "instance_groups"]
+__all__ = ["FEWEST", "draw_instance_shapes", "draw_instances", "instance_groups"]
 
 FEWEST = 8
 """Minimum number of actors to draw as instances; see ``instance_groups``."""
@@ -73,7 +75,12 @@ def draw_instances(
         Shading and lights.
     """
     program = programs.drawing(
-        "instance", options.shading, "mesh", skin=instances.method, affine=instances.is_affine
+        "instance",
+        options.shading,
+        "mesh",
+        skin=instances.method,
+        affine=instances.is_affine,
+        effects=view.effects.defines,
     )
     instances.place(actors, view)
     instances.use(program, view)
@@ -83,3 +90,22 @@ def draw_instances(
     draw_runs(
         instances.array(program, indices), indices, options.texture, instances=instances.count
     )
+
+
+def draw_instance_shapes(
+    programs: Programs,
+    instances: InstanceBuffers,
+    actors: Sequence[Actor],
+    view: View,
+    options: DisplayOptions,
+    fragment: str,
+) -> None:
+    """Draw the surfaces of such actors with a fragment shader that needs no material."""
+    program = programs.drawing(
+        "instance", fragment=fragment, skin=instances.method, affine=instances.is_affine
+    )
+    instances.place(actors, view)
+    instances.use(program, view)
+    indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
+    array = instances.array(program, indices)
+    array.render(moderngl.TRIANGLES, instances=instances.count)

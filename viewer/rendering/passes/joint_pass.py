@@ -140,7 +140,9 @@ class JointPass:
         """
         overlays = opacity < 1.0
         view = in_front(view) if overlays else view
-        program = joint_program(self.programs, skeleton, options)
+        program = joint_program(
+            self.programs, skeleton, options, "phong", "mesh", view.effects.defines
+        )
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_joints, program, skeleton, *how)
         if overlays:
@@ -160,10 +162,11 @@ def joint_program(
     options: DisplayOptions,
     chunk: str = "phong",
     fragment: str = "mesh",
+    effects: tuple[str, ...] = (),
 ) -> moderngl.Program:
     """Return the program that draws a skeleton in its style; for ``draw_joints``."""
     name = "joint" if skeleton.style(options) == "boxes" else "bone"
-    return programs.drawing(name, chunk, fragment=fragment)
+    return programs.drawing(name, chunk, fragment=fragment, effects=effects)
 
 
 def draw_joints(

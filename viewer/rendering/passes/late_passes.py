@@ -13,6 +13,7 @@ from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.mesh_pass import MeshPass
 
 if TYPE_CHECKING:
+    from viewer.rendering.gpu.accumulation import Accumulation
     from viewer.rendering.passes.annotation_pass import AnnotationPass
     from viewer.rendering.passes.ghost_pass import GhostPass
     from viewer.rendering.passes.keypoint_pass import KeypointPass
@@ -52,6 +53,7 @@ class LatePasses:
     ) -> None:
         self._context, self._programs, self._buffers = context, programs, buffers
         self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
+        self._sum: Accumulation | None = None
         self._made: list[_Made] = []
 
     @cached_property
@@ -124,7 +126,20 @@ class LatePasses:
         self._made.append(outlines)
         return outlines
 
+    def accumulation(self, size: tuple[int, int]) -> Accumulation:
+        """Return the sum of passes of a picture of this size."""
+        from viewer.rendering.gpu.accumulation import Accumulation
+
+        if self._sum is None or self._sum.size != size:
+            if self._sum is not None:
+                self._sum.release()
+            self._sum = None
+            self._sum = Accumulation(self._context, self._programs, size)
+        return self._sum
+
     def release(self) -> None:
         """Free all passes that were created."""
         for item in self._made:
             item.release()
+        if self._sum is not None:
+            self._sum.release()

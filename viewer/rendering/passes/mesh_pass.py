@@ -71,7 +71,9 @@ class MeshPass:
         """
         look = mesh.scalars.look if options.shading == "scalar" else None
         corners = "corners" if look is not None else ""
-        program = self.programs.drawing("mesh", _shading(mesh, options), geometry=corners)
+        program = self.programs.drawing(
+            "mesh", _shading(mesh, options), geometry=corners, effects=view.effects.defines
+        )
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
         set_surface(program, mesh.mesh, options)
@@ -81,6 +83,20 @@ class MeshPass:
             mesh.scalars.use(_COLORMAP_UNIT)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
         draw_runs(self.array(mesh, program, indices), indices, options.texture)
+
+    def draw_shape(
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        fragment: str,
+    ) -> None:
+        """Draw the surface with a fragment shader that needs no material."""
+        program = self.programs.drawing("mesh", fragment=fragment)
+        set_model(program, view, placement, mesh.center)
+        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
 
     def draw_lines(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions

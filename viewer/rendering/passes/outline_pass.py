@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import moderngl
@@ -14,49 +14,23 @@ from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlay.segments import Manner, SegmentPass, dots
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.projection import picture_scale
 from viewer.rendering.shown import has_points, placement_of, shows_mesh, shows_skeleton
-from viewer.rendering.view import View, set_model
-from viewer.rig.arrays import Floats
+from viewer.rendering.view import View
 from viewer.rig.scene import Actor, Scene
 
-__all__ = ["OutlinePass", "OutlineTools", "Outlined"]
+__all__ = ["OutlinePass", "OutlineTools"]
 
 _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
 """Selected and hovered, sRGB."""
 _WIDTH = 2.0  # of the line, pixels of a picture of standard height
 _POINT = 9.0  # diameter of a point, the same
 _MOST = 12  # pixels around a mask that are looked at
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Outlined:
-    """Something with an outline.
-
-    Attributes
-    ----------
-    actor : int
-        Index in the scene.
-    joint : int
-        A joint of it, outlined where the skeleton is drawn; -1 for the whole actor.
-    points : (N, 3)
-        In place of actor and joint, if there are any: points in scene space.
-    is_hovered : bool
-        Whether it lies under the pointer, rather than being selected.
-    """
-
-    actor: int
-    joint: int = -1
-    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    is_hovered: bool = False
-
-    def key(self) -> tuple[object, ...]:
-        """Return a key that identifies the outline in an unchanged scene."""
-        return self.actor, self.joint, self.points.tobytes(), self.is_hovered
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,23 +180,16 @@ class OutlinePass:
         mesh = self.tools.buffers.posed_mesh(actor)
         mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
         program = self.tools.programs.drawing("mesh", fragment="mask")
-        set_model(program, view, placement_of(actor, options), mesh.center)
         set_uniforms(program, {"u_mask": mask})
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        self.tools.meshes.array(mesh, program, indices).render(moderngl.TRIANGLES)
+        self.tools.meshes.draw_shape(mesh, placement_of(actor, options), view, options, "mask")
 
     def _cover_points(
         self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
     ) -> None:
         points = self.tools.buffers.points_of(actor)
         points.update(actor, actor.placement, view, options.min_confidence)
-        if not len(points.elements):
-            return
-        program = self.tools.programs.drawing("point", fragment="mask")
-        set_model(program, view, actor.placement, points.center)
-        set_uniforms(program, {"u_mask": mask})
-        array = points.array(program, self.tools.points.capsule)
-        array.render(moderngl.TRIANGLES, instances=len(points.elements))
+        set_uniforms(self.tools.programs.drawing("point", fragment="mask"), {"u_mask": mask})
+        self.tools.points.draw_shapes(points, actor.placement, view, "mask")
 
     def _free(self) -> None:
         for item in self._distance:

@@ -232,7 +232,9 @@ class PointPass:
         """
         if not len(points.elements):
             return
-        program = self.programs.drawing("point", "phong", fragment="mesh")
+        program = self.programs.drawing(
+            "point", "phong", fragment="mesh", effects=view.effects.defines
+        )
         set_model(program, view, placement, points.center)
         set_lights(program, view, options.lights)
         set_uniforms(program, {"u_flat": False, "u_textured": False, "u_opacity": 1.0})
@@ -247,6 +249,16 @@ class PointPass:
         array.render(moderngl.TRIANGLES, instances=count)
         self.context.disable(moderngl.CULL_FACE)
         self.context.front_face = "ccw"
+
+    def draw_shapes(
+        self, points: PointBuffers, placement: Floats, view: View, fragment: str
+    ) -> None:
+        """Draw one actor's keypoints with a fragment shader that needs no material."""
+        if len(points.elements):
+            program = self.programs.drawing("point", fragment=fragment)
+            set_model(program, view, placement, points.center)
+            array = points.array(program, self.capsule)
+            array.render(moderngl.TRIANGLES, instances=len(points.elements))
 
     def _draw_hidden(self, array: moderngl.VertexArray, count: int, opacity: float) -> None:
         self.context.depth_func = ">"

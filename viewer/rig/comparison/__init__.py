@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from viewer.phrases import counted
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.comparison.difference import Difference, Measure, Tally
 from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
@@ -80,14 +80,14 @@ class _Comparison:
         self._pair_meshes()
         self._pair_points()
         if first.figure.up != second.figure.up:
-            ups = f"{first.figure.up} and {second.figure.up}"
-            self.notes.append(f"up axes differ ({ups}): compared without conversion")
+            ups = {"first": first.figure.up, "second": second.figure.up}
+            self.notes.append(Diagnostic("D002.up", values=ups))
 
     def _pair_skeletons(self) -> None:
         first, second = self.first.figure.skeleton, self.second.figure.skeleton
         self.joints: Pairs | None = None
         if first is None or second is None:
-            self._lone("skeleton", first, second)
+            self._lone("D001.skeleton", first, second)
             return
         self.joints = pair_joints(first, second)
         self.mismatches += self.joints.mismatches
@@ -100,14 +100,19 @@ class _Comparison:
         first, second = self.first.figure.mesh, self.second.figure.mesh
         self.has_meshes, self.is_same = False, False
         if first is None or second is None:
-            self._lone("mesh", first, second)
+            self._lone("D001.mesh", first, second)
             return
         self.has_meshes, self.is_same = True, _is_same_topology(first, second)
         if self.is_same:
             self.vertices = self._tally("vertices", "length", first.n_vertices)
             return
-        counts = f"{_counts(first)}; {_counts(second)}"
-        self.notes.append(f"meshes differ ({counts}): closest points are compared")
+        counts = {
+            "vertices": first.n_vertices,
+            "triangles": first.n_triangles,
+            "other_vertices": second.n_vertices,
+            "other_triangles": second.n_triangles,
+        }
+        self.notes.append(Diagnostic("D002.meshes", values=counts))
         self.vertices = self._tally("surface, from the first", "length", first.n_vertices)
         self.back = self._tally("surface, from the second", "length", second.n_vertices)
 
@@ -115,7 +120,7 @@ class _Comparison:
         first, second = self.first.figure.points, self.second.figure.points
         self.points: Pairs | None = None
         if first is None or second is None:
-            self._lone("captured points", first, second)
+            self._lone("D001.point-set", first, second)
             return
         self.points = pair_names(first.names, second.names, "point")
         self.mismatches += self.points.mismatches
@@ -123,10 +128,10 @@ class _Comparison:
         names = self.points.names
         self.captured = self._tally("captured points", "length", len(names), names)
 
-    def _lone(self, what: str, first: object, second: object) -> None:
+    def _lone(self, key: str, first: object, second: object) -> None:
         if first is not None or second is not None:
-            owner = "first" if second is None else "second"
-            self.mismatches.append(f"only the {owner} has {'' if what[-1] == 's' else 'a '}{what}")
+            side = "first" if second is None else "second"
+            self.mismatches.append(Diagnostic(key, values={"side": side}))
 
     def _tally(self, name: str, kind: str, count: int, items: tuple[str, ...] = ()) -> Tally:
         self.tallies.append(Tally(name, kind, count, items))
@@ -138,7 +143,8 @@ class _Comparison:
         n_searches = min(count, _MOST_SEARCHES)
         searched = set(np.linspace(0, count - 1, n_searches).round().astype(int).tolist())
         if self.has_meshes and not self.is_same and count > _MOST_SEARCHES:
-            self.notes.append(f"closest points in {n_searches} of {count} frames")
+            values = {"n": n_searches, "all": count}
+            self.notes.append(Diagnostic("D002.searched", values=values))
         absent = 0
         for number in range(count):
             step = self.steps.pose(number, self.first, self.second)
@@ -156,7 +162,7 @@ class _Comparison:
             self._compare_points(step)
             self._compare_meshes(step, number in searched)
         if absent:
-            self.mismatches.append(f"only one of them is present in {counted(absent, 'frame')}")
+            self.mismatches.append(Diagnostic("D001.absent", values={"n": absent}))
         self._pose_at_worst()
         measures = [tally.result() for tally in self.tallies]
         return Difference(
@@ -229,12 +235,6 @@ class _Comparison:
 
 def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
     return Surface(positions, actor.figure.require_mesh().triangles).closest(points)
-
-
-def _counts(mesh: Mesh) -> str:
-    vertices = "vertex" if mesh.n_vertices == 1 else "vertices"
-    triangles = "triangle" if mesh.n_triangles == 1 else "triangles"
-    return f"{mesh.n_vertices:,} {vertices}, {mesh.n_triangles:,} {triangles}"
 
 
 def _is_same_topology(first: Mesh, second: Mesh) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 
 __all__ = ["Difference", "Measure", "Tally"]
@@ -57,9 +58,9 @@ class Difference:
     ----------
     measures : tuple of Measure
         One for each property that both figures have.
-    mismatches : tuple of str
+    mismatches : tuple of Diagnostic
         Items that only one figure has, such as joints or frames; no tolerance applies to them.
-    notes : tuple of str
+    notes : tuple of Diagnostic
         Remarks on the method of comparison.
     size : float
         Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
@@ -68,8 +69,8 @@ class Difference:
     """
 
     measures: tuple[Measure, ...]
-    mismatches: tuple[str, ...]
-    notes: tuple[str, ...]
+    mismatches: tuple[Diagnostic, ...]
+    notes: tuple[Diagnostic, ...]
     size: float
     unit: str
 

@@ -7,13 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.phrases import counted
+from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Pairs", "pair_joints", "pair_names", "rotation_distance"]
 
-_LISTED = 6  # names in a message
+_KEYS = {
+    "joint": ("D001.joints", "D002.joints-by-index"),
+    "DOF": ("D001.dofs", "D002.dofs-by-index"),
+    "point": ("D001.points", "D002.points-by-index"),
+}
+"""Messages about each kind of item: names without a partner, and no name in common."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,15 +31,15 @@ class Pairs:
         Indices into both lists, in the order of the first.
     names : tuple of N str
         Names in the first list.
-    mismatches, notes : tuple of str
+    mismatches, notes : tuple of Diagnostic
         Names without a partner; remarks on partners that were not matched by name.
     """
 
     first: Ints
     second: Ints
     names: tuple[str, ...]
-    mismatches: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    mismatches: tuple[Diagnostic, ...] = ()
+    notes: tuple[Diagnostic, ...] = ()
 
 
 def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
@@ -58,12 +63,11 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
         for above in (skeleton.parents[found],)
     ]
     other = np.flatnonzero(parents[0] != parents[1])
-    texts = [f"different parents: {_listed([pairs.names[place] for place in other])}"] * bool(
-        len(other)
-    )
+    values = {"names": [pairs.names[place] for place in other]}
+    moved = [Diagnostic("D001.parents", values=values)] if len(other) else []
     return replace(
         pairs,
-        mismatches=(*pairs.mismatches, *texts),
+        mismatches=(*pairs.mismatches, *moved),
         notes=(*pairs.notes, *_order_notes(pairs, second)),
     )
 
@@ -78,17 +82,14 @@ def _unique_labels(skeleton: Skeleton) -> tuple[str, ...]:
     )
 
 
-def _order_notes(pairs: Pairs, second: Skeleton) -> list[str]:
+def _order_notes(pairs: Pairs, second: Skeleton) -> list[Diagnostic]:
     order = np.argsort(pairs.second)
     other = np.flatnonzero(order != np.arange(len(order)))
     if not len(other):
         return []
     place = int(other[0])
     here, there = pairs.names[place], _unique_labels(second)[int(pairs.second[order[place]])]
-    return [
-        f"joints are in a different order, which matters to .skin and .anim files: where the first "
-        f"has {here}, the second has {there}"
-    ]
+    return [Diagnostic("D002.order", values={"first": here, "second": there})]
 
 
 def _places(found: Ints, count: int) -> Ints:
@@ -106,7 +107,7 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     first, second : sequences of str
         Each without repetition.
     what : str
-        The kind of item in messages: ``"joint"``.
+        The kind of item: ``"joint"``, ``"DOF"`` or ``"point"``.
 
     Returns
     -------
@@ -117,22 +118,17 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]
     if not shared and len(first) == len(second) > 0:
         same = np.arange(len(first), dtype=np.int32)
-        note = f"no {what} names in common: compared by index"
-        return Pairs(same, same, tuple(first), notes=(note,))
+        return Pairs(same, same, tuple(first), notes=(Diagnostic(_KEYS[what][1]),))
     both = np.array(shared, dtype=np.int32).reshape(-1, 2)
     mismatches = []
     for ordinal, names, others in (("first", first, second), ("second", second, first)):
         known = set(others)
         lone = [name for name in names if name not in known]
         if lone:
-            mismatches.append(f"{counted(len(lone), what)} only in the {ordinal}: {_listed(lone)}")
+            values = {"n": len(lone), "side": ordinal, "names": lone}
+            mismatches.append(Diagnostic(_KEYS[what][0], values=values))
     names = tuple(first[number] for number in both[:, 0])
     return Pairs(both[:, 0], both[:, 1], names, tuple(mismatches))
-
-
-def _listed(names: Sequence[str]) -> str:
-    rest = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f", … and {rest} more" if rest > 0 else "")
 
 
 def rotation_distance(first: Floats, second: Floats) -> Floats:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion.clip import Clip
@@ -40,7 +40,7 @@ class Steps:
         Rows of those DOFs in either skeleton.
     first_frame : int
         Number of the first frame.
-    mismatches, notes : tuple of str
+    mismatches, notes : tuple of Diagnostic
         DOFs or motions that only one has; remarks on the choice of steps.
     own : (Pose or None, Pose or None)
         Initial poses of figures without motion.
@@ -51,8 +51,8 @@ class Steps:
     first: Ints
     second: Ints
     first_frame: int = 0
-    mismatches: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    mismatches: tuple[Diagnostic, ...] = ()
+    notes: tuple[Diagnostic, ...] = ()
     own: tuple[Pose | None, Pose | None] = (None, None)
 
     @property
@@ -115,9 +115,8 @@ def _still_steps(first: Actor, second: Actor, n_poses: int) -> Steps:
     none = np.zeros(0, dtype=np.int32)
     if (first.clip is None) != (second.clip is None):
         lacking = "second" if second.clip is None else "first"
-        return Steps(
-            np.zeros(0), np.zeros((0, 0)), none, none, 0, (f"the {lacking} has no motion",)
-        )
+        still = Diagnostic("D001.no-motion", values={"side": lacking})
+        return Steps(np.zeros(0), np.zeros((0, 0)), none, none, 0, (still,))
     if first.figure.skeleton is None or second.figure.skeleton is None or n_poses == 0:
         return Steps(np.zeros(0), np.zeros((0, 0)), none, none)
     return _test_poses(first.figure.skeleton, second.figure.skeleton, n_poses)
@@ -129,11 +128,12 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
     lasts = clips[0].end - clips[0].start, clips[1].end - clips[1].start
     mismatches = []
     if abs(lasts[0] - lasts[1]) > 0.5 / rates[0]:
-        mismatches.append(f"durations differ: {lasts[0]:.6g} s and {lasts[1]:.6g} s")
+        values = {"first": lasts[0], "second": lasts[1]}
+        mismatches.append(Diagnostic("D001.durations", values=values))
     notes = []
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
-        text = f"frame rates differ ({rates[0]:g} and {rates[1]:g} frames a second)"
-        notes.append(f"{text}: compared at that of the first")
+        values = {"first": rates[0], "second": rates[1]}
+        notes.append(Diagnostic("D002.rates", values=values))
     base = 0 if isinstance(clips[0], Clip) else clips[0].timing.first_frame
     last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
     start, end = (None, None) if frames is None else frames
@@ -143,9 +143,9 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
     if not len(chosen):
         raise RigError(f"no frame in {start}:{end}; both have frames {base} to {last}")
     none = np.zeros(0, dtype=np.int32)
-    texts = tuple(mismatches), tuple(notes)
+    found = tuple(mismatches), tuple(notes)
     times = (chosen - base) / rates[0]
-    return Steps(times, np.zeros((0, 0)), none, none, int(chosen[0]), *texts)
+    return Steps(times, np.zeros((0, 0)), none, none, int(chosen[0]), *found)
 
 
 def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
@@ -155,11 +155,14 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
     other = np.flatnonzero((limits[0] != limits[1]).any(axis=1))
     if len(other):
         dof = int(other[0])
-        low, high = limits[0][dof].tolist(), limits[1][dof].tolist()
-        mismatches.append(
-            f"different limits of {counted(len(other), 'DOF')}, such as {pairs.names[dof]}: "
-            f"{low[0]:.6g} to {low[1]:.6g} and {high[0]:.6g} to {high[1]:.6g}"
-        )
+        own, others = limits[0][dof].tolist(), limits[1][dof].tolist()
+        values = {
+            "n": len(other),
+            "dof": pairs.names[dof],
+            **dict(zip(("low", "high"), own, strict=True)),
+            **dict(zip(("other_low", "other_high"), others, strict=True)),
+        }
+        mismatches.append(Diagnostic("D001.limits", values=values))
     dofs = _random_dofs(first, pairs.first, limits, n_poses)
     none = np.zeros(0)
     return Steps(none, dofs, pairs.first, pairs.second, 0, tuple(mismatches), pairs.notes)

@@ -63,7 +63,7 @@ class _Text:
         if not np.array_equal(one.shaped, one.stored):
             self._vector("+ shape", one.shaped)
         if not np.array_equal(one.rest, one.shaped):
-            self._vector("+ pose correctives", one.rest)
+            self._vector("+ correctives", one.rest)
         self._vector("p", one.rest)
 
     def influence(self, index: int) -> None:
@@ -81,24 +81,24 @@ class _Text:
 
     def sums(self) -> None:
         """Add the sums of weights and terms."""
-        self.lines.append(f"sum of w = {self._number(float(self.one.weights.sum()))}")
-        self._vector("sum of w M p", self.one.linear)
+        self.lines.append(f"sum w = {self._number(float(self.one.weights.sum()))}")
+        self._vector("sum w M p", self.one.linear)
 
     def dual(self, dual: DualTerms) -> None:
-        """Add the dual quaternions, their sum, and the position that it gives."""
+        """Add the dual quaternions, their sum, and the resulting position."""
         for index, values in enumerate(dual.duals):
             number = index + 1
             flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
             weight = f"{dual.fractions[index]:.{self.digits}f}"
-            self.lines.append(f"q{number}: relative weight {weight}{flip}")
+            self.lines.append(f"q{number}: normalised weight {weight}{flip}")
             self._quaternions("   ", values)
-        self.lines.append("q = sum of relative weight times q, with these signs")
+        self.lines.append("q = sum of normalised weight times q, with these signs")
         self._quaternions("   ", dual.blended)
-        self.lines.append(f"length of its real part = {dual.length:.{self.digits}f}")
+        self.lines.append(f"length of the real part = {dual.length:.{self.digits}f}")
         identity = np.eye(3, 4)
         if np.abs(dual.stretches - identity).max(initial=0.0) > _RIGID:
-            self._vector("p stretched", dual.stretched)
-        self._vector("moved by q / length", dual.position)
+            self._vector("stretched p", dual.stretched)
+        self._vector("moved by q", dual.position)
 
     def end(self) -> None:
         """Add the result of the method, the figure's placement, and the final position."""
@@ -107,8 +107,8 @@ class _Text:
             blend_factor = f"{one.skinning.blend_factor:.{self.digits}f}"
             self._vector(self.method.result.format(blend_factor=blend_factor), one.skinned)
         if not np.array_equal(one.placement, np.eye(4)):
-            self.lines.append(f"figure: times {one.placement[0, 0]:.{self.digits}f}, plus")
-            self._vector("", one.placement[:3, 3])
+            self.lines.append(f"scale = {one.placement[0, 0]:.{self.digits}f}")
+            self._vector("translation", one.placement[:3, 3])
         self._vector("position", one.position)
 
     def _vector(self, label: str, values: Floats) -> None:

@@ -114,10 +114,9 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     """
     skeleton = figure.skeleton
     if skeleton is None or motion.joint_names[0] not in skeleton.names:
-        raise RigError(
-            f"{motion.name} moves the joint {motion.joint_names[0]}, "
-            f"which {figure.name} does not have"
-        )
+        joint = motion.joint_names[0]
+        names = {"motion": motion.name, "joint": joint, "figure": figure.name}
+        raise RigError(Diagnostic("F004.body-joint", values=names))
     count = motion.n_rows
     vectors = np.zeros((count, skeleton.n_joints, 3))
     lost = []

@@ -8,8 +8,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
-from viewer.phrases import counted
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_label
 
@@ -176,26 +176,25 @@ def suits(clip: Clip, skeleton: Skeleton) -> bool:
     return not misfit(clip, skeleton)
 
 
-def misfit(clip: Clip, skeleton: Skeleton) -> str:
-    """Return why a clip cannot move a skeleton, as a phrase that follows its name, or ""."""
+def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
+    """Return why a clip cannot move a skeleton, as a phrase that follows its name, or None."""
     if not is_course_rig(skeleton):
-        return (
-            "is not a course rig, whose clips move the root along x, y, z and rotate each joint "
-            f"about x, y, z: {_first_misfit(skeleton)}"
-        )
+        return Phrase("not-course-rig", reason=_first_misfit(skeleton))
     if len(clip.channels) != skeleton.n_dofs:
-        return f"needs {skeleton.n_dofs} (3 + 3 x {skeleton.n_joints} joints)"
-    return ""
+        return Phrase("clip-needs", n=skeleton.n_dofs, joints=skeleton.n_joints)
+    return None
 
 
-def _first_misfit(skeleton: Skeleton) -> str:
+def _first_misfit(skeleton: Skeleton) -> Phrase:
     """Return a description of the first joint whose DOFs are not those of a course rig."""
     for joint in range(skeleton.n_joints):
         kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
         if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
-            found = f"DOFs {', '.join(kinds)}" if kinds else "no DOFs"
-            return f"joint {joint_label(skeleton, joint)} has {found}"
-    return "its DOFs are not in the order of its joints"
+            label = joint_label(skeleton, joint)
+            if not kinds:
+                return Phrase("joint-without-dofs", joint=label)
+            return Phrase("joint-with-dofs", joint=label, kinds=kinds)
+    return Phrase("dofs-unordered")
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
@@ -206,10 +205,10 @@ def check_fit(clip: Clip, skeleton: Skeleton) -> None:
     RigError
         If the number of channels or the DOFs do not match; see ``is_course_rig``.
     """
-    if not is_course_rig(skeleton):
-        raise RigError(f"clip {clip.name}: the skeleton {misfit(clip, skeleton)}")
-    if len(clip.channels) != skeleton.n_dofs:
-        raise RigError(
-            f"clip {clip.name} has {counted(len(clip.channels), 'channel')}, "
-            f"the skeleton {misfit(clip, skeleton)}"
-        )
+    found = misfit(clip, skeleton)
+    if found is None:
+        return
+    values = {"clip": clip.name, "n": len(clip.channels), "misfit": found}
+    raise RigError(
+        Diagnostic("C009.channels" if is_course_rig(skeleton) else "C009.rig", values=values)
+    )

@@ -14,7 +14,7 @@ __all__ = ["FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
 SLOWEST, FASTEST = 1e-6, 1e6
 """Frames per second: outside these limits, times of long motions lose precision."""
 
-RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames a second"
+RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames per second"
 """The limits as text, for messages."""
 
 _ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame

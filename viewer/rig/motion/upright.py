@@ -47,7 +47,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
 def upright_actor(scene: Scene, actor: Actor) -> Actor:
     """Return an actor whose figure states the up axis of its pose, rotated upright if upside down.
 
-    A body in a z-up capture stands along z, whatever the up axis of its model is.
+    A body in a z-up capture stands along z, regardless of the up axis of its model.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand. None: only coefficients add the mean.
     hand_coefficients : bool or None
         Whether hand poses are coefficients; None: unless there are 45 numbers.
-    turns : JointRotations or None
+    joint_rotations : JointRotations or None
         Used by a figure with other DOFs instead of the numbers: its joints of the same names are
         rotated equally; its placement, size and shape are unchanged. Figures with the same DOFs
         use everything else, as far as they have the blend shapes.
@@ -86,7 +86,7 @@ class PoseRecord:
     scale: float | None = None
     flat_hands: bool | None = None
     hand_coefficients: bool | None = None
-    turns: JointRotations | None = None
+    joint_rotations: JointRotations | None = None
     line_of: Callable[[str, str], int | None] | None = None
 
 
@@ -139,7 +139,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
         expression=weights[~is_shape] if (~is_shape).any() else None,
         translation=pose.figure_translation.copy(),
         scale=pose.figure_scale,
-        turns=relative_rotations(figure, pose),
+        joint_rotations=relative_rotations(figure, pose),
     )
 
 
@@ -158,7 +158,7 @@ def apply_record(
         Changed, except for parts that the record does not mention.
     cut : bool
         Drop coefficients that a figure with fewer shapes lacks, as with files of related models,
-        instead of raising an error. Records with ``turns`` always drop them.
+        instead of raising an error. Records with ``joint_rotations`` always drop them.
 
     Returns
     -------
@@ -175,9 +175,9 @@ def apply_record(
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(f"figure {figure.name} has no skeleton to pose")
-    if record.turns is not None and not has_layout_of(record.turns, figure):
-        work, notes = rotate_joints(record.turns, figure, pose)
+        raise RigError(Diagnostic("F004.pose", values={"figure": figure.name}))
+    if record.joint_rotations is not None and not has_layout_of(record.joint_rotations, figure):
+        work, notes = rotate_joints(record.joint_rotations, figure, pose)
         _take_over(work, pose)
         return notes + _left_as_they_were(record)
     work = pose.copy()
@@ -192,7 +192,7 @@ def apply_record(
             notes += _apply_part(name, values, record, figure, work)
     has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
     # A pose of a figure with the same skeleton is applied as far as possible.
-    cut = record.turns is not None or (cut and has_shapes)
+    cut = record.joint_rotations is not None or (cut and has_shapes)
     with _part("shape"):
         notes += apply_coefficients("shape", record.shape, figure, work, cut)
     with _part("expression"):
@@ -215,7 +215,7 @@ def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
     """Return a message about parts of a record that a figure with other DOFs ignores."""
     moves = DOF_KINDS[:3]
     moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
-    shifts = record.turns is not None and record.turns.shifts.any()
+    shifts = record.joint_rotations is not None and record.joint_rotations.shifts.any()
     place = record.translation is not None and np.any(record.translation)
     shapes = (values is not None and np.any(values) for values in (record.shape, record.expression))
     left = {
@@ -253,9 +253,9 @@ def _apply_dofs(record: PoseRecord, figure: Figure, pose: Pose) -> list[Diagnost
     for label, value in record.dofs.items():
         with _part("dofs", label):
             pose.dofs[_dof(figure, label)] = value
-    if record.turns is not None:
+    if record.joint_rotations is not None:
         is_whole = len(record.dofs) == skeleton.n_dofs
-        restore_beneath(skeleton, pose, record.turns, is_whole)
+        restore_beneath(skeleton, pose, record.joint_rotations, is_whole)
     before = pose.dofs.copy()
     pose.dofs[:] = clamp_dofs(skeleton, before)
     return _beyond_limits(skeleton, before)

@@ -15,7 +15,6 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
 
-_SHORTLY = 8  # names listed in an error
 _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
           "right_shoulder right_elbow")  # fmt: skip
 
@@ -102,9 +101,9 @@ def _find(skeleton: Skeleton, name: str, title: str) -> int:
     found = [joint for joint, known in enumerate(skeleton.names) if known == name]
     if len(found) == 1:
         return found[0]
-    if len(found) > 1:
-        raise RigError(f'the mapping names "{name}", of which {title} has {len(found)}')
-    raise RigError(f'the mapping names "{name}", which {title} does not have')
+    values = {"joint": name, "figure": title, "n": len(found)}
+    key = "F004.mapping-joints" if found else "F004.mapping-joint"
+    raise RigError(Diagnostic(key, values=values))
 
 
 def _match_equal(
@@ -139,11 +138,14 @@ def _misfit(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> RigError:
     unused, idle = _left(source, target, partners)
-    return RigError(
-        f"{titles[0]} does not fit {titles[1]}: expected hips and a leg or an arm in both, found "
-        f"{int((partners >= 0).sum())} joints that match; unknown in {titles[0]}: "
-        f"{_listed(unused, _SHORTLY)}; in {titles[1]}: {_listed(idle, _SHORTLY)}"
-    )
+    values = {
+        "motion": titles[0],
+        "figure": titles[1],
+        "n": int((partners >= 0).sum()),
+        "unused": unused,
+        "idle": idle,
+    }
+    return RigError(Diagnostic("F004.joints-unmatched", values=values))
 
 
 def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str], list[str]]:
@@ -151,11 +153,6 @@ def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str]
     unused = [label for j, label in enumerate(joint_labels(source)) if j not in used]
     idle = joint_labels(target)
     return unused, [idle[j] for j in np.flatnonzero(partners < 0)]
-
-
-def _listed(names: list[str], limit: int) -> str:
-    more = f" and {len(names) - limit} more" * (len(names) > limit)
-    return (", ".join(names[:limit]) or "none") + more
 
 
 def _notes(

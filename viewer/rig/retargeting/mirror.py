@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -65,7 +66,7 @@ def joint_partners(figure: Figure) -> Ints:
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(f"figure {figure.name} has no skeleton to mirror")
+        raise RigError(Diagnostic("F004.mirror", values={"figure": figure.name}))
     joints = rest_joints(figure)
     mirrored = joints.copy()
     axis = mirror_axis(figure)
@@ -79,8 +80,8 @@ def joint_partners(figure: Figure) -> Ints:
     size = box_size(bounding_box(joints))
     far = np.flatnonzero(distances[np.arange(len(joints)), partners] > _NEAR * size)
     if len(far) or (partners[partners] != np.arange(len(joints))).any():
-        name = skeleton.names[int(far[0])] if len(far) else "two joints"
-        raise RigError(f"{name} has no partner on the other side: the skeleton is not symmetric")
+        name = skeleton.names[int(far[0])] if len(far) else Phrase("two-joints")
+        raise RigError(Diagnostic("F004.asymmetric", values={"joint": name}))
     return partners
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
@@ -214,12 +214,12 @@ def rotate_joints(
     """
     other = target.skeleton
     if other is None:
-        raise RigError(f"figure {target.name} has no skeleton to pose")
+        raise RigError(Diagnostic("F004.pose", values={"figure": target.name}))
     partners = joints_by_name(source.names, other.names)
     found = np.flatnonzero(partners >= 0)
     if not len(found):
-        whose = printable(source.figure) or "the pose"
-        raise RigError(f"{whose} and {target.name} have no joint name in common")
+        values = {"pose": source.figure or Phrase("the-pose"), "figure": target.name}
+        raise RigError(Diagnostic("F004.no-common-joint", values=values))
     to_target = _up_rotation(source.up, target.up)
     deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
     rest = _figure_rotations(other, _with_zero_dofs(other))
@@ -236,7 +236,7 @@ def _rotate_joints(
     world = np.empty((skeleton.n_joints, 3, 3))
     present = joint_rotations(skeleton, start)
     for joint, parent in enumerate(skeleton.parents.tolist()):
-        # The wanted parent rotation, not the limited one, so that local rotations are preserved.
+        # The target rotation of the parent, not the limited one, preserves local rotations.
         above = world[parent] if parent >= 0 else np.eye(3)
         world[joint] = wanted.get(joint, above @ present[joint])
         if joint in wanted:

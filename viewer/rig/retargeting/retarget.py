@@ -113,7 +113,7 @@ def retarget(
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
-        raise RigError(f"{named} has no skeleton to move")
+        raise RigError(Diagnostic("F004.no-skeleton", values={"figure": named}))
     matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
     to_target = _up_rotation(motion.figure.up, figure.up)
     rests = rest_of(source, to_target, figure.up), rest_of(target, np.eye(3), figure.up)

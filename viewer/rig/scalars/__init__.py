@@ -134,7 +134,7 @@ SCALARS = {
     ),
     "area": Quantity("Area change", "strain", "a skin", "diverging", "%", robust=True),
     "methods": Quantity(f"Distance {_FIRST} to {' or '.join(_OTHERS)}", "distances", "a skin"),
-    "cut": Quantity("Distance to few influences", "distances", "a skin"),
+    "pruning": Quantity("Distance to few influences", "distances", "a skin"),
     "normalized": Quantity("Effect of normalising weights", "distances", "a skin"),
     "correctives": Quantity("Effect of pose correctives", "distances", "pose correctives"),
     "asymmetry": Quantity("Asymmetry", "distances", "a symmetry map"),
@@ -245,7 +245,7 @@ def menu_title(key: str, skinning: Skinning) -> str:
     skinning : Skinning
         Gives the number of influences.
     """
-    if key != "cut":
+    if key != "pruning":
         return SCALARS[key].title
     count = influences_kept(skinning)
     return f"Distance to {count} influence{'s' if count > 1 else ''}"

@@ -11,10 +11,10 @@ from viewer.rig.retargeting.mirror import mirror_axis
 from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.skinning import PURE, Skinning, deform
 
-__all__ = ["asymmetry", "correctives", "cut", "methods", "normalized"]
+__all__ = ["asymmetry", "correctives", "methods", "normalized", "pruning"]
 
 
-def cut(asked: Asked) -> Floats:
+def pruning(asked: Asked) -> Floats:
     """Return the distance between all influences and the strongest few: (V,), figure units."""
     count = influences_kept(asked.skinning)
     # Relative to normalised weights, as the effect of normalising is a quantity of its own.

@@ -158,7 +158,7 @@ for level in range(17):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_fill_level_is_one_line_or_a_video(tiny_disk, suffix):
     """In a process of its own, which FFmpeg used to end with a segmentation fault."""
-    folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "formats")])
+    folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
     run = subprocess.run(
         [sys.executable, "-c", _LEVELS, str(tiny_disk), suffix],
         env={**os.environ, "PYTHONPATH": folders},

@@ -13,7 +13,7 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
 from viewer.cli import run
-from viewer.commands._frame_numbers import Numbering, Range, numbering_of, parse_range
+from viewer.commands._sequence.frame_numbers import Numbering, Range, numbering_of, parse_range
 from viewer.errors import ViewerError
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
@@ -219,4 +219,4 @@ def test_fastest_rate_is_taken(tmp_path, capsys):
     options = ["--fps", "1e5", "--frame", "50000", "--json"]
     assert run(["info", *files, str(tmp_path / "move.anim"), *options]) == 0
     table = json.loads(capsys.readouterr().out)["actors"][0]["skeleton"]["dof_table"]
-    assert_allclose(table[0]["value"], 1.0, atol=1e-9)  # half a second at 2 per second
+    assert_allclose(table[0]["value"], 1.0, atol=1e-9)  # half a second at 2 fps

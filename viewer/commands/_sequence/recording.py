@@ -9,12 +9,12 @@ import string
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from viewer.commands._frame_numbers import parse_range
 from viewer.commands._numbers import number
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
-from viewer.commands._shots import Request, Shots, parse_turntable, shots_of
+from viewer.commands._sequence.frame_numbers import parse_range
+from viewer.commands._sequence.shots import Request, Shots, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
@@ -146,7 +146,7 @@ def _check_name(name: str) -> None:
 
 
 def _check_picture(output: Path) -> None:
-    """Refuse numbered pictures under the name of a video; a GIF may be either."""
+    """Check that numbered pictures do not have the name of a video; a GIF may be either."""
     suffix = output.suffix.lower()
     if suffix in VIDEOS and suffix not in PICTURES:
         raise UnsupportedFormatError(
@@ -244,7 +244,7 @@ def _recording(
         size,
         options,
         moves=shots.moves,
-        interpolate=arguments.fill_gaps,
+        interpolate=arguments.interpolate_gaps,
         turn=shots.turn,
         follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
     )

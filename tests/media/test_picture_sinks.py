@@ -37,7 +37,7 @@ def test_number_is_its_digits_side_by_side():
 def test_number_is_white_in_the_lower_left_corner():
     pixels = plain((100, 100, 100, 255), (60, 40))
     write_number(pixels, 1)
-    # One dot a pixel, a margin of two: 9 x 11 pixels, 45 % of the gray shines through.
+    # One pixel per dot and a margin of two: 9 x 11 pixels, 45 % of the gray shows through.
     assert pixels[-11, 0].tolist() == [45, 45, 45, 255]
     assert pixels[-12, 0].tolist() == [100, 100, 100, 255] == pixels[-1, 9].tolist()
     ink = (pixels[-9:-2, 2:7, 0] == 255).tolist()

@@ -142,7 +142,7 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
         group.add_argument(
             "--frames",
             metavar=many,
-            help=f"frames A to B - 1{step}; A or B may be left out (default: the whole motion)",
+            help=f"frames A to B - 1{step}; A or B may be omitted (default: the whole motion)",
         )
     group.add_argument("--frame", type=int, metavar="N", help="pose at frame N of the motion")
     group.add_argument(
@@ -160,7 +160,7 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
 
 
 def parse_range(text: str) -> Range:
-    """Parse ``A:B`` or ``A:B:STEP``; A and B may be left out.
+    """Parse ``A:B`` or ``A:B:STEP``; A and B may be omitted.
 
     >>> parse_range("10:20:2"), parse_range(":5")
     (Range(first=10, stop=20, step=2), Range(first=None, stop=5, step=1))
@@ -206,4 +206,4 @@ def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     else:
         scene.time = frames.checked_time(arguments.time)
     for actor in scene.actors:
-        pose_actor(actor, scene.time, arguments.fill_gaps)
+        pose_actor(actor, scene.time, arguments.interpolate_gaps)

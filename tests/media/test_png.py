@@ -1,4 +1,4 @@
-"""Our PNG files hold exactly the pixels they were given, read back by Pillow."""
+"""PNG files contain exactly the given pixels when read by Pillow."""
 
 import io
 

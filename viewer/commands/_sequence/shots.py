@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.commands._frame_numbers import Numbering, Range, numbering_of
+from viewer.commands._sequence.frame_numbers import Numbering, Range, numbering_of
 from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
@@ -18,7 +18,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.scene import Scene
 
 _MOST_FRAMES = 1_000_000
-_TURN_SECONDS = 6.0  # of a turntable of a still scene
+_ROTATION_SECONDS = 6.0  # duration of a turntable of a still scene
 _FULL = 360.0  # degrees
 
 
@@ -105,7 +105,8 @@ Turntable(degrees=-90.0, seconds=None))
     if found and found[2] != "deg" and 0.0 < value <= 1e5:
         return Turntable(_FULL, value)
     raise ViewerError(
-        f'--turntable: expected seconds, as 6, or degrees, as 90deg, found "{printable(text)}"'
+        "--turntable: expected seconds such as 6, or degrees such as 90deg, "
+        f'found "{printable(text)}"'
     )
 
 
@@ -129,7 +130,7 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
         notes += [*more, *_overridden(arguments, scene)]
     else:
         assert request.turntable is not None  # or nothing would move
-        places = np.zeros(_count((request.turntable.seconds or _TURN_SECONDS) * rates.drawn))
+        places = np.zeros(_count((request.turntable.seconds or _ROTATION_SECONDS) * rates.drawn))
     seconds = len(places) / rates.drawn
     if request.kind == "sheet":
         places = _spread(places, arguments.contact_sheet, moves)
@@ -178,7 +179,7 @@ def _places(
     start, stop = numbering.span(request.range)
     total, first = numbering.count, numbering.first
     behind = f"frames {first + max(total, start)} to {first + stop - 1}"
-    notes = [f"--frames: {behind} are after the motion's end"] if stop > total else []
+    notes = [f"--frames: {behind} are beyond the motion's end"] if stop > total else []
     # Step between drawn frames, in frames of the motion.
     step = 1 if request.range is None else request.range.step
     pace = step * (arguments.speed or 1.0) * rates.played / rates.drawn

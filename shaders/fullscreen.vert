@@ -1,0 +1,10 @@
+#version 330
+// One triangle that covers the target.
+
+out vec2 v_place;       // 0 to 1 from the lower left corner
+
+void main() {
+    vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+    v_place = 0.5 * corner + 0.5;
+    gl_Position = vec4(corner, 0.0, 1.0);
+}

@@ -1,0 +1,14 @@
+#version 330
+// Contact shadows on the ground: black with an opacity, so that they also lie on no background.
+
+in vec2 v_place;            // of the field
+
+uniform sampler2D u_field;  // darkness by contact, and by what is farther above
+uniform vec2 u_opacity;     // of both
+
+out vec4 f_color;           // sRGB, premultiplied by alpha
+
+void main() {
+    vec2 light = 1.0 - u_opacity * texture(u_field, v_place).rg;
+    f_color = vec4(0.0, 0.0, 0.0, 1.0 - light.x * light.y);
+}

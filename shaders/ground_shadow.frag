@@ -1,0 +1,16 @@
+#version 330
+// The key light's shadow on the ground: black with an opacity, so that it also lies on no background.
+
+#pragma include shadow
+
+in vec2 v_place;            // of the shadow map
+
+uniform vec3 u_depth;       // in the map: at place 0, and its growth along both axes
+uniform float u_opacity;
+
+out vec4 f_color;           // sRGB, premultiplied by alpha
+
+void main() {
+    float depth = min(u_depth.x + dot(u_depth.yz, v_place), 1.0);
+    f_color = vec4(0.0, 0.0, 0.0, u_opacity * (1.0 - unshadowed(vec3(v_place, depth))));
+}

@@ -1,0 +1,23 @@
+"""Fixtures of the Lint panel."""
+
+from __future__ import annotations
+
+import pytest
+from app.linting.checked_scenes import SIZE, finish
+from lint.sound import scene_of
+
+from viewer.rig.scene import Scene
+
+
+@pytest.fixture
+def lint(drive):
+    """Open an app that shows a figure or scene, its Lint panel open and the check done."""
+
+    def open_panel(shown, **settings):
+        scene = shown if isinstance(shown, Scene) else scene_of(shown)
+        hand = drive(scene=scene, size=SIZE, samples=1, **settings)
+        hand.menu("menu Edit", "Check the rig")
+        finish(hand)
+        return hand
+
+    return open_panel

@@ -1,0 +1,147 @@
+"""Checks in the window while figures move: stale findings, cancellation, other work."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from app.linting.checked_scenes import LIGHT, SIZE, codes, finish, jump, marked, row_of
+from lint.sound import column, scene_of
+
+from viewer.app.linting.actions import check_rig, start_check
+from viewer.app.linting.state import Linting
+from viewer.lint import lint_scene
+from viewer.rig.scene import Actor
+
+
+def stale(hand, texts):
+    texts.clear()
+    hand.step(2)
+    return any(text.startswith("The figure, pose or limits have changed") for text in texts)
+
+
+def test_findings_are_stale_while_the_pose_is_another(lint, texts):
+    hand = lint(LIGHT)
+    assert not stale(hand, texts)
+    hand.state.actor.pose.dofs[4] = 0.3
+    hand.step()
+    assert stale(hand, texts)
+    hand.key("z", "ctrl")
+    assert not stale(hand, texts)
+
+
+def test_time_makes_nothing_stale_but_posing_does(lint, texts):
+    hand = lint(jump())
+    hand.state.clock.playing = True
+    hand.step(20)
+    hand.state.clock.playing = False
+    assert not stale(hand, texts)
+    hand.click(row_of(hand, "C003"))
+    assert not stale(hand, texts)
+    hand.state.actor.pose.dofs[4] = 0.3
+    assert stale(hand, texts)
+    hand.click("Recheck")
+    finish(hand)
+    assert not stale(hand, texts)
+
+
+def test_recheck_sees_the_pose_and_other_limits(lint, texts):
+    hand = lint(column())
+    assert codes(hand) == []
+    hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_rotation=1.0)
+    assert stale(hand, texts)
+    hand.state.actor.pose.dofs[4] = 3.5  # its limits are -3 and 3
+    hand.click("Recheck")
+    finish(hand)
+    assert codes(hand) == ["S004"] and not stale(hand, texts)
+
+
+def test_another_scene_has_not_been_checked(lint, rig, texts):
+    hand = lint(LIGHT)
+    hand.click(row_of(hand, "W001"))
+    hand.open(*rig)
+    texts.clear()
+    hand.step(2)
+    assert hand.state.of(Linting).checked is None and hand.state.of(Linting).marks is None
+    assert "This scene has not been checked yet." in texts
+    assert not marked(hand)
+    hand.click("Check")
+    finish(hand)
+    assert hand.state.of(Linting).checked.source is hand.state.scene
+
+
+def test_marks_go_with_the_figure_they_are_on(lint, texts):
+    hand = lint(LIGHT)
+    hand.click(row_of(hand, "W001"))
+    hand.state.scene.actors[0] = Actor(column())
+    assert stale(hand, texts)
+    assert hand.state.of(Linting).marks is None and not marked(hand)
+
+
+def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
+    hand = drive(scene=scene_of(column()), size=SIZE, samples=1)
+    started, seen, is_held = hold_checks(monkeypatch)
+    check_rig(hand.state)
+    assert is_held.wait(30)
+    hand.step(2)
+    assert hand.state.job is not None and hand.state.job.progress == (3, 8)
+    hand.state.actor.pose.dofs[4] = 3.5
+    hand.step()
+    started.set()
+    finish(hand)
+    assert seen and hand.state.of(Linting).checked.findings == ()
+    assert hand.state.of(Linting).checked.scene.actors[0].pose.dofs[4] == 0.0
+
+
+def hold_checks(monkeypatch):
+    """Let checks wait after their third step for an event; return it, what came after, and when."""
+    import threading
+
+    go, seen, is_held = threading.Event(), [], threading.Event()
+
+    def held(scene, options, report):
+        report(3, 8, "column: mesh")
+        is_held.set()
+        go.wait(30)
+        report(4, 8, "column: symmetry")
+        seen.append(scene)
+        return lint_scene(scene, options)
+
+    monkeypatch.setattr("viewer.lint._again.lint_scene", held)
+    return go, seen, is_held
+
+
+@pytest.mark.parametrize("how", ["Cancel check", "escape"])
+def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
+    hand = drive(scene=scene_of(LIGHT), size=SIZE, samples=1)
+    go, seen, is_held = hold_checks(monkeypatch)
+    check_rig(hand.state)
+    assert is_held.wait(30)
+    hand.step(3)
+    running = hand.state.of(Linting).running
+    if how == "escape":
+        hand.key("escape")
+    else:
+        hand.click(how)
+    hand.step(3)
+    assert hand.state.job is None and hand.state.of(Linting).running is None
+    go.set()
+    running.job.wait()
+    hand.step(2)
+    assert not seen and hand.state.of(Linting).checked is None
+    assert hand.says("Cancelled")
+
+
+def test_check_waits_for_other_work(lint, monkeypatch):
+    hand = lint(LIGHT)
+    go, _, is_held = hold_checks(monkeypatch)
+    first = hand.state.of(Linting).checked
+    start_check(hand.state)
+    assert is_held.wait(30)
+    hand.step(2)
+    job = hand.state.job
+    hand.click("Recheck")  # greyed out
+    assert hand.state.job is job
+    go.set()
+    finish(hand)
+    assert hand.state.of(Linting).checked is not first

@@ -1,0 +1,27 @@
+"""Fixtures of the Rig panel."""
+
+from __future__ import annotations
+
+import pytest
+from app import rig_scene
+from app.rig_scene import TRUE
+from app.rigging.rig_panel import SIZE
+
+from viewer.app.rigging.placing import as_similarity, move_by_hand
+from viewer.app.rigging.sources import current_template
+
+
+@pytest.fixture
+def rigging(drive):
+    """A hand on an app with the mesh and its template, which lies on it, the panel open."""
+
+    def opened(placed=True, **settings):
+        hand = drive(scene=rig_scene.scene(**settings), size=SIZE, samples=1)
+        hand.menu("menu Window", "Rig")
+        hand.step(2)
+        if placed:  # searching takes seconds
+            move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
+            hand.step(2)
+        return hand
+
+    return opened

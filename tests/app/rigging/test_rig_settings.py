@@ -1,0 +1,287 @@
+"""Rig panel: settings, templates of files, messages, and results that are saved."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from app import rig_scene
+from app.rig_scene import TRUE
+from app.rigging.rig_panel import SIZE, names, seen
+from app.tiny import write_rig
+from imgui_bundle import imgui
+from numpy.testing import assert_allclose
+
+pytest.importorskip("scipy")
+import viewer
+from viewer.app.files.state import Files
+from viewer.app.rigging.placing import placing_now
+from viewer.app.rigging.sources import target_mesh, template_texts
+from viewer.app.rigging.state import Rigging
+from viewer.app.rigging.steps import align_template
+from viewer.app.rigging.work import start_adding, start_reading
+from viewer.autorig.alignment.surface_alignment import AlignmentSettings
+from viewer.export import export
+from viewer.formats.rigged import save
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skinning import deform
+
+pytestmark = pytest.mark.usefixtures("quick_fits")
+
+
+def test_missing_scipy_is_a_message(rigging, monkeypatch):
+    def missing(name):
+        raise ModuleNotFoundError(name)
+
+    monkeypatch.setattr("viewer.rig._scipy.import_module", missing)
+    hand = rigging()
+    hand.click("Run")
+    hand.finish_job()
+    assert hand.state.error == "rigging needs scipy: pip install scipy"
+    assert names(hand) == ["scan", "arm"]
+
+
+def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
+    asked = {}
+
+    def placed(template, own, target, settings, fits, tell):
+        asked.update(alignment=settings, fits=fits)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+
+    def instead(figure, pose, target, settings, report, name):
+        asked.update(settings=settings, name=name)
+        raise viewer.ViewerError("stopped here")
+
+    monkeypatch.setattr("viewer.app.rigging.work.align_template", placed)
+    monkeypatch.setattr("viewer.app.rigging.work.transfer", instead)
+    hand = rigging(placed=False)
+    hand.pick("Up", 3)
+    hand.pick("Scale", 2)
+    hand.click("rig advanced")
+    hand.step(2)
+    hand.pick("Joints##rig", 1)
+    hand.enter_value("Max. angle", "75")
+    hand.enter_value("Smoothing", "7")
+    hand.enter_value("Max. influences", "3")
+    hand.click("Pose correctives")
+    hand.click("Refine alignment")
+    hand.click("Fit pose and proportions")
+    hand.click("Run")
+    hand.finish_job()
+    settings = asked["settings"]
+    assert hand.state.error == "stopped here" and asked["name"] == "scan rigged"
+    assert (asked["alignment"].up, asked["alignment"].scale) == ("z", "none")
+    assert asked["alignment"].facing is None and not asked["fits"]
+    assert not asked["alignment"].refines
+    assert_allclose(settings.alignment.matrix, TRUE, atol=1e-9)
+    assert settings.joints == "alignment" and not settings.correctives and not settings.fits
+    assert settings.weights.match.max_angle == pytest.approx(np.radians(75.0))
+    assert settings.weights.match.near_angle == pytest.approx(np.radians(75.0))
+    assert (settings.weights.smoothing_rounds, settings.weights.max_influences) == (7, 3)
+
+
+def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypatch):
+    titles, draw = [], imgui.tree_node
+    monkeypatch.setattr(imgui, "tree_node", lambda text: titles.append(text) or draw(text))
+    hand = rigging(placed=False)
+    assert titles[-1] == "Advanced###rig advanced" and "Smoothing" not in hand.state.item_rects
+    hand.state.of(Rigging).choices.smoothing, hand.state.of(Rigging).choices.joints = 3, "alignment"
+    hand.step(2)
+    assert titles[-1] == "Advanced (2 changed)###rig advanced"
+    hand.click("rig advanced")
+    hand.step(2)
+    assert "Smoothing" in hand.state.item_rects
+
+
+def test_work_says_in_words_what_it_does_and_its_share(rigging, texts, monkeypatch):
+    gate = threading.Event()
+
+    def placed(template, own, target, settings, fits, tell):
+        tell(0.4, "pose")
+        gate.wait(60)
+        return align_template(template, own, target, AlignmentSettings(matrix=TRUE), False, tell)
+
+    monkeypatch.setattr("viewer.app.rigging.work.align_template", placed)
+    said, draw = [], imgui.progress_bar
+    monkeypatch.setattr(imgui, "progress_bar", lambda *given: said.append(given[2]) or draw(*given))
+    hand = rigging(placed=False)
+    hand.click("Align")
+    while hand.state.job.progress != (40, 100):
+        time.sleep(0.01)
+    texts.clear()
+    hand.step(2)
+    gate.set()
+    assert "Fitting pose and proportions" in texts and said[-1] == "40 %"
+    hand.finish_job()
+
+
+def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
+    hand = rigging(placed=False)
+    actor = hand.state.scene.actors[1]
+    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is turned by half a radian more
+    hand.step(2)
+    hand.click("Align")
+    hand.finish_job()
+    state = hand.state
+    assert state.of(Rigging).placing.fitted is not None
+    texts.clear()
+    hand.step()
+    assert any(text.startswith("pose: template joints rotated") for text in texts)
+    ghost = hand.app.frame.renderer.ghost
+    shown = apply_transform(ghost.placement, ghost.figure.mesh.positions)
+    own = apply_transform(ghost.placement, deform(actor.figure, actor.pose)[0])
+    wanted = target_mesh(state).positions
+    gaps = [np.linalg.norm(points - wanted, axis=1).max() for points in (shown, own)]
+    assert gaps[0] < 0.2 * gaps[1]
+    assert actor.pose.dofs[8] == 0.2  # the actor stands as before
+    hand.click("Run")
+    hand.finish_job()
+    assert_allclose(seen(hand, 0), wanted, atol=1e-6)
+    assert state.error == ""
+
+
+def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp_path):
+    figure, pose = rig_scene.bent()
+    export(Actor(rig_scene.scan(figure, pose)), tmp_path / "scan.obj")
+    hand = drive(size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.click("Add mesh…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step()
+    hand.click("file scan.obj")
+    hand.click("Open###Open")
+    hand.finish_job()
+    assert hand.state.actor.name == "scan" and hand.state.of(Rigging).target is hand.state.actor
+    assert hand.state.paths[-1] == tmp_path / "scan.obj"
+    assert hand.undo_steps == 1
+    assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox"]
+    hand.pick("Template", 2)
+    assert hand.state.of(Rigging).template_key == "fox"
+    hand.click("rig tool move")  # the template has to be there to be moved
+    hand.finish_job()
+    assert hand.state.of(Rigging).template.figure.name == "fox"
+    hand.click("Pose it…")
+    hand.step(2)
+    assert names(hand) == ["fox", "scan", "fox-2"]
+    chosen = hand.state.scene.actors[2]
+    assert hand.state.of(Rigging).template_key == f"actor {id(chosen)}"
+    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # beside the others
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert names(hand) == ["fox", "scan"]
+
+
+def template_names(hand):
+    return template_texts(hand.state).values()
+
+
+def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
+    hand = drive(scene=rig_scene.scene(with_template=False), size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    assert hand.state.of(Rigging).template_key == "body"  # there is no other
+    save(rig_scene.bent()[0], tmp_path / "arm.npz")
+    start_reading(hand.state, (tmp_path / "arm.npz",))
+    hand.finish_job()
+    template = hand.state.of(Rigging).template
+    hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
+    hand.finish_job()
+    assert hand.state.of(Rigging).template is template
+    assert placing_now(hand.state).fitted is not None
+    hand.click("Run")
+    hand.finish_job()
+    assert hand.state.of(Rigging).template is template and placing_now(hand.state) is not None
+    assert names(hand) == ["scan rigged", "scan"] and hand.state.error == ""
+
+
+def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
+    hand = rigging()
+    skel, skin = write_rig(tmp_path)
+    hand.click("Template file…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step()
+    hand.click("file tiny.skel")
+    hand.click("Open###Open")
+    hand.finish_job()
+    wanted = "tiny.skel: expected a figure with mesh, skeleton and skin, found none"
+    assert hand.state.error == wanted
+    hand.key("escape")
+    hand.click("Template file…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.chosen = {skel, skin}
+    hand.step()
+    hand.click("Open 2 files###Open")
+    hand.finish_job()
+    assert hand.state.of(Rigging).template.figure.name == "tiny" and hand.state.error == ""
+    assert hand.state.of(Rigging).template_key == "file"
+
+
+def test_rigged_mesh_without_a_bare_one_is_refused(drive, tmp_path):
+    hand = drive(size=SIZE, samples=1)
+    body = viewer.load(*write_rig(tmp_path)).actors[0]
+    save(body.figure, tmp_path / "whole.npz")
+    start_adding(hand.state, tmp_path / "whole.npz")
+    hand.finish_job()
+    assert hand.state.error == (
+        f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found one with a rig"
+    )
+
+
+def test_result_is_saved_and_opens_again(rigging, tmp_path):
+    hand = rigging()
+    hand.click("Run")
+    hand.finish_job()
+    hand.click("Save rigged…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.step()
+    assert hand.state.of(Files).dialog.name == "scan_rigged.npz"
+    hand.click("Save###Save")
+    hand.finish_job()
+    assert hand.says("Saved") and hand.state.error == ""
+    again = viewer.load(tmp_path / "scan_rigged.npz").actors[0].figure
+    assert again.is_attached and again.fields[0].name == "confidence"
+    hand.click("Save rigged…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.name = "arm2.skel"
+    hand.step()
+    hand.click("Save###Save")
+    hand.finish_job()
+    found = sorted(path.name for path in tmp_path.glob("arm2.*"))
+    assert found == ["arm2.json", "arm2.obj", "arm2.skel", "arm2.skin"]
+    hand.click("Save rigged…")
+    hand.state.of(Files).dialog.enter(tmp_path)
+    hand.state.of(Files).dialog.name = "arm3.glb"
+    hand.step()
+    hand.click("Save###Save")
+    hand.finish_job()
+    assert hand.state.error.startswith('a rigged mesh cannot be written as ".glb"; there are: ')
+
+
+def test_report_is_copied(rigging, texts):
+    hand = rigging()
+    hand.click("Run")
+    hand.finish_job()
+    lines = [line.labelled for line in hand.state.of(Rigging).results["robust"].rigged.lines]
+    hand.click("Copy report")
+    assert imgui.get_clipboard_text() == "\n".join(lines)
+    texts.clear()
+    hand.step()
+    assert set(lines) <= set(texts)
+
+
+def test_target_without_meeting_the_template_is_a_message(drive):
+    figure, pose = rig_scene.bent()
+    mesh = rig_scene.scan(figure, pose).mesh
+    flat = viewer.Mesh(np.zeros((3, 3)), np.tile([0.0, 1, 0], (3, 1)), np.array([[0, 1, 2]]))
+    assert mesh.n_triangles
+    hand = drive(
+        scene=Scene([Actor(viewer.Figure("point", flat)), Actor(figure, pose)]),
+        size=SIZE, samples=1,
+    )  # fmt: skip
+    hand.menu("menu Window", "Rig")
+    hand.click("Run")
+    hand.finish_job()
+    assert hand.state.error != "" and names(hand) == ["point", "arm"]

@@ -1,0 +1,33 @@
+"""Fixtures of the tests of commands."""
+
+from __future__ import annotations
+
+import pytest
+from app.tiny import write_rig
+from commands.drawn_motions import anim_text
+
+from viewer.cli import run
+
+
+@pytest.fixture
+def walk(tmp_path) -> list[str]:
+    """Files of the tiny rig and a clip of 1 s: it goes 4 along x, and its arm turns."""
+    files = write_rig(tmp_path)
+    clip = tmp_path / "walk.anim"
+    # Three translations, then x, y, z of the root and of the arm.
+    clip.write_text(anim_text(1.0, 9, {0: (0.0, 4.0), 8: (0.0, 1.5)}))
+    return [str(path) for path in (*files, clip)]
+
+
+@pytest.fixture
+def draw(tmp_path, capsys):
+    """Return a function that renders files into a name with options, and returns what is said."""
+
+    def command(files, name, *options, size="64x48", code=0):
+        out = str(tmp_path / name)
+        found = run(["render", *files, "-o", out, "--size", size, *options])
+        said = capsys.readouterr()
+        assert found == code, said.err
+        return said
+
+    return command

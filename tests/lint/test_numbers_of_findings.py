@@ -1,0 +1,160 @@
+"""Numbers in findings, and valid figures close to a fault that have none."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.planted import FAULTS, captured, findings_of, five_joints, moving
+from lint.sound import (
+    FRAMES,
+    RATE,
+    column,
+    make_mesh,
+    scene_of,
+)
+
+from viewer.lint import lint_scene
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.motion.timing import Timing
+
+
+def test_numbers_of_the_messages() -> None:
+    messages = {name: findings_of(FAULTS[name][0]) for name in ("sum too large", "jump", "sliding")}
+    texts = {f.code: f.message for found in messages.values() for f in found}
+    assert texts["W001"] == (
+        "weights of 2 vertices do not sum to 1 (worst: 1.1 at vertex 9, an error of 0.1)"
+    )
+    # 3 m in 1/30 s; the legs are 0.2 m wide and 0.9 m high, and may move at 15 times 0.922 m.
+    assert texts["C003"] == (
+        "2 of 60 frames: pelvis moves at 90 m/s (limit 13.8 m/s) at frame 120, 0.667 s"
+    )
+    # All of the 59 steps of 0.5 / 30 m.
+    assert "left_ankle slides by 983 mm in total, at up to 0.5 m/s (frame " in texts["C007"]
+
+
+def test_numbers_of_meshes_and_gaps() -> None:
+    """Both ends of an edge, the first vertex of a normal, and which frames are missing."""
+    names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
+    texts = {f.code: f.message for name in names for f in findings_of(FAULTS[name][0])}
+    assert texts["M006"] == (
+        "1 non-manifold edge with up to 3 triangles (first: between vertices 0 and 1)"
+    )
+    assert texts["M005"].startswith("3 boundary edges (first: between vertices 0")
+    assert texts["M009"] == (
+        "1 of 20 normals opposes the winding of all adjacent triangles (first: vertex 3)"
+    )
+    assert texts["C005"] == "4 of 60 frames are missing in 2 gaps: frames 110 to 112, frame 130"
+    # 4 and 3 radians.
+    assert texts["S004"] == (
+        "1 DOF of the pose is outside its limits: knee.y is 229.2°, its limits are -171.9° and "
+        "171.9°"
+    )
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_one_is_singular(name: str) -> None:
+    """No count of 1 has a plural behind it, nor "are" or "have"."""
+    for finding in findings_of(FAULTS[name][0]):
+        text = re.sub(r"[\d.]+ of ", "", finding.message)  # the whole decides: 1 of 60 frames
+        of_one = re.findall(r"(?<![\d.:])1 ((?!units\b)[a-zA-Z]+s)\b(?! to | at )", text)
+        assert set(of_one) <= {"has", "is"}, finding.message
+        one = re.match(r"1 (?:of \d+ )?[\w ]*?\b(are|have|lie|move|list|point|belong)\b", text)
+        assert one is None, finding.message
+
+
+def test_a_gap_is_looked_at_just_before_it() -> None:
+    (gap,) = findings_of(FAULTS["gaps"][0])
+    # Frame 109 is the tenth, 9 / 30 s after the first.
+    assert gap.seek == pytest.approx(0.3)
+
+
+def test_who_is_not_there_for_long_is_counted_so() -> None:
+    """Person 1 is there in frames 100 to 119, 2 of them missing."""
+    rows = np.arange(FRAMES)
+    rows[20:] = rows[5] = rows[6] = -1
+    timing = Timing(RATE, rows, first_frame=100, holds=False)
+    (gap,) = lint_scene(moving(lambda root, turns: None, timing))
+    assert gap.message == "2 of 20 frames are missing in 1 gap: frames 105 to 106"
+
+
+def test_thin_sheets_and_creases_have_no_normals_against_them() -> None:
+    """Each side of a sheet has its own; a sheet whose sides share vertices agrees with one."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    front = np.array([[0, 1, 2], [0, 2, 3]])
+    sides = Mesh(
+        np.vstack([square, square]),
+        np.repeat([[0.0, 0, 1], [0, 0, -1]], 4, axis=0),
+        np.vstack([front, front[:, ::-1] + 4]).astype(np.int32),
+    )
+    shared = Mesh(
+        square, np.tile([0.0, 0, 1], (4, 1)), np.vstack([front, front[:, ::-1]]).astype(np.int32)
+    )
+    for mesh in (sides, shared):
+        assert "M009" not in {f.code for f in lint_scene(scene_of(Figure("sheet", mesh)))}
+    turned = replace(sides, normals=-sides.normals)
+    found = [f for f in lint_scene(scene_of(Figure("sheet", turned))) if f.code == "M009"]
+    assert found[0].vertices.tolist() == list(range(8))
+
+
+def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:
+    """All joints but the root stay; e is moved by a translation of its own: 0.05 of it is lost."""
+    figure = five_joints()
+    scene = scene_of(figure)
+    scene.actors[0].pose.translations[1:, 0] = 0.0
+    scene.actors[0].pose.translations[4, 0] = 2.0
+    locked = replace(figure.skeleton, dof_limits=np.zeros_like(figure.skeleton.dof_limits))
+    scene.actors[0].figure = replace(figure, skeleton=locked)
+    (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
+    # The whole: 0.05 of 2 m. The cut keeps nothing of e: 100 mm in the present pose, 0 at rest.
+    assert found.message == (
+        "1 vertex has more than 4 influences (maximum: 5); pruning to 4 moves the mesh "
+        "by up to 100 mm (vertex 8), 100 mm on average over these vertices, in 6 poses"
+    )
+
+
+def test_a_foot_that_swings_does_not_slide() -> None:
+    def step(root: np.ndarray, _: np.ndarray) -> None:
+        root[:, 2] = 2.5 * np.arange(FRAMES) / RATE  # 2.5 m/s, as a foot passes the ground
+
+    assert [finding.code for finding in lint_scene(moving(step))] == []
+
+
+def test_a_person_who_comes_later_has_no_gap() -> None:
+    rows = np.arange(FRAMES)
+    rows[:20] = rows[50:] = -1
+    timing = Timing(RATE, rows, first_frame=100, holds=False)
+    assert lint_scene(moving(lambda root, turns: None, timing)) == []
+
+
+def test_seams_are_no_borders() -> None:
+    """Vertices at one place count as one: a closed mesh with a seam is closed."""
+    figure = column()
+    positions = np.vstack([figure.mesh.positions, figure.mesh.positions[0::4]])
+    triangles = figure.mesh.triangles.copy()
+    side = np.isin(triangles, np.arange(0, 20, 4)) & (np.arange(36) % 8 < 2)[:, None]
+    triangles[side] = 20 + triangles[side] // 4
+    mesh = make_mesh(positions, triangles)
+    codes = {finding.code for finding in lint_scene(scene_of(Figure("seam", mesh)))}
+    assert codes == set()
+
+
+def test_rare_keypoints_of_low_confidence_are_told_by_how_often_they_are_seen() -> None:
+    """Low in 3 of the 10 frames that see it; in 3 of 60, which is 5 %; and once of 2."""
+
+    def change(points: np.ndarray) -> None:
+        points[10:, 0, 3] = 0.0
+        points[4:7, 0, 3] = 0.2
+        points[20:23, 1, 3] = 0.1
+        points[2:, 2, 3] = 0.0
+        points[1, 2, 3] = 0.1
+
+    (low,) = lint_scene(captured(change))
+    assert low.message == (
+        "hip has a confidence below 0.3 in 30 % of the 10 frames in which it is "
+        "visible (first: frame 104)"
+    )
+    assert low.frames.tolist() == [104, 105, 106] and low.joints.tolist() == [0]

@@ -1,0 +1,202 @@
+"""Retargeting onto other hierarchies: which joints match, which rotations are taken over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from faults import lines
+from rig.retargeting.two_people import BODY, EXACT, HIK, bones, figure_of, moving, places
+
+from viewer.errors import RigError
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.retarget import retarget, scaled_motion
+
+
+def test_joints_between_two_that_match_are_folded_in() -> None:
+    table = dict(HIK)
+    table["LeftArmRoll"] = ("LeftArm", (30, 145, 0))
+    table["LeftForeArm"] = ("LeftArmRoll", HIK["LeftForeArm"][1])
+    order = [*list(HIK)[:14], "LeftArmRoll", *list(HIK)[14:]]
+    source = moving(figure_of({name: table[name] for name in order}, "mocap"))
+    figure = figure_of(BODY, "body")
+    clip, notes = retarget(source, figure)
+    theirs, mine = places(source.figure, source.clip), places(figure, clip)
+    np.testing.assert_allclose(
+        bones(mine, ("left_elbow", "left_wrist")),
+        bones(theirs, ("LeftForeArm", "LeftHand")),
+        atol=EXACT,
+    )
+    assert "unmatched joints of mocap: LeftToeBase, LeftArmRoll" in lines(notes)
+
+
+def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
+    table = {**BODY, "jaw": ("head", (0.0, 1.52, 0.08)), "tail": ("pelvis", (0, 0.9, -0.2))}
+    source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
+    clip, notes = retarget(source, figure)
+    np.testing.assert_array_equal(clip.rotations[:, -2:], np.tile([0.0, 0, 0, 1], (5, 2, 1)))
+    assert "joints kept at rest: spine2, jaw, tail" in lines(notes)
+
+
+def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
+    def with_fingers(table: dict, wrist: str, names: list[str], turn: np.ndarray) -> dict:
+        base = np.array(table[wrist][1], dtype=float)
+        size = 0.01 if base[1] > 10 else 0.0001
+        places = [(8, 0, 3), (12, 0, 3), (8, 0, -3), (12, 0, -3)]
+        tips = [tuple(base + size * 100 * (turn @ np.array(p))) for p in places]
+        return {
+            **table,
+            names[0]: (wrist, tips[0]),
+            names[1]: (names[0], tips[1]),
+            names[2]: (wrist, tips[2]),
+            names[3]: (names[2], tips[3]),
+        }
+
+    hik = ["LeftHandIndex1", "LeftHandIndex2", "LeftHandPinky1", "LeftHandPinky2"]
+    own = ["left_index1", "left_index2", "left_pinky1", "left_pinky2"]
+    # The figure's hand hangs down, palm to the body; the source's is stretched out, palm down.
+    hang = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    source = moving(figure_of(with_fingers(HIK, "LeftHand", hik, np.eye(3)), "mocap"))
+    figure = figure_of(with_fingers(BODY, "left_wrist", own, hang), "body")
+    clip, _ = retarget(source, figure)
+    theirs, mine = places(source.figure, source.clip), places(figure, clip)
+    pairs = [
+        ((hik[0], hik[2]), (own[0], own[2])),
+        ((hik[0], hik[1]), (own[0], own[1])),
+        ((hik[2], hik[3]), (own[2], own[3])),
+        (("LeftHand", hik[0]), ("left_wrist", own[0])),
+    ]
+    for pair, ours in pairs:
+        np.testing.assert_allclose(bones(mine, ours), bones(theirs, pair), atol=EXACT)
+
+
+def test_same_hierarchy_with_other_proportions_takes_rotations_over() -> None:
+    source = moving(figure_of(BODY, "one"))
+    names = list(BODY)
+    # Depth-first instead of breadth-first, with 0.9 times the width and 1.1 times the height.
+    order = [
+        "pelvis",
+        "spine1",
+        "spine2",
+        "spine3",
+        "neck",
+        "head",
+        *[n for n in names if "_" in n],
+    ]
+    table = {n: (BODY[n][0], tuple(np.array(BODY[n][1]) * [0.9, 1.1, 1.0])) for n in order}
+    figure = figure_of(table, "two")
+    clip, notes = retarget(source, figure)
+    for joint, name in enumerate(order):
+        same = np.einsum(
+            "na,na->n", clip.rotations[:, joint], source.clip.rotations[:, names.index(name)]
+        )
+        np.testing.assert_allclose(np.abs(same), 1.0, atol=EXACT)
+    assert lines(notes)[0] == "one drives 20 of 20 joints of two"
+
+
+def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> None:
+    figure = figure_of(BODY, "one")
+    motion = moving(figure)
+    shifts = motion.clip.translations.copy()
+    shifts[2:, 4] = 0.05, -0.01, 0.02
+    motion = SkeletonMotion(figure, replace(motion.clip, translations=shifts))
+    clip, _ = retarget(motion, figure)
+    np.testing.assert_allclose(clip.translations, shifts, atol=EXACT)
+    bigger = scaled_motion(motion, 2.0).figure
+    clip, _ = retarget(motion, bigger)
+    np.testing.assert_allclose(clip.translations[:, 4], 2 * shifts[:, 4], atol=EXACT)
+    _, notes = retarget(motion, figure_of(HIK, "mocap"))
+    assert lines(notes)[-1] == (
+        "translations of 1 joint relative to its parent omitted (largest: 0.0548 at left_knee)"
+    )
+
+
+def test_mapping_names_what_rules_do_not_know() -> None:
+    strange = {
+        f"x{i}": (f"x{list(HIK).index(p)}" if p else "", at)
+        for i, (p, at) in enumerate(HIK.values())
+    }
+    source, figure = moving(figure_of(strange, "strange")), figure_of(BODY, "body")
+    with pytest.raises(RigError):
+        retarget(source, figure)
+    arm = {"x0": "pelvis", "x13": "left_shoulder", "x14": "left_elbow", "x15": "left_wrist"}
+    clip, notes = retarget(source, figure, arm)
+    theirs, mine = places(source.figure, source.clip), places(figure, clip)
+    np.testing.assert_allclose(
+        bones(mine, ("left_elbow", "left_wrist")), bones(theirs, ("x14", "x15")), atol=EXACT
+    )
+    assert lines(notes)[0] == (
+        "strange drives 4 of 20 joints of body: pelvis by x0, left_shoulder by x13, "
+        "left_elbow by x14, left_wrist by x15"
+    )
+    assert "joints kept at rest: left_hip, right_hip" in lines(notes)[1]
+
+
+def test_equal_names_match_whatever_they_mean() -> None:
+    table = {
+        "base": ("", (0, 0, 0)),
+        "tail_01": ("base", (0, 0, 1)),
+        "tail_02": ("tail_01", (0, 0, 2)),
+    }
+    more = {**table, "sting": ("tail_02", (0, 0, 3))}
+    source, figure = moving(figure_of(table, "snake")), figure_of(more, "wasp")
+    clip, notes = retarget(source, figure)
+    theirs, mine = places(source.figure, source.clip), places(figure, clip)
+    np.testing.assert_allclose(mine["tail_02"], theirs["tail_02"], atol=EXACT)
+    assert lines(notes)[:2] == [
+        "snake drives 3 of 4 joints of wasp",
+        "joints kept at rest: sting",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("mapping", "key", "values"),
+    [
+        (
+            None,
+            "F004.joints-unmatched",
+            {
+                "motion": "snake",
+                "figure": "body",
+                "n": 0,
+                "unused": ["base", "tail"],
+                "idle": list(BODY),
+            },
+        ),
+        ({"tial": "head"}, "F004.mapping-joint", {"joint": "tial", "figure": "snake", "n": 0}),
+        ({"tail": "haed"}, "F004.mapping-joint", {"joint": "haed", "figure": "body", "n": 0}),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    mapping: dict[str, str] | None, key: str, values: dict[str, object]
+) -> None:
+    snake = figure_of({"base": ("", (0, 0, 0)), "tail": ("base", (0, 0, 1))}, "snake")
+    with pytest.raises(RigError) as caught:
+        retarget(moving(snake), figure_of(BODY, "body"), mapping)
+    found = caught.value.diagnostic
+    assert found is not None and (found.key, found.values) == (key, values)
+
+
+def test_gaps_stay_where_they_are() -> None:
+    motion = moving(figure_of(HIK, "mocap"))
+    timing = Timing(25.0, np.array([0, 1, -1, -1, 2, 3, 4]), first_frame=7)
+    clip, _ = retarget(
+        SkeletonMotion(motion.figure, replace(motion.clip, timing=timing)), figure_of(BODY, "b")
+    )
+    assert clip.timing is timing and clip.n_rows == 5
+
+
+def test_scaled_motion_scales_all_lengths() -> None:
+    motion = moving(figure_of(HIK, "mocap"))
+    boxes = np.tile([[-1.0, -1, -1], [1, 1, 2]], (20, 1, 1))
+    figure = replace(motion.figure, skeleton=replace(motion.figure.skeleton, boxes=boxes))
+    small = scaled_motion(SkeletonMotion(figure, motion.clip), 0.01, "m")
+    assert small.figure.unit == "m"
+    np.testing.assert_allclose(small.figure.skeleton.boxes, 0.01 * boxes)
+    before, after = places(motion.figure, motion.clip), places(small.figure, small.clip)
+    for name, place in before.items():
+        np.testing.assert_allclose(after[name], 0.01 * place, atol=1e-14)
+    with pytest.raises(RigError, match="expected a factor above 0, found 0"):
+        scaled_motion(motion, 0.0)

@@ -1,0 +1,30 @@
+"""When the window rests: frames that show what was awaited, then none."""
+
+from __future__ import annotations
+
+import pytest
+
+from viewer.app.window import _Rest
+
+pytestmark = pytest.mark.slow
+
+
+def test_what_was_awaited_is_followed_by_frames_that_show_it():
+    for at in range(1, 9):  # the frame that brings it, be it the last one before the window sleeps
+        rest = _Rest()
+        for frame in range(at):
+            rest.count(happened=frame % 4 == 0, awaits=True)
+        drawn = 0
+        for _ in range(12):
+            rest.count(happened=False, awaits=False)
+            drawn += rest.left >= 0
+        # ImGui measures a window in its first frame, and shows it with its size in the second.
+        assert drawn >= 2 and rest.left < 0
+
+
+def test_rest_ends_when_nothing_happens():
+    rest, drawn = _Rest(), 0
+    for _ in range(20):
+        rest.count(happened=False, awaits=False)
+        drawn += rest.left >= 0
+    assert 0 < drawn < 5

@@ -1,0 +1,72 @@
+"""The solid parts of a scene, drawn from any point of view without their materials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rendering.bounds import Bounds
+from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.instance_pass import draw_instance_shapes
+from viewer.rendering.passes.joint_pass import draw_joints, joint_program
+from viewer.rendering.passes.late_passes import LatePasses
+from viewer.rendering.passes.mesh_pass import MeshPass
+from viewer.rendering.shown import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
+from viewer.rendering.view import View
+from viewer.rig.arrays import Floats
+from viewer.rig.scene import Actor
+
+__all__ = ["Casters"]
+
+
+@dataclass(frozen=True, slots=True)
+class Casters:
+    """What casts shadows and occludes light in one picture; all its buffers are updated.
+
+    Attributes
+    ----------
+    programs, mesh_pass, late, buffers : Programs, MeshPass, LatePasses, ActorBuffers
+        What draws, and what is drawn.
+    meshes : Meshes
+        Surfaces.
+    actors : sequence of Actor
+        All actors of the scene.
+    options : DisplayOptions
+        Display options.
+    """
+
+    programs: Programs
+    mesh_pass: MeshPass
+    late: LatePasses
+    buffers: ActorBuffers
+    meshes: Meshes
+    actors: Sequence[Actor]
+    options: DisplayOptions
+
+    def draw(self, view: View, fragment: str) -> None:
+        """Draw everything solid with a fragment shader that needs no material."""
+        options = self.options
+        for actor, mesh in self.meshes.singles:
+            placement = placement_of(actor, options)
+            self.mesh_pass.draw_shape(mesh, placement, view, options, fragment)
+        for actors, instances in self.meshes.instanced:
+            draw_instance_shapes(self.programs, instances, actors, view, options, fragment)
+        for actor in self.actors:
+            # Over a skin, a skeleton is an overlay.
+            if shows_skeleton(actor, options) and not shows_mesh(actor.figure, options):
+                skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
+                program = joint_program(self.programs, skeleton, options, "", fragment)
+                draw_joints(program, skeleton, placement, view, options)
+            if has_points(actor):
+                points = self.buffers.points_of(actor)
+                self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)
+
+    def spheres(self, bounds: Bounds) -> list[Floats]:
+        """Return bounding spheres of each drawn actor: (N, 4) centres and radii, scene space."""
+        drawn = [actor for actor in self.actors if actor.is_drawn]
+        found = [bounds.spheres(actor, self.options) for actor in drawn]
+        return [spheres for spheres in found if len(spheres) and np.isfinite(spheres).all()]

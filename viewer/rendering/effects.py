@@ -1,0 +1,96 @@
+"""Shadows and ambient occlusion as the lit shaders use them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.program import set_uniforms
+from viewer.rendering.gpu.upload import as_uniform
+from viewer.rig.arrays import Floats
+
+__all__ = ["FILTER_RADIUS", "NO_EFFECTS", "SHADOW_UNIT", "Effects", "Occlusion", "Shadow"]
+
+SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # lower units belong to materials and skinning
+FILTER_RADIUS = 3.5
+"""Radius of the filter of shadows, texels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shadow:
+    """The key light's shadow map.
+
+    Attributes
+    ----------
+    texture : moderngl.Texture
+        Depths seen from the light.
+    matrix : (4, 4)
+        Scene space to the map, 0 to 1 on all axes.
+    texel : float
+        Side of a texel, scene units.
+    strength : float
+        0 to 1: fraction of the light that a shadow takes away.
+    """
+
+    texture: moderngl.Texture
+    matrix: Floats
+    texel: float
+    strength: float
+
+
+@dataclass(frozen=True, slots=True)
+class Occlusion:
+    """The ambient light that reaches each pixel.
+
+    Attributes
+    ----------
+    texture : moderngl.Texture
+        Fraction of the light, and depth in camera space, at half of the picture's resolution.
+    strength : float
+        0 to 1: how much of it counts.
+    """
+
+    texture: moderngl.Texture
+    strength: float
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """What changes the light on surfaces besides the lights themselves."""
+
+    shadow: Shadow | None = None
+    occlusion: Occlusion | None = None
+
+    @property
+    def defines(self) -> tuple[str, ...]:
+        """Macros of the shaders that use them."""
+        pairs = (("SHADOWS", self.shadow), ("OCCLUSION", self.occlusion))
+        return tuple(name for name, effect in pairs if effect is not None)
+
+    def bind(self, program: moderngl.Program, view: Floats) -> None:
+        """Set the uniforms and textures of a program; ``view`` is scene to camera space, (4, 4)."""
+        shadow, occlusion = self.shadow, self.occlusion
+        if shadow is not None:
+            size = shadow.texture.width
+            values = {
+                "u_shadow_map": SHADOW_UNIT,
+                "u_shadow_matrix": as_uniform(shadow.matrix @ np.linalg.inv(view)),
+                "u_shadow_radius": FILTER_RADIUS / size,
+                # As far as the filter reaches, or the surface would shade itself.
+                "u_shadow_offset": (FILTER_RADIUS + 1.0) * shadow.texel,
+                "u_shadow_strength": shadow.strength,
+            }
+            set_uniforms(program, values)
+            shadow.texture.use(SHADOW_UNIT)
+        if occlusion is not None:
+            set_uniforms(
+                program,
+                {"u_occlusion": _OCCLUSION_UNIT, "u_occlusion_strength": occlusion.strength},
+            )
+            occlusion.texture.use(_OCCLUSION_UNIT)
+
+
+NO_EFFECTS = Effects()
+"""Light that depends on nothing but the lights."""

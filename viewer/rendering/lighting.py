@@ -1,0 +1,134 @@
+"""Light that depends on the whole scene: shadows, contact shadows and ambient occlusion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.bounds import Bounds
+from viewer.rendering.casters import Casters
+from viewer.rendering.effects import Effects, Shadow
+from viewer.rendering.gpu.program import Programs
+from viewer.rendering.passes.contact_pass import Contact, ContactPass
+from viewer.rendering.passes.ground_pass import ground_axes
+from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
+from viewer.rendering.passes.shadow_pass import ShadowPass
+from viewer.rendering.sampling import Sample, tilted
+from viewer.rendering.view import View, key_direction
+from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box, box_size
+
+__all__ = ["Lighting"]
+
+_SHADOW_STRENGTH = 0.9  # the rest stands for light that other surfaces reflect
+
+
+class Lighting:
+    """Draws what the light on a scene depends on, before each pass of a picture.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self.bounds = Bounds()
+        self._spheres: Floats | None = None
+        self._contact: Contact | None = None
+        self._made: list[ShadowPass | ContactPass | GroundShadowPass] = []
+
+    @cached_property
+    def _shadow_pass(self) -> ShadowPass:
+        self._made.append(made := ShadowPass(self.context))
+        return made
+
+    @cached_property
+    def _contact_pass(self) -> ContactPass:
+        self._made.append(made := ContactPass(self.context, self.programs))
+        return made
+
+    @cached_property
+    def _ground_pass(self) -> GroundShadowPass:
+        self._made.append(made := GroundShadowPass(self.context, self.programs))
+        return made
+
+    def begin(self, casters: Casters, up: str, box: Floats) -> None:
+        """Draw what all passes of a picture share.
+
+        Parameters
+        ----------
+        casters : Casters
+            What casts shadows.
+        up : str
+            The scene's up axis.
+        box : (2, 3)
+            Bounds whose lowest point lies on the ground, scene space.
+        """
+        self._spheres = self._contact = None
+        of_actors = casters.spheres(self.bounds) if casters.options.has_shadows else []
+        if not of_actors:
+            return
+        self._spheres = np.concatenate(of_actors)
+        size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
+        if size > 0.0:
+            axes, height = _ground(up, box)
+            self._contact = self._contact_pass.draw(casters.draw, self._spheres, size, axes, height)
+
+    def light(self, casters: Casters, view: View, sample: Sample, strength: float) -> View:
+        """Draw what one pass of a picture needs; return its view with the effects.
+
+        Parameters
+        ----------
+        casters : Casters
+            What casts shadows.
+        view : View
+            The camera's matrices.
+        sample : Sample
+            The pass.
+        strength : float
+            0 to 1: how much of shadows and occlusion counts.
+        """
+        options, shadow = casters.options, None
+        if self._spheres is not None and options.lights.key.strength > 0.0:
+            direction = tilted(key_direction(view, options.lights), sample.light)
+            shadow = self._shadow_pass.draw(
+                casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
+            )
+        return replace(view, effects=Effects(shadow))
+
+    def draw_ground(self, view: View, box: Floats, strength: float) -> None:
+        """Draw the shadows on the ground, unless the camera is below it."""
+        axes, height = _ground(view.camera.up, box)
+        if not _is_above(view, axes[2], height):
+            return
+        if self._contact is not None:
+            self._ground_pass.draw_contact(self._contact, view, axes, height, strength)
+        shadow: Shadow | None = view.effects.shadow
+        if shadow is not None:
+            self._ground_pass.draw_shadow(shadow, view, axes[2], height)
+
+    def release(self) -> None:
+        """Free all passes that were created."""
+        for item in self._made:
+            item.release()
+
+
+def _ground(up: str, box: Floats) -> tuple[Floats, float]:
+    """Return the ground's two axes and the up axis as rows, and its height."""
+    axes = ground_axes(up)
+    return axes, float((axes[2] @ box.T).min())
+
+
+def _is_above(view: View, up: Floats, height: float) -> bool:
+    """Return whether a camera looks at the ground from above."""
+    if view.camera.is_parallel:
+        return bool(up @ view.matrix[2, :3] > 0.0)
+    eye = -view.matrix[:3, :3].T @ view.matrix[:3, 3]
+    return bool(up @ eye > height)

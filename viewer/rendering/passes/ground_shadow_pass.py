@@ -1,0 +1,107 @@
+"""Shadows on the ground: the key light's, and contact shadows."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.effects import FILTER_RADIUS, SHADOW_UNIT, Shadow
+from viewer.rendering.gpu.draw_state import without_depth_writes
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.passes.contact_pass import Contact
+from viewer.rendering.view import View, set_model
+from viewer.rig.arrays import Floats
+
+__all__ = ["GroundShadowPass"]
+
+_OPACITY = 0.42  # of the key light's shadow
+_CONTACT_OPACITIES = 0.55, 0.38
+_GRAZING = 0.06, 0.22  # sine of the light's height at which its shadow begins, and is full
+_FIELD_UNIT = 0
+
+
+class GroundShadowPass:
+    """Draws black patches on the ground, whose opacity is the shadow.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._corners = buffer(context, [[0, 0], [1, 0], [0, 1], [1, 1]], "f4")
+        self._arrays = VertexArrays(context)
+
+    def draw_shadow(self, shadow: Shadow, view: View, up: Floats, height: float) -> None:
+        """Draw the key light's shadow.
+
+        Parameters
+        ----------
+        shadow : Shadow
+            The shadow map.
+        view : View
+            The camera's matrices.
+        up : (3,)
+            The up axis.
+        height : float
+            Of the ground along it.
+        """
+        back = np.linalg.inv(shadow.matrix)
+        away = back[:3, 2]
+        slope = -(up @ away) / np.linalg.norm(away)
+        fade = float(np.clip((slope - _GRAZING[0]) / (_GRAZING[1] - _GRAZING[0]), 0.0, 1.0))
+        if fade == 0.0:
+            return
+        # Light that passes the corners of the map meets the ground at these depths.
+        corners = np.array([[0.0, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]]) @ back.T
+        depths = (height - corners[:, :3] @ up) / (up @ away)
+        places = corners[:, :3] + depths[:, None] * away
+        program = self.programs.drawing("patch", fragment="ground_shadow")
+        growth = depths[1:] - depths[0]
+        values = {
+            "u_shadow_map": SHADOW_UNIT,
+            "u_shadow_radius": FILTER_RADIUS / shadow.texture.width,
+            "u_depth": (float(depths[0]), *growth.tolist()),
+            "u_opacity": _OPACITY * fade * shadow.strength,
+        }
+        set_uniforms(program, values)
+        shadow.texture.use(SHADOW_UNIT)
+        self._draw(program, view, places[0], places[1] - places[0], places[2] - places[0])
+
+    def draw_contact(
+        self, contact: Contact, view: View, axes: Floats, height: float, strength: float
+    ) -> None:
+        """Draw contact shadows; ``axes`` are the ground's two and the up axis as rows."""
+        program = self.programs.drawing("patch", fragment="ground_contact")
+        opacities = tuple(strength * opacity for opacity in _CONTACT_OPACITIES)
+        set_uniforms(program, {"u_field": _FIELD_UNIT, "u_opacity": opacities})
+        contact.texture.use(_FIELD_UNIT)
+        # Seen from below, the second axis points down.
+        origin = axes.T @ np.array([contact.low[0], contact.high[1], height])
+        sides = contact.high - contact.low
+        self._draw(program, view, origin, sides[0] * axes[0], -sides[1] * axes[1])
+
+    def _draw(
+        self, program: moderngl.Program, view: View, origin: Floats, first: Floats, second: Floats
+    ) -> None:
+        """Draw the parallelogram of two sides from a corner, scene space."""
+        placement = np.eye(4)
+        placement[:3, 0], placement[:3, 1] = first, second
+        placement[:3, 2] = np.cross(first, second)
+        placement[:3, 3] = origin
+        set_model(program, view, placement, np.zeros(3))
+        array = self._arrays.get(program, lambda: [(self._corners, "2f4", "in_corner")])
+        # Patches are translucent and must not hide anything.
+        with without_depth_writes(self.context):
+            array.render(moderngl.TRIANGLE_STRIP)
+
+    def release(self) -> None:
+        """Free vertex arrays and corners."""
+        self._arrays.release()
+        self._corners.release()

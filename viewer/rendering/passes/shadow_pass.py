@@ -1,0 +1,129 @@
+"""The key light's shadow map, fitted to what casts shadows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.camera import Camera
+from viewer.rendering.effects import FILTER_RADIUS, Shadow
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.view import View
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.transform import translation_matrix
+
+__all__ = ["SHADOW_SIZE", "ShadowPass", "light_view", "parallel_view"]
+
+SHADOW_SIZE = 2048
+"""Texels on each side of a shadow map."""
+
+_MARGIN = FILTER_RADIUS + 2.0  # texels without shadow around all casters
+_STEP = 2.0**0.25  # of the map's extent: moving figures don't change its resolution each frame
+_TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1.0]])
+
+
+class ShadowPass:
+    """Draws depths seen from a light.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        self._owner = Owner()
+        with self._owner.guard():
+            size = SHADOW_SIZE, SHADOW_SIZE
+            self._texture = self._owner.keep(context.depth_texture(size))
+            self._texture.compare_func = "<="
+            self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            self._texture.repeat_x = self._texture.repeat_y = False
+            self._framebuffer = self._owner.keep(context.framebuffer((), self._texture))
+
+    def draw(
+        self,
+        draw: Callable[[View, str], object],
+        spheres: Floats,
+        direction: Floats,
+        strength: float,
+    ) -> Shadow:
+        """Draw a shadow map.
+
+        Parameters
+        ----------
+        draw : callable
+            Draws what casts shadows, with a view and a fragment shader.
+        spheres : (N, 4)
+            Bounds of all that: centres and radii, scene space; at least one.
+        direction : (3,)
+            Towards the light, unit length, scene space.
+        strength : float
+            0 to 1: fraction of the light that a shadow takes away.
+        """
+        view, extent = light_view(spheres, direction)
+        self._framebuffer.use()
+        context = self.context
+        context.viewport = (0, 0, SHADOW_SIZE, SHADOW_SIZE)
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.depth_func = "<"
+        self._framebuffer.clear(depth=1.0)
+        draw(view, "depth")
+        matrix = _TO_TEXTURE @ view.projection @ view.matrix
+        return Shadow(self._texture, matrix, 2.0 * extent / SHADOW_SIZE, strength)
+
+    def release(self) -> None:
+        """Free the map."""
+        self._owner.release()
+
+
+def light_view(spheres: Floats, direction: Floats) -> tuple[View, float]:
+    """Return the view of a directional light that contains some spheres, and its half extent.
+
+    Extents grow in steps, and the middle lies on a grid of texels, so that edges of shadows do not
+    crawl while figures move.
+
+    Parameters
+    ----------
+    spheres : (N, 4)
+        Centres and radii, scene space.
+    direction : (3,)
+        Towards the light, unit length.
+    """
+    aside = np.eye(3)[np.argmin(np.abs(direction))]
+    right = np.cross(aside, direction)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(direction, right), direction])
+    centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
+    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
+    half = 0.5 * max(high[0] - low[0], high[1] - low[1])
+    # Half a texel of snapping, and room for the filter.
+    half /= 1.0 - 2.0 * (_MARGIN + 1.0) / SHADOW_SIZE
+    extent = _STEP ** np.ceil(np.log(max(half, 1e-30)) / np.log(_STEP))
+    texel = 2.0 * extent / SHADOW_SIZE
+    middle = 0.5 * (low + high)
+    middle[:2] = np.round(middle[:2] / texel) * texel
+    deep = 0.5 * (high[2] - low[2]) * 1.01 + 1e-3 * extent
+    return parallel_view(axes, middle, np.array([extent, extent, deep])), float(extent)
+
+
+def parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
+    """Return a parallel view of a box.
+
+    Parameters
+    ----------
+    axes : (3, 3)
+        Right, up and backward as rows, scene space.
+    middle : (3,)
+        Of the box, along these axes.
+    halves : (3,)
+        Half its sides.
+    """
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes
+    # OpenGL's depth grows away from the eye, against the backward axis.
+    projection = np.diag([1.0 / halves[0], 1.0 / halves[1], -1.0 / halves[2], 1.0])
+    return View(translation_matrix(-middle) @ matrix, projection, Camera(orthographic=True))
