@@ -34,6 +34,8 @@ from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
+from viewer.app.view.hovering import draw_hovered_name, hover_joint
+from viewer.app.view.outlines import outlined_parts
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
@@ -128,6 +130,7 @@ class Frame:
         follow_actor(state)
         keep_fitting(state, files.stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
+        hover_joint(state)
         self._draw_scene(scale)
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
@@ -188,7 +191,9 @@ class Frame:
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)
-        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
+        renderer.outlines = outlined_parts(state)
+        drawn_over = renderer.marks, renderer.ghost, renderer.annotations, renderer.outlines
+        key = self._keys.key(state, size, *drawn_over)
         if key != self._drawn:
             self._drawn = key  # even if drawing fails: it is retried only after a change
             self._draw_target(size)
@@ -199,6 +204,7 @@ class Frame:
             # Textures have their first row at the bottom.
             draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
             draw_hovered(state)
+            draw_hovered_name(state)
             draw_gizmo(state)
             draw_rig_tools(state)
             if state.panels_visible:
@@ -351,6 +357,11 @@ class Frame:
         """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
+        if self.renderer.outlines:
+            # Those of the window are no part of the scene.
+            self.renderer.outlines = ()
+            self._draw_target(self.target.size)
+            self._drawn = None
         return self.target.read()
 
     def release(self) -> None:

@@ -31,6 +31,7 @@ from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
+from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
@@ -243,7 +244,8 @@ class _Window:
         files = state.of(Files)
         is_read = files.loader is not None or files.stream is not None
         is_read |= not state.framing.is_settled
-        return is_read or state.of(Weights).is_waiting or _awaits_tooltip(self._imgui)
+        is_waiting = state.of(Weights).is_waiting or state.of(Hovered).is_waiting
+        return is_read or is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window has no pixels at present."""

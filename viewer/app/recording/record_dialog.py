@@ -84,6 +84,8 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
             settings.seconds = seconds
     if settings.kind != ".mp4":
         settings.transparent = checkbox(state, "Transparent background", settings.transparent)
+    if state.selected_joint >= 0 or len(state.scene.actors) > 1:
+        state.options.outline = checkbox(state, "Selection outline", state.options.outline)
     if state.options.shading == "scalar":
         state.options.legend = checkbox(state, "Legend in pictures", state.options.legend)
     imgui.text_disabled(_span_text(state, settings))

@@ -15,7 +15,7 @@ from viewer.app.core.state import AppState
 from viewer.app.view.camera_actions import fly_to
 from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
 
-__all__ = ["AxisGizmo", "draw_axis_gizmo", "holds_gizmo"]
+__all__ = ["AxisGizmo", "draw_axis_gizmo", "holds_gizmo", "is_over_gizmo"]
 
 _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
@@ -60,7 +60,7 @@ def holds_gizmo(state: AppState) -> bool:
     if gizmo.is_held:
         _go_on(state, gizmo)
         return True
-    if io.want_capture_mouse or not _is_over(state):
+    if io.want_capture_mouse or not is_over_gizmo(state):
         return False
     gizmo.is_held = imgui.is_mouse_clicked(_LEFT)
     # The wheel zooms here as anywhere else.
@@ -94,7 +94,7 @@ def draw_axis_gizmo(state: AppState) -> None:
         *(x - _RADIUS * unit, y - _RADIUS * unit),
         *(x + _RADIUS * unit, y + _RADIUS * unit),
     )
-    pen, is_over = imgui.get_background_draw_list(), _is_free(state) and _is_over(state)
+    pen, is_over = imgui.get_background_draw_list(), _is_free(state) and is_over_gizmo(state)
     if is_over:
         pen.add_circle_filled((x, y), _RADIUS * unit, imgui.get_color_u32((1.0, 1.0, 1.0, 0.16)))
     mouse = imgui.get_io().mouse_pos
@@ -154,7 +154,8 @@ def _is_free(state: AppState) -> bool:
     return is_held or not (is_down or imgui.get_io().want_capture_mouse)
 
 
-def _is_over(state: AppState) -> bool:
+def is_over_gizmo(state: AppState) -> bool:
+    """Return whether the pointer is over the gizmo."""
     center, mouse = _center(state), imgui.get_io().mouse_pos
     if center is None or not imgui.is_mouse_pos_valid():
         return False

@@ -14,6 +14,7 @@ from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.state import Posing
 from viewer.app.posing.tool_actions import no_tool
+from viewer.app.view.hovering import hover_actor, joint_near
 from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.hover_text import tells_vertices
@@ -62,6 +63,7 @@ def answer_picks(
             x, y, aims = wanted
             _take_click(state, renderer, size, (x * scale, y * scale), aims)
         _look_under_mouse(state, renderer, size, scale, picture)
+        hover_actor(state, renderer, size, scale)
     except ViewerError as problem:
         state.error = str(problem)
 
@@ -85,9 +87,15 @@ def _take_click(
             imgui.set_window_focus(PANELS["vertex"].title)  # another tab may hide it
         return
     pick = _pick(state, renderer, size, pixel, state.options)
+    if not aims and (pick is None or pick.joint < 0):
+        x, y, width, _ = state.view_rect
+        near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
+        if near >= 0:  # missed it by a little
+            select_joint(state, near)
+            return
     if pick is None:
         if not aims:
-            state.selected_joint = -1
+            state.selected_joint, state.is_actor_selected = -1, False
         return
     take_pick(state, pick, aims)
     mover = None if aims else _mover(state, pick)
@@ -129,7 +137,7 @@ def _pick(
 
 def take_pick(state: AppState, found: Pick, aims: bool) -> None:
     """Choose the actor and joint that were clicked; a double click aims the camera there."""
-    if found.actor != state.chosen_actor:
+    if found.actor != state.chosen_actor or not state.is_actor_selected:
         state.choose_actor(found.actor)
         state.say_status(printable(state.actor.name, 60))
     if found.joint >= 0:

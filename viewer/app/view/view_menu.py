@@ -22,6 +22,7 @@ from viewer.app.view.display_actions import (
     toggle_option,
     toggle_skeleton,
 )
+from viewer.app.view.outlines import Outlines, toggle_outlines
 from viewer.app.weights.actions import (
     no_view,
     toggle_picking,
@@ -66,6 +67,8 @@ def draw_view_menu(state: AppState) -> None:
         toggle_option(state, "grid", "Grid")
     if menu_item(state, "Axis gizmo", "", state.of(AxisGizmo).is_shown):
         toggle_gizmo(state)
+    if menu_item(state, "Selection outlines", "", state.of(Outlines).is_shown):
+        toggle_outlines(state)
     if menu_item(state, "Hide menus and panels", "Tab"):
         state.panels_visible = False
     imgui.end_menu()
