@@ -11,6 +11,7 @@ import moderngl
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import follow_actor, stop_following
+from viewer.app.context.context_menu import answer_right_click, draw_context_menu
 from viewer.app.core.fitting import keep_fitting
 from viewer.app.core.jobs import FrameJob
 from viewer.app.core.state import AppState
@@ -26,6 +27,7 @@ from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
+from viewer.app.palette.palette_window import draw_palette
 from viewer.app.picture_key import PictureKeys
 from viewer.app.posing.gizmo_drawing import draw_gizmo
 from viewer.app.posing.shape_guard import drop_unreadable_shapes
@@ -111,6 +113,8 @@ class Frame:
         drop_unreadable_shapes(state)
         self.open(draw_interface(state))
         draw_record_dialog(state)
+        draw_context_menu(state)
+        draw_palette(state)
         draw_file_dialog(state)
         files = state.of(Files)
         self.open(files.wants_open)
@@ -134,6 +138,7 @@ class Frame:
         self._draw_scene(scale)
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
+            answer_right_click(state, self.renderer, self.target.size, scale)
         imgui.render()
 
     def paint(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> None:

@@ -17,7 +17,8 @@ __all__ = ["drop_motion_before_press", "handle_mouse"]
 _DEGREES_PER_POINT = 0.4
 _ZOOM_PER_NOTCH = 0.88
 _LEFT = imgui.MouseButton_.left
-_BUTTONS = (_LEFT, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+_RIGHT = imgui.MouseButton_.right
+_BUTTONS = (_LEFT, _RIGHT, imgui.MouseButton_.middle)
 
 
 def drop_motion_before_press() -> None:
@@ -59,6 +60,8 @@ def handle_mouse(state: AppState) -> None:
         and (wants_vertex(state.of(Weights)) or not choose_joint(state))
     ):
         picking.wanted = (*place, False)
+    if imgui.is_mouse_released(_RIGHT) and _is_still(_RIGHT):
+        picking.menu_at = place
     if io.mouse_wheel and imgui.is_mouse_pos_valid():
         across = (io.mouse_pos.x - x - width / 2) / height
         upward = -(io.mouse_pos.y - y - height / 2) / height
@@ -75,6 +78,11 @@ def _drags(button: imgui.MouseButton_) -> bool:
 
 def _is_click() -> bool:
     """Return whether a button was released without a drag or a double click."""
-    io, left = imgui.get_io(), _LEFT
-    is_still = io.mouse_drag_max_distance_sqr[left] < io.mouse_drag_threshold**2
-    return is_still and io.mouse_clicked_last_count[left] < 2 and not io.key_shift
+    io = imgui.get_io()
+    return _is_still(_LEFT) and io.mouse_clicked_last_count[_LEFT] < 2 and not io.key_shift
+
+
+def _is_still(button: imgui.MouseButton_) -> bool:
+    """Return whether the pointer has stayed in place since a button was pressed."""
+    io = imgui.get_io()
+    return bool(io.mouse_drag_max_distance_sqr[button] < io.mouse_drag_threshold**2)
