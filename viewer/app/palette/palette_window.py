@@ -159,7 +159,7 @@ def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
     note_item(state, f"palette {row}")
     note = entry.why or entry.kind
     key = "" if entry.why else entry.key
-    right = start + room
+    right = start + room - 0.3 * imgui.get_font_size()
     if key:
         right -= imgui.calc_text_size(key).x
         imgui.same_line(right)
