@@ -30,6 +30,7 @@ _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
 """Selected and hovered, sRGB."""
 _WIDTH = 2.0  # of the line, pixels of a picture of standard height
 _POINT = 9.0  # diameter of a point, the same
+_TILE, _LEVEL = 16, 4  # side of tile.vert's tiles, pixels; mipmaps with texels of that size
 _MOST = 12  # pixels around a mask that are looked at
 
 
@@ -57,8 +58,8 @@ class OutlinePass:
     def __init__(self, context: moderngl.Context, tools: OutlineTools) -> None:
         self.context, self.tools = context, tools
         self._segments = SegmentPass(context, tools.programs)
-        self._spread = tools.programs.drawing("background", fragment="spread")
-        self._line = tools.programs.drawing("background", fragment="outline")
+        self._spread = tools.programs.drawing("tile", fragment="spread")
+        self._line = tools.programs.drawing("tile", fragment="outline")
         self._arrays = [context.vertex_array(p, []) for p in (self._spread, self._line)]
         self._mask: Target | None = None
         self._distance: list[Any] = []
@@ -103,7 +104,9 @@ class OutlinePass:
                 if 0 <= one.actor < len(scene.actors):
                     self._cover(one, scene.actors[one.actor], view, options, target.size)
             self.context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-            mask.resolve().use(0)
+            covered = mask.resolve()
+            covered.build_mipmaps(max_level=_LEVEL)
+            covered.use(0)
             self._compose(target)
 
     def _make(self, target: Target) -> None:
@@ -113,28 +116,33 @@ class OutlinePass:
             return
         self._free()
         self._mask = Target(self.context, target.size, target.samples)
+        self._mask.texture.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
         texture = self.context.texture(target.size, 2, dtype="f2")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._distance = [texture, self.context.framebuffer([texture])]
 
     def _compose(self, target: Target) -> None:
-        """Find distances from the resolved mask, and draw the lines."""
-        scale = picture_scale(target.size)
+        """Find distances from the resolved mask, and draw the lines, in tiles with an edge."""
+        size, scale = target.size, picture_scale(target.size)
         reach = min(int(np.ceil(scale * _WIDTH)) + 2, _MOST)
+        level = min(_LEVEL, int(np.log2(min(size))))
+        tiles = -(-size[0] // _TILE) * -(-size[1] // _TILE)
         texture, framebuffer = self._distance
         framebuffer.use()
-        self.context.viewport = (0, 0, *target.size)
+        self.context.viewport = (0, 0, *size)
+        framebuffer.clear(1.0, 1.0, 1.0, 1.0)
         self.context.disable(moderngl.BLEND)
-        set_uniforms(self._spread, {"u_mask": 0, "u_reach": reach})
-        self._arrays[0].render(moderngl.TRIANGLES, vertices=3)
+        edges = {"u_mask": 0, "u_reach": reach, "u_level": level}
+        set_uniforms(self._spread, edges)
+        self._arrays[0].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=tiles)
         self.context.enable(moderngl.BLEND)
         target.framebuffer.use()
-        self.context.viewport = (0, 0, *target.size)
+        self.context.viewport = (0, 0, *size)
         texture.use(1)
         colors = np.array(_COLORS, dtype="f4").tobytes()
-        values = {"u_mask": 0, "u_distance": 1, "u_reach": reach, "u_width": scale * _WIDTH}
-        set_uniforms(self._line, {**values, "u_colors": colors})
-        self._arrays[1].render(moderngl.TRIANGLES, vertices=3)
+        values = {"u_distance": 1, "u_width": scale * _WIDTH, "u_colors": colors}
+        set_uniforms(self._line, {**edges, **values})
+        self._arrays[1].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=tiles)
 
     def _cover(
         self,
