@@ -14,6 +14,7 @@ NAMES = [
     "bodies",
     "deform",
     "instances",
+    "structure",
     "motion",
     "read",
     "captures",

@@ -86,6 +86,10 @@ class Pace:
             self._strength = min(max(wanted, before - change), before + change)
         return self._strength != before
 
+    def restart(self) -> None:
+        """Draw the next frame again, although nothing has changed."""
+        self._done = 0
+
     def measured(self, step: Step, seconds: float) -> None:
         """Take note of how long a step took to draw."""
         if step.options.quality != "draft":

@@ -13,7 +13,14 @@ from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
-from viewer.rendering.options import BACKGROUNDS, MATCAPS, QUALITIES, SHOWN, DisplayOptions
+from viewer.rendering.options import (
+    BACKGROUNDS,
+    BONES,
+    MATCAPS,
+    QUALITIES,
+    SHOWN,
+    DisplayOptions,
+)
 from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.arrays import Floats
@@ -76,6 +83,13 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     )
     _add_shading_arguments(group)
     add_scalar_arguments(group)
+    group.add_argument(
+        "--bones",
+        choices=BONES,
+        default="auto",
+        help="style of skeletons (default: auto, the boxes of files that have them, otherwise "
+        "octahedra)",
+    )
     group.add_argument(
         "--background",
         default="gradient",
@@ -211,6 +225,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         normals=arguments.normals,
         texture=not arguments.no_texture,
         grid=not arguments.no_grid,
+        bones=arguments.bones,
         background=arguments.background,
         samples=arguments.samples,
         quality=arguments.quality or "final",

@@ -9,7 +9,7 @@ from viewer.rendering.shown import placement_of, shows_mesh, shows_skeleton
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.mesh import bounding_box
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -18,6 +18,7 @@ from viewer.rig.skin import Skin, bind_positions, owners
 __all__ = ["Bounds", "stretch"]
 
 _MARGIN = 1.03  # for pose correctives and skinning methods that do not blend linearly
+_BONE = 0.05  # greatest half width of a bone, in sizes of the skeleton
 _MOST = 32  # figures whose radii are kept
 
 
@@ -113,15 +114,19 @@ def _reaches(centers: Floats, skin: Skin, positions: Floats) -> Floats:
 
 
 def _of_joints(actor: Actor) -> Floats:
-    """Return spheres around an actor's joint boxes, figure space."""
+    """Return spheres around an actor's bones and joint boxes, figure space."""
     pose = actor.require_pose()
     skeleton = shaped(actor.figure, pose.shape_weights).require_skeleton()
     world = posed_skeleton(skeleton, pose).world
+    places = world[:, :3, 3]
+    thick = np.full(len(places), _BONE * box_size(bounding_box(places)))
+    bones = np.column_stack([places, thick])
     if skeleton.boxes is None:
-        return np.pad(world[:, :3, 3], ((0, 0), (0, 1)))
+        return bones
     middles, halves = skeleton.boxes.mean(axis=1), 0.5 * np.ptp(skeleton.boxes, axis=1)
     centers = np.einsum("jik,jk->ji", world[:, :3, :3], middles) + world[:, :3, 3]
-    return np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch(world)])
+    boxes = np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch(world)])
+    return np.concatenate([bones, boxes])
 
 
 def _of_box(box: Floats) -> Floats:
