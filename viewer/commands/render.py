@@ -162,7 +162,7 @@ def draw_scene(
     A quality that was not chosen is lowered where drawing it in software takes long.
     """
     from viewer.rendering.offscreen import Offscreen
-    from viewer.rendering.software_limits import limit_passes
+    from viewer.rendering.quality_limits import limit_passes
 
     with deferred(), Offscreen(device) as offscreen:
         notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)

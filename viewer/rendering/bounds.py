@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
@@ -19,7 +21,6 @@ __all__ = ["Bounds", "stretch"]
 
 _MARGIN = 1.03  # for pose correctives and skinning methods that do not blend linearly
 _BONE = 0.05  # greatest half width of a bone, in sizes of the skeleton
-_MOST = 32  # figures whose radii are kept
 
 
 class Bounds:
@@ -30,7 +31,7 @@ class Bounds:
     """
 
     def __init__(self) -> None:
-        self._radii: dict[int, tuple[Figure, Floats, Floats]] = {}
+        self._reaches: WeakKeyDictionary[Figure, tuple[Floats, Floats]] = WeakKeyDictionary()
 
     def spheres(self, actor: Actor, options: DisplayOptions) -> Floats:
         """Return spheres around what is drawn of an actor.
@@ -69,13 +70,11 @@ class Bounds:
         return self._of_skin(figure, figure.require_skin(), pose)
 
     def _of_skin(self, figure: Figure, skin: Skin, pose: Pose) -> Floats:
-        if id(figure) not in self._radii:
-            if len(self._radii) >= _MOST:
-                self._radii.pop(next(iter(self._radii)))
+        if figure not in self._reaches:
             centers = bind_positions(skin)
             radii = _reaches(centers, skin, figure.require_mesh().positions)
-            self._radii[id(figure)] = figure, centers, radii
-        _, centers, radii = self._radii[id(figure)]
+            self._reaches[figure] = centers, radii
+        centers, radii = self._reaches[figure]
         palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
         used = radii >= 0.0
         palette = palette[used]
