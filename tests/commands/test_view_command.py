@@ -33,7 +33,8 @@ def test_without_display_the_figure_is_drawn_under_a_new_name(tmp_path, monkeypa
         assert captured.err == ""
         assert len(list(folder.iterdir())) == number + 1
     picture = np.array(Image.open(folder / "tiny.png").convert("RGBA"))
-    assert (picture == viewer.render(viewer.load(*rig), (1280, 720))).all()
+    options = viewer.DisplayOptions(quality="final")
+    assert (picture == viewer.render(viewer.load(*rig), (1280, 720), options=options)).all()
 
 
 def test_without_display_and_files_the_fox_is_drawn(tmp_path, monkeypatch, capsys):
