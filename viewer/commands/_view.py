@@ -13,7 +13,14 @@ from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
-from viewer.rendering.options import BACKGROUNDS, MATCAPS, SHOWN, DisplayOptions
+from viewer.rendering.options import (
+    BACKGROUNDS,
+    BONES,
+    MATCAPS,
+    QUALITIES,
+    SHOWN,
+    DisplayOptions,
+)
 from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rendering.pinhole import distortion_error
 from viewer.rig.arrays import Floats
@@ -22,6 +29,19 @@ from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
+_SWITCHES = (
+    ("no-shadows", "leave out shadows"),
+    ("flat", "use one normal per triangle"),
+    ("wireframe", "draw triangle edges"),
+    ("normals", "draw vertex normals"),
+    ("no-texture", "use plain colours instead of textures"),
+    ("no-grid", "omit the ground grid"),
+    ("keypoints", "draw a model's keypoints"),
+    ("reduced", "draw the coarser mesh, if there is one"),
+    ("xray", "draw bones visible through the skin"),
+    ("joint-names", "label joints, where labels do not overlap"),
+    ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
+)
 _VISIBLE = 0.5  # pixels of the camera's own pictures: smaller errors are invisible
 
 
@@ -64,6 +84,13 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     _add_shading_arguments(group)
     add_scalar_arguments(group)
     group.add_argument(
+        "--bones",
+        choices=BONES,
+        default="auto",
+        help="style of skeletons (default: auto, the boxes of files that have them, otherwise "
+        "octahedra)",
+    )
+    group.add_argument(
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
@@ -73,18 +100,14 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--samples", type=int, default=4, metavar="N", help="samples per pixel (default: 4)"
     )
-    for name, text in (
-        ("flat", "use one normal per triangle"),
-        ("wireframe", "draw triangle edges"),
-        ("normals", "draw vertex normals"),
-        ("no-texture", "use plain colours instead of textures"),
-        ("no-grid", "omit the ground grid"),
-        ("keypoints", "draw a model's keypoints"),
-        ("reduced", "draw the coarser mesh, if there is one"),
-        ("xray", "draw bones visible through the skin"),
-        ("joint-names", "label joints, where labels do not overlap"),
-        ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
-    ):
+    group.add_argument(
+        "--quality",
+        choices=QUALITIES,
+        metavar="NAME",
+        help="draft: no shadows; normal: shadows; final: soft shadows, ambient occlusion and "
+        "smoother edges (default: final for pictures, normal for videos)",
+    )
+    for name, text in _SWITCHES:
         group.add_argument(f"--{name}", action="store_true", help=text)
     group.add_argument(
         "--hide-part",
@@ -202,8 +225,11 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         normals=arguments.normals,
         texture=not arguments.no_texture,
         grid=not arguments.no_grid,
+        bones=arguments.bones,
         background=arguments.background,
         samples=arguments.samples,
+        quality=arguments.quality or "final",
+        shadows=not arguments.no_shadows,
         skinning=skinning_of(arguments),
         keypoints=arguments.keypoints,
         reduced=arguments.reduced,

@@ -8,7 +8,9 @@ from viewer.rig.skinning import Skinning
 
 __all__ = [
     "BACKGROUNDS",
+    "BONES",
     "MATCAPS",
+    "OPACITIES",
     "QUALITIES",
     "SHOWN",
     "Color",
@@ -30,14 +32,26 @@ SHOWN = {
 MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
 """Pictures of lit spheres for the shading ``"matcap"``, with labels for menus."""
 
+BONES = {
+    "auto": "Automatic",
+    "boxes": "Boxes",
+    "octahedra": "Octahedra",
+    "sticks": "Sticks",
+    "axes": "Axes",
+}
+"""Styles of skeletons, with labels for menus: see ``DisplayOptions.bones``."""
+
+OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
+"""Default opacity of a skeleton over the skin: boxes often enclose it, thin shapes do not."""
+
 BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
 
 
 QUALITIES = {
-    "draft": "Draft, no shadows",
-    "normal": "Normal, shadows",
-    "final": "Final, soft shadows and occlusion",
+    "draft": "Draft",
+    "normal": "Normal",
+    "final": "Final",
 }
 """Qualities of a picture, with labels for menus."""
 
@@ -115,8 +129,12 @@ class DisplayOptions:
         draw the ground grid; cull back faces.
     background : str
         An entry of ``BACKGROUNDS`` or ``"#rrggbb"``.
-    skeleton_opacity : float
-        Opacity of the skeleton over the skin.
+    bones : str
+        Style of skeletons, a key of ``BONES``: boxes as a file has them, or small cubes; octahedra,
+        sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
+        them, otherwise octahedra.
+    skeleton_opacity : float or None
+        Opacity of the skeleton over the skin; None for ``OPACITIES`` by style.
     samples : int
         Samples per pixel, limited by the driver's maximum.
     quality : str
@@ -158,6 +176,8 @@ class DisplayOptions:
     joint_names, joint_axes : bool
         Label the joints, omitting labels that would overlap; draw the axes of the joint spaces
         (x red, y green, z blue).
+    outline : bool
+        Outline the selected joint, or else the selected actor, in pictures.
     """
 
     show: str = "skin"
@@ -172,7 +192,8 @@ class DisplayOptions:
     grid: bool = True
     cull: bool = False
     background: str = "gradient"
-    skeleton_opacity: float = 0.35
+    bones: str = "auto"
+    skeleton_opacity: float | None = None
     samples: int = 4
     quality: str = "draft"
     shadows: bool = True
@@ -192,6 +213,7 @@ class DisplayOptions:
     xray: bool = False
     joint_names: bool = False
     joint_axes: bool = False
+    outline: bool = False
 
     @property
     def has_shadows(self) -> bool:

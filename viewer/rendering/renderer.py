@@ -16,6 +16,8 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
+from viewer.rendering.overlays import Overlays, draw_overlays
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
@@ -28,7 +30,6 @@ from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.shown import (
     Meshes,
     far_first,
-    has_joint_marks,
     has_markers,
     has_points,
     placement_of,
@@ -74,6 +75,8 @@ class Renderer:
         Annotations, drawn over everything except legends.
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
+    outlines : sequence of Outlined
+        Parts of the scene to outline; if empty, the selection with ``DisplayOptions.outline``.
     names_left_out : (int, int)
         Number of joint names omitted from the last picture for lack of room, and number of
         joints within it.
@@ -93,6 +96,7 @@ class Renderer:
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
+        self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
         self.lighting = Lighting(context, self.programs)
         self.late = LatePasses(
@@ -157,12 +161,18 @@ class Renderer:
         for index in range(count) if passes is None else passes:
             one = sample(index, count)
             shifted = jittered(view, one.shift, target.size)
-            lit = self.lighting.light(casters, shifted, one, strength)
+            lit = self.lighting.light(casters, shifted, target.size, one, strength)
             self._prepare(target)
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
-        self._draw_marks(scene, view, options, target.size, selected)
+        over = Overlays(self.marks, self.ghost, self.annotations)
+        self.names_left_out = draw_overlays(
+            self.late, over, scene, view, options, target.size, selected
+        )
+        if self.outlines or options.outline:
+            outlined = self.outlines or [Outlined(*selected)]
+            self.late.outline_pass.draw(outlined, scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
 
@@ -191,13 +201,15 @@ class Renderer:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+        self._draw_blended(meshes, view, options)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self._draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, joint, options.skeleton_opacity)
+                opacity = self.buffers.skeleton(actor).opacity(options)
+                self._draw_skeleton(actor, view, options, joint, opacity)
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
@@ -285,6 +297,11 @@ class Renderer:
         drawn += [instances.mesh for _, instances in meshes.instanced]
         self.late.use_pictures(drawn, options)
         self._draw_layer(meshes, view, options, blended=False)
+
+    def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        """Draw translucent surfaces, over all that is opaque and the ground."""
+        drawn = [mesh.mesh for _, mesh in meshes.singles]
+        drawn += [instances.mesh for _, instances in meshes.instanced]
         if any(mesh.is_blended for mesh in drawn):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
@@ -336,40 +353,6 @@ class Renderer:
         markers.update(actor.require_pose(), options.skinning)
         # Marker positions already include the placement of the pose.
         self.late.keypoint_pass.draw(markers, actor.placement, view, options)
-
-    def _draw_marks(
-        self,
-        scene: Scene,
-        view: View,
-        options: DisplayOptions,
-        size: tuple[int, int],
-        selected: tuple[int, int],
-    ) -> None:
-        """Draw joint marks, ghost, marks and annotations, then all labels."""
-        self.names_left_out, drawn = (0, 0), []
-        if has_joint_marks(options):
-            from viewer.rendering.overlay.joint_annotation import joint_annotation
-
-            joints = joint_annotation(scene.actors, options, size, selected)
-            if joints is not None:
-                self.late.annotation_pass.draw(joints, view, size)
-                drawn.append(joints)
-        if self.ghost is not None:
-            self.late.ghost_pass.draw(self.ghost, view, options)
-        over = [*self._marked(), *self.annotations]
-        for annotation in over:
-            self.late.annotation_pass.draw(annotation, view, size)
-        if drawn or over:
-            left_out = self.late.annotation_pass.write([*drawn, *over], view, size)
-            self.names_left_out = left_out[0] if drawn else (0, 0)
-
-    def _marked(self) -> list[Annotation]:
-        """Return the marks as annotations."""
-        if self.marks is None:
-            return []
-        from viewer.rendering.overlay.marks import mark_annotation
-
-        return [mark_annotation(self.marks)]
 
     def _draw_motion_paths(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]

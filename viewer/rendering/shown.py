@@ -125,7 +125,7 @@ def update_skeletons(
         pose = actor.pose
         if pose is None or not shows_skeleton(actor, options):
             continue
-        if not buffers.skeleton(actor).is_current(pose):
+        if not buffers.skeleton(actor).is_current(pose, options):
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
@@ -136,7 +136,7 @@ def update_skeletons(
         assert skeleton is not None  # guaranteed by shows_skeleton
         posed_worlds(skeleton, poses)  # batched; each pose caches its result
         for actor, pose in group:
-            buffers.skeleton(actor).update(pose)
+            buffers.skeleton(actor).update(pose, options)
 
 
 def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:

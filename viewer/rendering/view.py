@@ -62,14 +62,15 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
     """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program uses."""
     pair = (lights.key, lights.rim)
+    sky, ground = np.array(lights.sky), np.array(lights.ground)
     directions = [_direction(light, lights.follow_camera, view) for light in pair]
     colors = [[light.strength * channel for channel in light.color] for light in pair]
     values = {
         "u_light_directions": np.array(directions, dtype="f4").tobytes(),
         "u_light_colors": np.array(colors, dtype="f4").tobytes(),
         "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)]),
-        "u_sky": tuple(lights.ambient * channel for channel in lights.sky),
-        "u_ground": tuple(lights.ambient * channel for channel in lights.ground),
+        "u_ambient": tuple(0.5 * lights.ambient * (sky + ground)),
+        "u_ambient_growth": tuple(0.5 * lights.ambient * (sky - ground)),
         "u_specular": lights.specular,
         "u_shininess": max(lights.shininess, 1.0),
         "u_to_studio": as_uniform(_studio_axes(view, lights.follow_camera)),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from viewer.rendering.passes.keypoint_pass import KeypointPass
     from viewer.rendering.passes.legend_pass import LegendPass
     from viewer.rendering.passes.motion_path_pass import MotionPathPass
+    from viewer.rendering.passes.outline_pass import OutlinePass
     from viewer.rendering.passes.point_pass import PointPass
     from viewer.rendering.picking import PickPass
 
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
         | BackdropPass
         | Studio
         | Matcaps
+        | OutlinePass
     )
 
 __all__ = ["LatePasses"]
@@ -162,6 +164,16 @@ class LatePasses:
             self.matcaps.use(options.matcap)
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):
             self.studio.use()
+
+    @cached_property
+    def outline_pass(self) -> OutlinePass:
+        """Draws outlines of what is selected or hovered."""
+        from viewer.rendering.passes.outline_pass import OutlinePass, OutlineTools
+
+        tools = OutlineTools(self._programs, self._mesh_pass, self.point_pass, self._buffers)
+        outlines = OutlinePass(self._context, tools)
+        self._made.append(outlines)
+        return outlines
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
         """Return the sum of passes of a picture of this size."""
