@@ -111,6 +111,8 @@ def _lost(figure: Figure, pose: Pose) -> list[str]:
         lost.append(f"{figure.n_shapes} blend shapes (the current shape is kept)")
     if figure.correctives is not None:
         lost.append("pose correctives")
+    if figure.mesh is not None and not all(one.is_plain for one in figure.mesh.materials):
+        lost.append("materials beyond one picture each")
     if figure.up != "y":
         lost.append(f"the up axis {figure.up}")
     extras = {
