@@ -22,6 +22,7 @@ NAMES = [
     "lint",
     "transfer",
     "video",
+    "quality",
 ]
 
 ROOT = Path(__file__).resolve().parents[2]

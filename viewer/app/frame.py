@@ -27,6 +27,7 @@ from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
+from viewer.app.pace import Pace, Step
 from viewer.app.palette.palette_window import draw_palette
 from viewer.app.picture_key import PictureKeys
 from viewer.app.posing.gizmo_drawing import draw_gizmo
@@ -45,8 +46,10 @@ from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
 from viewer.phrases import printable
+from viewer.rendering.gpu.context import is_software
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
+from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes
 from viewer.rig.scene import Actor, Scene
 
@@ -84,6 +87,8 @@ class Frame:
         self.target: Target | None = None
         self._drawn: object = None
         self._keys = PictureKeys()
+        self.pace = Pace()
+        self._is_software = is_software(context)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
@@ -199,9 +204,11 @@ class Frame:
         renderer.outlines = outlined_parts(state)
         drawn_over = renderer.marks, renderer.ghost, renderer.annotations, renderer.outlines
         key = self._keys.key(state, size, *drawn_over)
-        if key != self._drawn:
-            self._drawn = key  # even if drawing fails: it is retried only after a change
-            self._draw_target(size)
+        self._drawn = key
+        # Even if drawing fails, it is retried only after a change.
+        step = self.pace.step(key, state.options, time.perf_counter())
+        if step is not None:
+            self._draw_target(size, step)
         if self.target is not None:
             picture = imgui.ImTextureRef(self.target.texture.glo)
             corner = (x + size[0] / scale, y + size[1] / scale)
@@ -216,16 +223,26 @@ class Frame:
                 draw_hints(state)
                 draw_axis_gizmo(state)
 
-    def _draw_target(self, size: tuple[int, int]) -> None:
+    def _draw_target(self, size: tuple[int, int], step: Step) -> None:
         """Draw the scene; if the driver fails, show a message and keep the window open."""
-        state = self.state
+        state, started = self.state, time.perf_counter()
         try:
             target = self._target(size)
             selected = (state.chosen_actor, state.selected_joint)
             self.renderer.draw(
-                state.scene, state.camera, state.options, target, state.box, selected
+                state.scene,
+                state.camera,
+                step.options,
+                target,
+                state.box,
+                selected,
+                step.passes,
+                step.strength,
             )
             target.resolve()
+            if self._is_software:
+                self.context.finish()
+                self.pace.measured(step, time.perf_counter() - started)
             state.stats.samples = target.samples
             state.stats.scalar_range = self.renderer.scalar_range
             state.stats.scalar_ends = self.renderer.scalars.ends
@@ -362,11 +379,11 @@ class Frame:
         """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
-        if self.renderer.outlines:
-            # Those of the window are no part of the scene.
-            self.renderer.outlines = ()
-            self._draw_target(self.target.size)
-            self._drawn = None
+        if self.renderer.outlines or self.pace.is_unfinished:
+            # Outlines of the window are not part of the scene, and a picture gets all its passes.
+            self.renderer.outlines, options = (), self.state.options
+            self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))
+            self.pace.restart()
         return self.target.read()
 
     def release(self) -> None:

@@ -228,14 +228,16 @@ class _Window:
         state = self.state
         # Threads are polled at intervals only, because drawing frames would slow them down.
         steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
-        if is_settling or state.clock.playing or steps:
+        # A picture that is not finished gets better in every frame.
+        improves = self.frame.pace.is_unfinished
+        if is_settling or state.clock.playing or steps or improves:
             glfw.poll_events()
         else:
             moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Redraw for messages that time out, progress bars and blinking text cursors.
             self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
-        self._is_dirty |= state.clock.playing or state.job is not None or steps
+        self._is_dirty |= state.clock.playing or state.job is not None or steps or improves
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:

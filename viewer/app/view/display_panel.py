@@ -19,8 +19,8 @@ from viewer.app.view.display_actions import show
 from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
 from viewer.phrases import printable
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BONES, OPACITIES, SHOWN
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.options import BONES, MATCAPS, OPACITIES, QUALITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
 from viewer.rendering.passes.bone_style import skeleton_opacity
 from viewer.rendering.passes.ground_pass import grid_step, parse_color
@@ -28,7 +28,13 @@ from viewer.rig.annotations import BodyParts
 
 __all__ = ["draw"]
 
-_BACKGROUNDS = {"gradient": "Gradient", "transparent": "Transparent", "#": "Colour"}
+_BACKGROUNDS = {
+    "gradient": "Gradient",
+    "white": "White",
+    "environment": "Studio",
+    "transparent": "Transparent",
+    "#": "Colour",
+}
 
 
 def draw(state: AppState) -> None:
@@ -52,9 +58,10 @@ def draw(state: AppState) -> None:
         _draw_opacity(state)
     imgui.separator()
     before = options.shading
-    options.shading = choice(state, "Shading", before, SHADING)
+    options.shading = choice(state, "Shading", before, SHADING_CHOICES)
     if options.shading == "scalar" != before:
         start_heat_map(state)
+    _draw_surface(state)
     _draw_extras(state)
     why = no_mesh(state)
     options.flat = checkbox(state, "Flat", options.flat, why)
@@ -69,9 +76,25 @@ def draw(state: AppState) -> None:
     _draw_background(state)
     imgui.separator()
     _draw_joint_toggles(state)
+    imgui.separator()
+    options.quality = choice(state, "Quality", options.quality, QUALITIES)
+    if options.quality != "draft":
+        options.shadows = checkbox(state, "Shadows", options.shadows)
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_surface(state: AppState) -> None:
+    """Draw what the chosen shading asks for: a matcap, or the surface of plain materials."""
+    options = state.options
+    if options.shading == "matcap":
+        options.matcap = choice(state, "Matcap", options.matcap, MATCAPS)
+    if options.shading == "pbr":
+        for name in ("metallic", "roughness"):
+            value = slider(state, name.capitalize(), getattr(options, name), 0.0, 1.0, flags=_CLAMP)
+            setattr(options, name, value)
+            explain("Of materials that do not state it")
 
 
 def _draw_bones(state: AppState, why: str) -> None:
