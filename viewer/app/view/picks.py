@@ -177,9 +177,10 @@ def _pick(
 
 def take_pick(state: AppState, found: Pick, aims: bool) -> None:
     """Choose the actor and joint that were clicked; a double click aims the camera there."""
-    if found.actor != state.chosen_actor or not state.is_actor_selected:
-        state.choose_actor(found.actor)
+    if found.actor != state.chosen_actor:
+        state.select_actor(found.actor)
         state.say_status(printable(state.actor.name, 60))
+    state.is_actor_selected = True
     if found.joint >= 0:
         select_joint(state, found.joint)
     if aims:
