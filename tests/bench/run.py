@@ -17,6 +17,7 @@ NAMES = [
     "motion",
     "read",
     "captures",
+    "observing",
     "losses",
     "lint",
     "transfer",
