@@ -113,11 +113,11 @@ def test_lost_display_leaves_no_half_written_recording(server, tmp_path):
 
 
 @pytest.mark.parametrize("step", ["create_window", "make_context_current", "swap_interval"])
-def test_display_lost_at_start_is_told_alike(server, tmp_path, step):
+def test_display_lost_at_start_gives_the_same_message(server, tmp_path, step):
     check_end(ended(server, tmp_path, step, START), server[1])
 
 
-def test_handler_of_others_comes_back():
+def test_previous_handler_is_restored():
     """Run in a process of its own, as Xlib has one handler for all."""
     program = (
         "import ctypes\n"

@@ -98,7 +98,7 @@ def _slide(hand):
 
 
 @pytest.mark.parametrize("move", [_orbit, _zoom, _pan, _slide])
-def test_fit_is_over_when_somebody_moves_the_camera(wide, move):
+def test_moving_the_camera_ends_the_fit(wide, move):
     move(wide)
     camera = wide.state.camera.copy()
     wide.key("tab")
@@ -170,7 +170,7 @@ def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_
     assert hand.state.camera.front == 180
 
 
-def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
+def test_whole_motion_is_framed_as_in_a_recording(drive, rig):
     scene = people(rig, [True] * 40)
     hand = drive(scene=scene, size=(1200, 700), samples=1)
     hand.state.framing.restart()
@@ -194,7 +194,7 @@ def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
     assert hand.state.camera.distance == camera.distance
 
 
-def test_fit_keeps_up_with_a_capture_that_is_read(streaming):
+def test_fit_keeps_up_with_a_loading_capture(streaming):
     streaming.start(capture(100, 5, 3))
     finish(streaming)
     streaming.step(40)
@@ -209,7 +209,7 @@ def test_fit_keeps_up_with_a_capture_that_is_read(streaming):
     assert is_fitted(streaming, points)
 
 
-def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
+def test_fit_keeps_a_camera_moved_while_a_capture_loads(streaming):
     streaming.start(capture(100, 5, 3))
     _zoom(streaming)
     camera = streaming.state.camera.copy()
@@ -221,7 +221,7 @@ def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
 
 
 @pytest.mark.parametrize("edit", ["key", "offset and key", "undo"])
-def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
+def test_views_fit_the_edited_motion(drive, rig, tmp_path, edit):
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=(1200, 700), samples=1)
     hand.state.framing.restart()
@@ -246,7 +246,7 @@ def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
         assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
 
 
-def test_tools_cover_nothing_that_is_fitted(drive, tmp_path):
+def test_toolbar_does_not_cover_the_fitted_view(drive, tmp_path):
     hand = drive(sided_skel(tmp_path / "tall.skel", "+z", 3.0), size=(1200, 700), samples=1)
     points = scene_points(hand.state.scene)
     fit(hand.state.camera, points, hand.state.aspect)
@@ -263,7 +263,7 @@ def _is_covered(hand, points):
     return ((seen[:, 0] > x0) & (seen[:, 1] < y1)).any()
 
 
-def test_ground_stays_under_the_feet_of_another_shape(box):
+def test_ground_stays_under_the_feet_when_the_shape_changes(box):
     box.state.framing.restart()
     box.step(2)
     camera = box.state.camera.copy()
@@ -292,7 +292,7 @@ def test_ground_does_not_follow_poses(box):
     assert box.state.box[0, 1] == pytest.approx(-taller / 2)
 
 
-def test_picture_is_drawn_anew_when_the_ground_moves(box):
+def test_view_is_redrawn_when_the_ground_moves(box):
     box.step(2)
     before = box.scene_picture()
     box.state.actor.pose.shape_weights[0] = 3.0
@@ -320,7 +320,7 @@ def test_ground_of_a_moving_figure_follows_its_shape(box):
     assert box.state.camera.distance == camera.distance
 
 
-def test_another_figure_in_place_of_one_is_looked_at_as_it_is(box, rig):
+def test_scene_box_follows_a_replaced_figure(box, rig):
     box.step(2)
     other = viewer.load(*rig).actors[0]
     box.state.actor.figure, box.state.actor.pose = other.figure, other.pose

@@ -58,13 +58,13 @@ PICTURES = {"gizmo_rotate": _rotate, "gizmo_turning": _turning, "gizmo_moving": 
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", PICTURES)
-def test_handles_look_as_they_did(drive, name):
+def test_handles_match_golden_images(drive, name):
     hand = PICTURES[name](drive)
     hand.state.messages.notes.clear()
     _compare(hand.screen(), name)
 
 
-def test_comparison_sees_the_handles(drive):
+def test_comparison_detects_missing_handles(drive):
     hand = _rotate(drive)
     with_rings = hand.screen()
     hand.key("q")

@@ -87,11 +87,11 @@ def test_timeline_and_status_show_no_minus_before_a_zero(drive, rig, tmp_path, t
     assert hand.says("0.000 s") and not hand.says("-0.000")
 
 
-def test_shift_of_a_joint_has_no_negative_zero():
+def test_joint_translation_shows_no_negative_zero():
     assert _shift_text("root", np.array([-0.0, 0.25, -1.0])) == "root   +0 +0.25 -1"
 
 
-def test_own_numbers_have_no_negative_zero(box, texts):
+def test_raw_pose_values_have_no_negative_zero(box, texts):
     box.click("Rotation vectors")
     box.state.actor.pose.dofs[:] = -1e-9
     texts.clear()

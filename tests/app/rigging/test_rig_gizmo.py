@@ -62,7 +62,7 @@ def unit_way(hand, axis):
     return np.array(frame.place(point + axis)) - place
 
 
-def test_template_begins_box_on_box(hand):
+def test_template_starts_with_aligned_bounding_boxes(hand):
     hand.click("rig tool move")
     start = similarity(hand)
     boxes = [
@@ -127,7 +127,7 @@ def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
     assert (similarity(hand).factors == 1.0).all()
 
 
-def test_drag_is_one_step_of_undoing_with_its_error(hand):
+def test_drag_is_one_undo_step_including_its_error(hand):
     hand.click("rig tool move")
     before, steps = similarity(hand), hand.undo_steps
     pull_along_x(hand, 2.5)
@@ -152,7 +152,7 @@ def test_drag_is_one_step_of_undoing_with_its_error(hand):
     assert hand.state.job is None and hand.undo_steps == steps + 1
 
 
-def test_moved_template_keeps_its_fitted_pose_and_not_the_gap_it_left(hand):
+def test_moved_template_keeps_its_fitted_pose_but_not_its_residual(hand):
     hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2  # the target's tip is bent more
     hand.step(2)
     hand.click("Align")
@@ -216,7 +216,7 @@ def test_ring_scales_the_template_as_a_whole(hand):
     assert hand.state.camera.azimuth == camera
 
 
-def test_view_beside_the_gizmo_still_orbits(hand):
+def test_drag_outside_the_gizmo_still_orbits(hand):
     hand.click("rig tool move")
     azimuth = hand.state.camera.azimuth
     x, y, width, height = hand.state.view_rect
@@ -224,7 +224,7 @@ def test_view_beside_the_gizmo_still_orbits(hand):
     assert hand.state.camera.azimuth != azimuth
 
 
-def test_numbers_place_the_template(hand):
+def test_typed_values_place_the_template(hand):
     hand.click("rig tool move")
     x0, y0, x1, y1 = hand.state.item_rects["Translation"]
     hand.enter_value("Scale factor", "30")
@@ -241,7 +241,7 @@ def test_numbers_place_the_template(hand):
     assert x1 > x0
 
 
-def test_refining_finds_the_place_from_near_by(hand):
+def test_refining_converges_from_nearby(hand):
     near = TRUE.copy()
     near[:3, 3] += 1.0
     template = current_template(hand.state)
@@ -253,7 +253,7 @@ def test_refining_finds_the_place_from_near_by(hand):
     assert hand.state.of(Rigging).placing.alignment.how == "landmarks"
 
 
-def test_run_keeps_what_was_placed_by_hand(hand):
+def test_run_keeps_the_manual_alignment(hand):
     template = current_template(hand.state)
     move_by_hand(hand.state, template, as_similarity(TRUE))
     hand.step(2)
@@ -330,7 +330,7 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
     assert state.of(Rigging).landmarks == []
 
 
-def test_clicks_beside_the_meshes_and_escape(hand):
+def test_clicks_outside_the_meshes_and_escape_add_no_landmark(hand):
     hand.click("rig tool landmarks")
     x, y, _, height = hand.state.view_rect
     hand.click((x + 5, y + height - 5))
@@ -349,7 +349,7 @@ def test_clicks_beside_the_meshes_and_escape(hand):
     assert hand.state.of(Rigging).tool == ""
 
 
-def test_matrices_become_similarities():
+def test_matrices_are_projected_to_similarities():
     turned = rig_scene.ROTATION
     matrix = translation_matrix(np.array([1.0, 2.0, 3.0]))
     matrix[:3, :3] = 2.0 * turned + 1e-5

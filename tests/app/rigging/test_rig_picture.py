@@ -29,7 +29,7 @@ def _result(hand):
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
-def test_rig_panel_looks_as_it_did(drive, name, prepare):
+def test_rig_panel_matches_golden_image(drive, name, prepare):
     hand = drive(scene=rig_scene.scene(), size=SIZE, samples=1)
     hand.state.of(ShownPanels).closed.add("stats")  # times are others every time
     hand.menu("menu Window", "Rig")

@@ -60,7 +60,7 @@ def test_selected_joint_with_influence_stays(tipped):
     assert tipped.state.selected_joint == 0 and shown(tipped) == (0.0, 1.0)
 
 
-def test_selected_joint_without_influence_gives_way_with_a_word(tipped):
+def test_selected_joint_without_influence_is_replaced_with_a_note(tipped):
     tipped.state.selected_joint = 2
     toggle_weights(tipped.state)
     assert tipped.state.selected_joint == 1 and shown(tipped) == (0.0, 1.0)
@@ -69,7 +69,7 @@ def test_selected_joint_without_influence_gives_way_with_a_word(tipped):
     assert shown(tipped) == (0.0, 0.0)
 
 
-def test_view_that_was_chosen_stays(tipped):
+def test_chosen_view_is_kept(tipped):
     tipped.state.options.scalar = "entropy"
     start_heat_map(tipped.state)
     assert tipped.state.options.scalar == "entropy" and tipped.state.selected_joint == -1
