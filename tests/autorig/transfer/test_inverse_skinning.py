@@ -34,7 +34,7 @@ def skinned(positions, skin, matrices):
     return np.array(moved)
 
 
-def test_skinned_mesh_comes_back():
+def test_skinned_mesh_is_unposed_exactly():
     figure = arm()
     matrices = palette(1.2)
     posed = skinned(figure.mesh.positions, figure.skin, matrices)
@@ -52,7 +52,7 @@ def test_half_and_half_is_singular_beyond_157_degrees(degrees, guarded):
     assert np.abs(found.positions).max() < 10.0
 
 
-def test_guarded_vertex_is_turned_back_by_the_nearest_rotation():
+def test_guarded_vertex_is_unposed_with_the_nearest_rotation():
     # The blend of none and 160 degrees about z is cos(80) of a turn by 80.
     angle = np.radians(160.0)
     skin = skin_from_lists([[(0, 0.5), (1, 0.5)]], np.tile(np.eye(4), (2, 1, 1)))
@@ -70,7 +70,7 @@ def test_vertex_without_influence_stays():
     assert not found.guarded.any()
 
 
-def test_mending_moves_only_the_surroundings_and_brings_the_pose_nearer():
+def test_repair_moves_only_the_neighbourhood_and_improves_the_pose():
     figure = arm()
     matrices = palette(np.radians(170.0))
     posed = skinned(figure.mesh.positions, figure.skin, matrices)
@@ -88,7 +88,7 @@ def test_mending_moves_only_the_surroundings_and_brings_the_pose_nearer():
     assert after < 0.5 * before
 
 
-def test_nothing_is_mended_where_nothing_is_singular():
+def test_nothing_is_repaired_without_singular_vertices():
     figure = arm()
     matrices = palette(0.3)
     posed = skinned(figure.mesh.positions, figure.skin, matrices)
