@@ -73,7 +73,7 @@ def test_standing_people_stand_in_gltf(recording, tmp_path):
     assert gltf.nodes[gltf.top(gltf.named("head"))]["name"] == "z up"
 
 
-def test_other_files_say_what_is_up(recording, tmp_path):
+def test_other_formats_record_the_up_axis(recording, tmp_path):
     convert(recording, tmp_path / "pose.obj")
     assert ": z up, metres\n" in (tmp_path / "pose.obj").read_text().partition("v ")[0]
     convert(recording, tmp_path / "pose.npz")

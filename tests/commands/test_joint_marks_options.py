@@ -30,13 +30,13 @@ def render(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("option", ["--xray", "--joint-names", "--joint-axes"])
-def test_option_changes_the_picture(render, rig, option):
+def test_option_changes_the_image(render, rig, option):
     plain, _ = render(*rig)
     marked, said = render(*rig, option)
     assert (plain != marked).any() and said == ""
 
 
-def test_names_left_out_are_told(render, tmp_path):
+def test_omitted_names_are_reported(render, tmp_path):
     path = tmp_path / "heap.skel"
     path.write_text("balljoint a { " + "balljoint b { } " * 4 + "}")
     _, said = render(str(path), "--joint-names")
@@ -44,7 +44,7 @@ def test_names_left_out_are_told(render, tmp_path):
     assert said.endswith("warning: 1 of 5 joint names omitted: they would cover another\n")
 
 
-def test_what_no_figure_has_is_told(render, rig):
+def test_missing_joints_are_reported(render, rig):
     _, said = render(rig[1], "--xray", "--joint-names")
     assert "warning: --xray: no figure has a skeleton\n" in said
     assert "warning: --joint-names: no figure has a skeleton\n" in said
