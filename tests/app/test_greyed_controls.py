@@ -19,7 +19,7 @@ NOTHING_MOVES = "no motion: open a clip, a capture or a BVH"
 
 @pytest.fixture
 def tooltips(monkeypatch):
-    """What tooltips said."""
+    """Tooltip texts."""
     said = []
 
     def record(text):
@@ -30,7 +30,7 @@ def tooltips(monkeypatch):
 
 
 def rest(hand, label):
-    """Let the mouse rest on a widget until its tooltip comes."""
+    """Rest the mouse on a widget until its tooltip appears."""
     hand.move(hand.place(label))
     hand.step(40)
 
@@ -76,7 +76,7 @@ def test_gaps_can_be_filled_if_present(drive, rig):
 def test_filling_gaps_is_greyed_without_gaps(drive, rig, tooltips):
     scene = people(rig, [True] * 9)
     clip = scene.actors[0].clip
-    # Nobody is missing before the first and after the last frame either.
+    # Nobody is missing before the first or after the last frame either.
     scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")

@@ -1,4 +1,4 @@
-"""The keyboard: every row of KEYS does what it says, and undo takes it back."""
+"""Shortcuts: every row of KEYS has its described effect, and undo reverts it."""
 
 from __future__ import annotations
 

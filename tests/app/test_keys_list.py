@@ -1,4 +1,4 @@
-"""The list of keys: whole in columns of letters of usual size, scrolled where there is no room."""
+"""The shortcut list: complete columns at the usual text size, scrolled if they do not fit."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_wheel_scrolls_if_the_list_does_not_fit(drive, rig):
     window = listed(hand)
     assert window.pos.y >= 0 and window.pos.y + window.size.y <= 300
     line = imgui.get_text_line_height_with_spacing()
-    # Its height is that of all lines, less what is seen.
+    # The scroll range is the height of all lines minus the visible part.
     assert window.scroll_max.y == pytest.approx(N_LINES * line - window.size.y, abs=3 * line)
     distance = hand.state.camera.distance
     for _ in range(40):

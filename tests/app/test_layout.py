@@ -1,4 +1,4 @@
-"""Panels, sizes and scales: what is closed comes back, and clicks hit at every scale."""
+"""Panels, sizes and scales: closed panels reopen, and clicks hit at every scale."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_panel_closes_by_its_cross(hand):
 
 def test_all_panels_closed_leave_the_view(hand):
     for panel in PANELS.values():
-        if not panel.needs and not panel.on_demand:  # the others are not there
+        if not panel.needs and not panel.on_demand:  # the others are closed
             hand.menu("menu Window", panel.title)
     hand.step(3)
     x, _y, width, height = hand.state.view_rect

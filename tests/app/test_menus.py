@@ -1,4 +1,4 @@
-"""The menus: the bundled body, models of a remembered folder, and what edits a pose."""
+"""The menus: the bundled body, models in a remembered folder, and pose editing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.models import load_model_folder, save_model_folder
 
 @pytest.fixture
 def models(tmp_path):
-    """A folder with three models and something else, as people unpack them."""
+    """A folder with three models and other files, as unpacked from their archives."""
     folder = tmp_path / "body models"
     (folder / "smplx").mkdir(parents=True)
     np.savez(folder / "SMPL_NEUTRAL.npz", **model("smpl"))

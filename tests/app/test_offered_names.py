@@ -14,7 +14,7 @@ from viewer.app.recording.state import KINDS, RecordSettings
 
 @pytest.fixture
 def recorded(drive, tmp_path):
-    """A hand on a recording of two people, drawn with the bundled body."""
+    """A test driver on a recording of two people, drawn with the bundled body."""
     folder = write_frames(tmp_path / "seq_smpl" / "smpl", {0: [body(0), body(7)], 1: [body(0)]})
     return drive(folder, samples=1, size=(1000, 700))
 

@@ -1,6 +1,6 @@
-"""Golden pictures of the interface, compared coarsely: letters differ between machines.
+"""Golden images of the interface, compared coarsely: letters differ between machines.
 
-``make golden NAME…`` draws them anew; look at them before they are committed.
+``make golden NAME…`` re-renders them; review them before committing.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def test_interface_matches_golden_images(drive, rig, name):
 def test_body_panels_match_golden_images(drive_body, name):
     kind, prepare = BODIES[name]
     hand = drive_body(kind, size=BODY_SIZE)
-    hand.state.of(ShownPanels).closed.add("stats")  # its times are others every time
+    hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
 

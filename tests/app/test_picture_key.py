@@ -1,4 +1,4 @@
-"""The key of the picture: every change of what is drawn changes it, and nothing else does."""
+"""The cache key of the view: every visible change changes it, and nothing else does."""
 
 from __future__ import annotations
 

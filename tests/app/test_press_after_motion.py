@@ -1,6 +1,6 @@
-"""A pointer that moves and presses between two frames: the way to the press is no drag.
+"""Pointer motion and press between two frames: the motion before the press is not a drag.
 
-Remote desktops, tablets and slow machines hand over both at once.
+Remote desktops, tablets and slow machines deliver both at once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from viewer.app.posing.state import Posing
 
 @pytest.fixture(params=[True, False], ids=["trickled", "at once"])
 def spread(request):
-    """Whether ImGui spreads quick input over several frames; to be set in a hand's own io."""
+    """Whether ImGui spreads quick input over several frames; set in the io of a test driver."""
     return request.param
 
 
@@ -117,7 +117,7 @@ def test_joint_handle_rotates_from_the_press(hand, spread):
 
 
 def _ring(hand):
-    """Return a place on a ring of the tool Rotate."""
+    """Return a position on a ring of the Rotate tool."""
     frame = view_frame(hand.state)
     center = joint_seen(hand, hand.state.selected_joint)
     places = around(center, RADIUS, 0.0, 2.0 * np.pi, 36)

@@ -15,7 +15,7 @@ CTRL = 2
 
 @pytest.fixture
 def type_at_once(hand):
-    """A function that sends what a keyboard sends for a text, all of it between two frames."""
+    """A function that sends all key events of a text between two frames."""
     keys = TypedKeys()
 
     def send(letter, action, modifiers=0):

@@ -1,4 +1,4 @@
-"""The scene's clock: what time is shown after so much wall clock time, in every mode."""
+"""The scene clock: scene time as a function of wall-clock time in every mode."""
 
 from __future__ import annotations
 

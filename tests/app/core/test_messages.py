@@ -1,4 +1,4 @@
-"""What was said is kept, counted and bounded; the window that lists it; its place in the view."""
+"""The message log (kept, counted, bounded), its window, and message positions in the view."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_keys_act_while_the_window_is_open(hand):
     ("heights", "room", "count"),
     [
         ([10, 10, 10], 30, 3),
-        ([10, 10, 10], 29, 1),  # one, and the line that tells of the other two
+        ([10, 10, 10], 29, 1),  # one, and the line that counts the other two
         ([10, 10, 10], 19, 0),
         ([10] * 20, 1000, 8),
         ([10] * 8, 1000, 8),
@@ -211,7 +211,7 @@ def test_interface_image_shows_warnings_however_long_rendering_takes(drive, rig,
     scene.diagnostics = (Diagnostic("M007.computed", Path("tiny.skin"), values=values),)
     hand = drive(scene=scene, samples=1)
     for note in hand.state.messages.notes:
-        note.until = 1e11  # as if it had been said just before the next line
+        note.until = 1e11  # as if shown just before the next line
     plain = hand.app.picture()
     monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
     late = hand.app.picture()

@@ -1,4 +1,4 @@
-"""The state of the window: its core, and what features keep in it."""
+"""Window state: the core and the state of features."""
 
 from __future__ import annotations
 

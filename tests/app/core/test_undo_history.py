@@ -1,4 +1,4 @@
-"""Changes that the history notices, and what undo brings back."""
+"""Changes detected by the undo history, and what undo restores."""
 
 from __future__ import annotations
 

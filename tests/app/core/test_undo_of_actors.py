@@ -1,4 +1,4 @@
-"""Undoing brings back who was there, not only how they were posed."""
+"""Undo restores the set of actors, not only their poses."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_poses_of_removed_actors_are_restored_with_them(hand):
     hand.step(2)
     state.scene.actors[0] = Actor(first.figure)
     hand.step(2)
-    first.pose.dofs[dof] = -3.0  # nobody sees it
+    first.pose.dofs[dof] = -3.0  # invisible
     hand.key("z", "ctrl")
     assert state.actor is first and first.pose.dofs[dof] == 0.7
     hand.key("z", "ctrl")

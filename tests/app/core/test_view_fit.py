@@ -1,4 +1,4 @@
-"""The camera fits the free view until somebody moves it; the ground follows shapes."""
+"""The camera fits the free view until the user moves it; the ground follows shapes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROOM = 1.08  # around a fitted figure
 
 
 def reach(hand, points=None):
-    """Return how far points come to the edges of the view: 1 is at an edge, across and up."""
+    """Return the extent of points relative to the view, across and up: 1 is at an edge."""
     points = scene_points(hand.state.scene) if points is None else points
     x, y, width, height = hand.state.view_rect
     seen = view_frame(hand.state).project(points) - (x + width / 2, y + height / 2)
@@ -41,14 +41,14 @@ def is_fitted(hand, points=None):
 
 
 def resize(hand, width, height):
-    """Let the window have another size; the framebuffer of the tests is large enough."""
+    """Resize the window; the framebuffer of the tests is large enough."""
     hand.io.display_size = (width, height)
     hand.step(4)
 
 
 @pytest.fixture
 def wide(drive, tmp_path):
-    """A hand on a bar ten times as wide as high, just opened in a window."""
+    """A test driver on a bar ten times as wide as high, just opened in a window."""
     hand = drive(bar(tmp_path / "bar.obj"), size=(1200, 700), samples=1)
     hand.state.framing.restart()
     hand.step(2)
@@ -148,7 +148,7 @@ def test_second_file_is_fitted_and_seen_from_its_front(wide, tmp_path):
     wide.open(sided_skel(tmp_path / "turned.skel", "-z"))
     wide.step(3)
     assert wide.state.camera.front == 180
-    assert wide.state.camera.azimuth == pytest.approx(-160)  # 20 degrees from ahead, as before
+    assert wide.state.camera.azimuth == pytest.approx(-160)  # 20 degrees from the front, as before
     assert is_fitted(wide)
     resize(wide, 1000, 700)
     assert is_fitted(wide)
@@ -162,7 +162,7 @@ def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_
     hand.key("_3")
     assert hand.state.camera.azimuth == -90
     hand.pick("Front axis", 0)
-    assert hand.state.camera.front == 90  # +x is ahead now
+    assert hand.state.camera.front == 90  # +x is the front now
     assert abs(hand.state.camera.azimuth) == 180  # and its left hand is seen as before
     hand.key("_1")
     assert hand.state.camera.azimuth == 90
@@ -232,7 +232,7 @@ def test_views_fit_the_edited_motion(drive, rig, tmp_path, edit):
         hand.step(3)
     place_key(hand.state, (0, 1), value=20.0)  # root x, at its end
     hand.step(3)
-    assert hand.state.camera.distance == before  # the edit is to be seen
+    assert hand.state.camera.distance == before  # the edit must be visible
     if edit == "undo":
         hand.key("z", "ctrl")
         hand.step(3)
@@ -272,7 +272,7 @@ def test_ground_stays_under_the_feet_when_the_shape_changes(box):
     box.step(2)
     taller = box_body.HEIGHT * (1 + 3.0 * box_body.STATURE)
     assert box.state.box[:, 1] == pytest.approx([-taller / 2, taller / 2])
-    # The camera stays: that the figure grew is to be seen.
+    # The camera stays, so that the growth of the figure is visible.
     assert box.state.camera.distance == camera.distance
     box.state.actor.pose.shape_weights[0] = 0.0
     box.step(2)
@@ -301,7 +301,7 @@ def test_view_is_redrawn_when_the_ground_moves(box):
 
 
 def test_ground_of_a_moving_figure_follows_its_shape(box):
-    """The lowest frame is looked at first, the others after it."""
+    """The lowest frame is evaluated first, the others after it."""
     actor = box.state.actor
     count = actor.figure.skeleton.n_joints
     actor.clip = walk([True] * 20, count)

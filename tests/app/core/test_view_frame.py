@@ -1,4 +1,4 @@
-"""Scene to window and back, by pinholes worked out by hand."""
+"""Projection between scene and window, compared with hand-calculated pinholes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ RECT = (100.0, 50.0, 400.0, 200.0)
 
 
 def frame(**settings) -> ViewFrame:
-    """Return what a camera sees that looks along -z from (0, 0, 5)."""
+    """Return the view frame of a camera at (0, 0, 5) looking along -z."""
     camera = Camera(distance=5.0, azimuth=0.0, inclination=0.0, fov=90.0, **settings)
     return ViewFrame(camera.projection_matrix(2.0, BOX) @ camera.view_matrix(), RECT)
 
 
 def test_points_project_as_through_a_pinhole() -> None:
-    # At a right angle of view the upper edge is as high as the point is far away.
+    # With a 90 degree field of view the upper edge is as high as the point is far away.
     assert_allclose(frame().project(np.zeros(3)), [300, 150], atol=1e-9)
     assert_allclose(frame().project(np.array([0.0, 5.0, 0.0])), [300, 50], atol=1e-9)
     assert_allclose(frame().project(np.array([1.0, 0.0, 3.0])), [300 + 100 / 2, 150], atol=1e-9)

@@ -113,7 +113,7 @@ def test_long_motions_are_decimated_only_as_needed(low, high):
     assert len(times) <= 2000
     frames = np.round((times - 5.0) * rate).astype(int)
     assert_allclose(values, angles[frames], atol=1e-12)
-    # All that is looked at is there, from end to end.
+    # The visible range is covered from end to end.
     assert times[0] <= low and (times[-1] >= high or frames[-1] >= count - 1 - np.diff(frames)[0])
     # ... with every frame if they are few.
     if (high - low) * rate < 900:

@@ -175,7 +175,7 @@ def test_shortcuts_work_while_the_mouse_is_over_a_key_or_line(curves):
     assert_array_equal(_arm(curves).times, [0.0, 2.0])
     curves.state.clock.seek(1.3)
     curves.step(2)
-    curves.move(_at(curves, 1.3, 5.0))  # on the line of the present time
+    curves.move(_at(curves, 1.3, 5.0))  # on the line of the current time
     curves.key("insert")
     curves.step(2)
     assert _arm(curves).times == pytest.approx([0.0, 1.3, 2.0], abs=0.02)

@@ -1,4 +1,4 @@
-"""Undo and redo of key edits: time, curve and pose come back as one state."""
+"""Undo and redo of key edits restore time, curve and pose together."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def go(hand, time):
 
 
 def assert_follows_its_clip(hand, time):
-    """Check that the figure is posed as its clip says at a time, which is the one shown."""
+    """Check that the clock shows a time and the figure has the clip's pose at it."""
     actor = hand.state.actor
     assert hand.state.clock.time == time and hand.state.scene.time == time
     wanted = [float(evaluate(channel, np.array(time))) for channel in actor.clip.channels]
@@ -64,7 +64,7 @@ def test_undoing_a_key_edit_shows_the_restored_clip(curves, name, held, monkeypa
     state = curves.state
     old = state.actor.clip
     state.of(Curves).keys = frozenset({KEY})
-    # Extrapolation is seen outside of the keys alone.
+    # Extrapolation is visible only outside the keys.
     time = -0.25 if name == "extrapolation" else 0.75
     state.clock.mode = "run on"
     go(curves, time)
@@ -143,7 +143,7 @@ def test_manual_pose_is_restored_when_its_key_is_undone(curves):
     assert curves.undo_steps == 2 and curves.dofs()[row] == 0.3
     go(curves, 1.75)
     curves.key("z", "ctrl")
-    assert state.clock.time == 0.75 and curves.dofs()[row] == 0.3  # the hand's, not the clip's
+    assert state.clock.time == 0.75 and curves.dofs()[row] == 0.3  # the manual pose, not the clip's
     curves.key("z", "ctrl")
     assert_follows_its_clip(curves, 0.75)
     curves.key("y", "ctrl")
@@ -218,7 +218,7 @@ def test_undo_restores_captured_points_with_the_time(drive):
 
 
 def test_undo_restores_absence_with_the_time(drive, rig):
-    """Absence is set by the clock; undoing an edit goes to a time with everybody there or not."""
+    """The clock sets absence; undoing an edit may jump to a time with absent people."""
     hand = drive(scene=people(rig, [True, True, False, False, True]), size=SIZE, samples=1)
     state = hand.state
     go(hand, 0.2)
@@ -287,7 +287,7 @@ def test_undo_twice_before_the_next_frame(curves):
 
 
 def test_clip_files_are_loaded_into_the_undoable_state(drive, rig, tmp_path):
-    """Poses that were loaded beside a clip are no step of their own."""
+    """Poses loaded together with a clip are not a separate undo step."""
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(scene=viewer.load(*rig, tmp_path / "wave.anim"), size=SIZE, samples=1)
     hand.step(3)

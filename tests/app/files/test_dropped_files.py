@@ -1,4 +1,4 @@
-"""Poses and pictures dropped on an open figure, and folders dropped on the window."""
+"""Poses and images dropped on an open figure, and folders dropped on the window."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _picture(folder):
 
 @pytest.fixture
 def textured(drive_body, tmp_path):
-    """A hand on a body with texture coordinates, seen from elsewhere, one step in its history."""
+    """A driver on a body with texture coordinates, the camera moved, with one undo step."""
     hand = drive_body("smplx", size=(900, 640))
     hand.state.camera.azimuth, hand.state.camera.distance = 77.0, 9.0
     hand.drag("pelvis.y", 0.6)
@@ -48,7 +48,7 @@ def test_dropped_pose_and_texture_are_applied_to_the_open_figure(textured, tmp_p
     assert textured.dof("pelvis.y") == before[textured.dof_index("pelvis.y")]
     has_texture = bool(state.actor.figure.mesh.materials)
     assert has_texture is ("picture" in names)
-    # What is dropped together is one step, its texture too.
+    # Files dropped together are one undo step, including the texture.
     assert textured.undo_steps == 2
     textured.key("z", "ctrl")
     assert textured.dof("left_knee.x") == 0.0

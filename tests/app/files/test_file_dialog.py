@@ -1,4 +1,4 @@
-"""The file dialog: folders, several files, cancelling, and what cannot be read."""
+"""The file dialog: folders, several files, cancelling, and unreadable folders."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.app.files.state import Files
 
 @pytest.fixture
 def dialog(hand, tmp_path):
-    """A hand on an open dialog: rig, a folder with another rig, a text file, a hidden file."""
+    """A driver on an open dialog: rig, a folder with another rig, a text file, a hidden file."""
     inner = tmp_path / "inner"
     inner.mkdir()
     write_rig(inner, "inside")

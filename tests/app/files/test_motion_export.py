@@ -1,4 +1,4 @@
-"""Motions exported from the window: beside the frame loop, never over what is open."""
+"""Motion export from the window: in the background, never overwriting open files."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_keys_are_written_at_the_shown_frame_rate(moving, tmp_path):
 
 @pytest.fixture
 def crowd(drive, rig):
-    """A hand on three people of one capture: the third is there only at its end; and points."""
+    """A driver on three people of one capture: the third appears only at its end; and points."""
     there = np.ones(21, dtype=bool)
     late = np.arange(21) >= 15
     scene = people(rig, there, there, late)
@@ -165,7 +165,7 @@ def test_file_names_derived_from_one_name(crowd, tmp_path):
 
 @pytest.fixture
 def bodies(drive_body):
-    """A hand on two bodies of the SMPL family in one capture; the second misses a frame."""
+    """A test driver on two bodies of the SMPL family in one capture; the second misses a frame."""
     hand = drive_body("smpl", size=(1000, 700))
     figure = hand.state.actor.figure
     count = figure.skeleton.n_joints

@@ -1,4 +1,4 @@
-"""Opening files in the window: what stays, what is replaced, what is said."""
+"""Opening files in the window: what is kept and replaced, and messages."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
     loader._started -= 5.0
     hand.step(3)
     assert "Cancel opening" in hand.state.item_rects
-    hand.drag("arm.x", 0.9)  # the window still answers
+    hand.drag("arm.x", 0.9)  # the window still responds
     assert hand.dof("arm.x") != 0.2
     hand.click("Cancel opening")
     assert hand.state.of(Files).loader is None

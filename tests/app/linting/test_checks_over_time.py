@@ -94,7 +94,7 @@ def test_posing_during_a_check_does_not_affect_it(drive, monkeypatch):
 
 
 def hold_checks(monkeypatch):
-    """Let checks wait after their third step for an event; return it, what came after, and when."""
+    """Block checks after their third step until an event; return it, later steps and times."""
     import threading
 
     go, seen, is_held = threading.Event(), [], threading.Event()

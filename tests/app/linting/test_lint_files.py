@@ -1,4 +1,4 @@
-"""The Lint panel tells what ``viewer lint`` does: files are read again, and gaps lead before."""
+"""The Lint panel matches ``viewer lint``: files are read again; gaps jump to the frame before."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_a_file_only_finding_says_so_and_copies_its_location(lint, files, texts,
     hand = lint(*files)
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
-    # The second vertex stands in the third line, and the scene has it from before.
+    # The second vertex is on the third line; the scene was loaded before the change.
     files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 nan 0", 1))
     hand.click("Recheck")
     finish(hand)
@@ -155,7 +155,7 @@ def test_a_gap_jumps_to_the_frame_before_it(lint):
     assert playback.frame + playback.first_frame == 109
     assert view.finding.message == "3 of 60 frames are missing in 1 gap: frames 110 to 112"
     assert hand.state.actor.is_present
-    # Its root is marked, and all of it is seen.
+    # Its root is marked, and all of it is visible.
     assert view.marks.points.tolist() == [[7.0, 0.0, 0.0]]
     assert hand.state.camera.target == pytest.approx([7.0, 2.0, 0.0])
     assert hand.says("Last frame before the gap: the person is absent in the next frame")

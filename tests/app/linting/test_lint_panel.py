@@ -1,4 +1,4 @@
-"""The Lint panel: checks, its list, where a click leads, marks, and what makes findings stale."""
+"""The Lint panel: checks, the list, jumping to findings, marks, and stale findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The manual in the window: chosen in the menu, read, and closed."""
+"""The manual window: opened from the menu, read, and closed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The timeline's field "Frames per second": of captures, undoably, and what keys are counted by."""
+"""The field "Frames per second": undoable for captures, and used for counting keyed frames."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def keyed(seconds=4.0):
 
 @pytest.fixture
 def rising(drive, rig):
-    """A hand on a figure with keys over four seconds."""
+    """A test driver on a figure with keys over four seconds."""
     hand = drive(*rig, size=SIZE, samples=1)
     hand.state.actor.clip = keyed()
     hand.step(4)
@@ -36,7 +36,7 @@ def rising(drive, rig):
 
 @pytest.fixture
 def pair(drive, rig):
-    """A hand on two people of one capture: 31 frames, 10 a second; the second comes at 20."""
+    """Two people of one capture: 31 frames, 10 a second; the second appears at frame 20."""
     scene = people(rig, [True] * 31, [False] * 20 + [True] * 11)
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.step(2)

@@ -1,4 +1,4 @@
-"""Scrubbing goes by whole frames, with Alt between them, on the timeline and in the curves."""
+"""Scrubbing snaps to whole frames unless Alt is held, on the timeline and in the curves."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from viewer.app.core.clock import Clock
 
 @pytest.fixture
 def keyed(drive, rig, tmp_path):
-    """A hand on the tiny rig with a clip of keys from 0 to 2 s."""
+    """A test driver on the tiny rig with a clip of keys from 0 to 2 s."""
     (tmp_path / "wave.anim").write_text(clip_text())
     return drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
 
 
 def scrub(hand, share, held=""):
-    """Drag in the timeline from its middle to a share of its length; return where that is."""
+    """Drag in the timeline from its middle to a fraction of its length; return the end point."""
     x0, y0, x1, _ = hand.state.item_rects["Scrubber"]
     x = round(x0 + share * (x1 - x0))
     hand.pull(((x0 + x1) / 2, y0 + 5), (x, y0 + 5), held=held)

@@ -23,7 +23,7 @@ ARM = 0  # the DOF that the test's clip moves
 
 @pytest.fixture
 def moving(drive, rig):
-    """A hand on the tiny figure with a clip: its last DOF rises by 0.1 a second, from 0 to 0.4."""
+    """A driver on the tiny figure with a clip: its last DOF rises by 0.1 per s from 0 to 0.4."""
     hand = drive(*rig, size=(1280, 800))
     actor = hand.state.actor
     dof = int(np.flatnonzero(actor.figure.skeleton.dof_kinds >= 3)[0])
@@ -34,7 +34,7 @@ def moving(drive, rig):
     )
     actor.clip = Clip("rise", (channel,), 0.0, 4.0)
     hand.dof_row, hand.dof_start = dof, start
-    assert "Scrubber" not in hand.state.item_rects  # nothing moved so far
+    assert "Scrubber" not in hand.state.item_rects  # nothing has moved yet
     hand.step(3)
     hand.state.history.start(hand.state.scene, hand.state.options)
     return hand
@@ -142,7 +142,7 @@ def test_clip_change_is_undone(moving):
 
 
 def capture(n_frames, part, people, name="take"):
-    """A capture of boxes: person p is there from frame 10 p on; x is the frame's number."""
+    """A capture of boxes: person p is present from frame 10 p on; x is the frame's number."""
 
     def parts():
         for first in range(0, n_frames, part):

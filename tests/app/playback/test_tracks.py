@@ -1,4 +1,4 @@
-"""The timeline's tracks: nobody's presence is too short to be seen, and tracks have colours."""
+"""Timeline tracks: minimum bar width, ruler labels and track colours."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_single_frame_is_visible_and_tracks_have_their_actors_colour(drive, rig)
     scene.actors[1].color = decode_color((0.9, 0.1, 0.1))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     first = _row(hand, 0)
-    # The middle of the bar, where neither ruler nor present time are drawn.
+    # The middle of the bar, where neither ruler nor current time are drawn.
     assert np.abs(first - [51, 204, 102]).max(axis=1).min() <= 2
     second = _row(hand, 1)
     red = np.flatnonzero((second[:, 0] > 120) & (second[:, 1] < 70))

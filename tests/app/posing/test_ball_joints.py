@@ -1,4 +1,4 @@
-"""Ball joints of body models: rotation vectors, the file's own numbers, the figure's place."""
+"""Ball joints of body models: rotation vectors, raw pose values and placement."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def euler(x, y, z):
 
 
 def _rotation(hand, joint):
-    """Return what a joint's DOFs say; its other transforms are those of the file."""
+    """Return a joint's rotation by its DOFs; its other transforms must be those of the file."""
     return euler(*(hand.dof(f"{joint}.{axis}") for axis in "xyz"))
 
 
@@ -42,7 +42,7 @@ def _enter_vector(hand, joint, *degrees):
 
 @pytest.fixture
 def vectors(box):
-    """A hand on the box, its joints edited as rotation vectors."""
+    """A test driver on the box, its joints edited as rotation vectors."""
     box.click("Rotation vectors")
     assert box.state.of(Posing).as_vectors
     return box
@@ -227,7 +227,7 @@ def test_m_swaps_left_and_right(vectors):
     vectors.enter_value("figure.tx", "0.5")
     before, steps = vectors.dofs(), vectors.undo_steps
     vectors.key("m")
-    # In a mirror across x a rotation vector keeps its x and turns its y and z round.
+    # Mirrored across x, a rotation vector keeps its x and negates its y and z.
     for joint, degrees in (("0", (10, -20, -30)), ("1", (-70, 0, -5)), ("2", (40, 50, -60))):
         wanted = rodrigues(np.radians(degrees))
         assert_allclose(_rotation(vectors, f"joint_{joint}"), wanted, atol=1e-12)

@@ -1,4 +1,4 @@
-"""The Joints panel of captured keypoints: what they are, their names and confidences."""
+"""The Joints panel of captured keypoints: description, names and confidences."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.scene import Scene
 
 @pytest.fixture
 def points(drive):
-    """A hand on four points; frame 1 is less sure of them."""
+    """A test driver on four points; frame 1 is less sure of them."""
     return drive(scene=Scene([dots([0.9, 0.05, 0.0, 0.5])]), size=(900, 900), samples=1)
 
 

@@ -20,7 +20,7 @@ VIEW_RADIUS = 1.2 * RADIUS
 
 
 def framed(drive, scene):
-    """Return a hand on a scene with all of its joints well within the view."""
+    """Return a test driver showing a scene with all joints well within the view."""
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.key("f")
     hand.state.camera.distance *= 1.5
@@ -30,7 +30,7 @@ def framed(drive, scene):
 
 @pytest.fixture
 def arm(drive):
-    """A hand on an arm whose shoulder is selected, with the tool Rotate."""
+    """A test driver on an arm whose shoulder is selected, with the tool Rotate."""
     hand = framed(drive, arm_scene())
     hand.state.selected_joint = 0
     hand.key("e")
@@ -109,7 +109,7 @@ def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     else:
         arm.press(1)
     assert_array_equal(arm.dofs(), before)
-    # Until the button comes up nothing else happens: no orbit, no drag.
+    # Until the button is released nothing else happens: no orbit, no drag.
     azimuth = arm.state.camera.azimuth
     arm.move(places[-1])
     assert_array_equal(arm.dofs(), before)

@@ -1,4 +1,4 @@
-"""Hands: components add up in rotation vectors, flat and mean hands are what the file says."""
+"""Hands: components add up in rotation vectors, flat and mean hands match the file."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Joints dragged: two links in closed form, arrows, and shifts of roots and figures."""
+"""The Move tool: two-link chains in closed form, arrows, and translations of roots and figures."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_default_chain_leaves_the_root_alone() -> None:
     skeleton = bent_arm().figure.skeleton
     assert used_chain(skeleton, 2, 0).tolist() == [1]
     assert used_chain(skeleton, 2, 2).tolist() == [1, 0]
-    assert used_chain(skeleton, 1, 0).tolist() == [0]  # nothing else can turn
+    assert used_chain(skeleton, 1, 0).tolist() == [0]  # nothing else can rotate
     assert used_chain(skeleton, 0, 0).tolist() == []
 
 

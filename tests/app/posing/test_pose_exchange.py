@@ -1,4 +1,4 @@
-"""Poses by clipboard and by dialog; figures written for other programs."""
+"""Copying and saving poses; exporting figures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor, Scene
 
 @pytest.fixture
 def posed(drive_body):
-    """A hand on a body in a pose of many digits, shaped and placed."""
+    """A test driver with a body whose pose, shape and placement have full-precision values."""
     hand = drive_body("smpl", size=(900, 640))
     pose = hand.state.actor.pose
     pose.dofs[:] = 0.9 * np.sin(1.7 * np.arange(len(pose.dofs)))
@@ -77,7 +77,7 @@ def test_raw_pose_vector_round_trips(posed):
     posed.key("r")
     posed.key("v", "ctrl")
     after = posed.state.actor.pose
-    # SMPL's numbers are the joints' rotations: neither shape nor place.
+    # SMPL's pose vector holds joint rotations only, no shape or translation.
     assert_allclose(after.dofs, before.dofs, atol=1e-12)
     assert_array_equal(after.shape_weights, before.shape_weights)
     assert after.figure_scale == 1.0 and not after.figure_translation.any()
@@ -184,7 +184,7 @@ ANGLES = (0.4, -0.3, 0.7, 0.2, 0.9, -0.5, 0.1, 0.6, -0.2)
 
 
 def _arm_text(orders, dofs, **settings):
-    """Return what a window with an arm copies, with its pose and its joints' rotations."""
+    """Return the clipboard text of a window showing an arm, its pose and joint rotations."""
     figure = arm_figure(orders=orders, **settings)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = dofs
@@ -226,7 +226,7 @@ def test_untransferred_joint_translations_are_reported(drive):
 
 
 def _name(hand, text):
-    """Write another name into the dialog."""
+    """Type a different name into the dialog."""
     hand.click(hand.place("Name", 0.3))
     hand.key("a", "ctrl")
     hand.key("delete")

@@ -1,4 +1,4 @@
-"""A joint's place and axes in the scene, and what it is seen to turn about."""
+"""A joint's position and axes in the scene, and its observed rotation axis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.rig.scene import Actor
 
 
 def turned_actor():
-    """An arm whose shoulder is turned a quarter about z, then the elbow about its z by -1/8."""
+    """An arm with the shoulder rotated by 90 degrees about z and the elbow by -45 about its z."""
     actor = Actor(arm_figure())
     actor.pose.dofs[2], actor.pose.dofs[3] = np.pi / 2, -np.pi / 4
     return actor

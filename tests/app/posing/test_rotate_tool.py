@@ -1,4 +1,4 @@
-"""Rings and what turning them does, with a camera that looks along -z at the joint."""
+"""Rotation rings and their effect, for a camera looking along -z at the joint."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def grabbed(actor, joint, view, place, orientation="local"):
 
 
 def spot(angle, radius=RADIUS):
-    """Return a place around the joint at the origin, against the clock from the right."""
+    """Return a position around the joint at the origin, counter-clockwise from the right."""
     return (300 + radius * np.cos(angle), 300 - radius * np.sin(angle))
 
 
@@ -53,7 +53,7 @@ def test_orientation_setting_determines_the_axes(orientation, x_axis) -> None:
 
 
 def test_joint_with_two_dofs_has_a_ring_for_each_about_its_own_axis() -> None:
-    # x is applied first: the axis of x is turned by what y does, y's is the parent's.
+    # x is applied first: the x axis is rotated by y, the y axis is the parent's.
     actor = Actor(arm_figure(orders=("xy", "z", "")))
     actor.pose.dofs[:2] = 0.7, np.pi / 2
     found = rings(posed_joint(actor, 0), actor.pose, "world", frame())
@@ -99,7 +99,7 @@ def test_face_on_ring_rotates_by_the_pointer_angle(angle, parallel) -> None:
         outcome = handle.follow(view, spot(0.7 + share * angle, 200.0), False)
     assert_allclose(outcome.pose.dofs[:3], [0, 0, angle], atol=1e-6)
     assert outcome.angle == pytest.approx(angle) and outcome.limited == ()
-    assert not actor.pose.dofs.any()  # the pose at the start is left alone
+    assert not actor.pose.dofs.any()  # the initial pose is not modified
 
 
 def test_rotation_accumulates_beyond_full_turns() -> None:
@@ -177,5 +177,5 @@ def test_mirrored_figure_rotates_with_the_pointer() -> None:
     turn = 0.6
     outcome = handle.follow(view, (300 + 90 * np.cos(turn), 300 - 90 * np.sin(turn)), False)
     elbow = posed_joint(actor, 1, outcome.pose).center
-    # The elbow was at (-1, 0, 0) and has gone round against the clock.
+    # The elbow was at (-1, 0, 0) and has moved counter-clockwise.
     assert_allclose(elbow, [-np.cos(turn), -np.sin(turn), 0], atol=1e-6)

@@ -1,4 +1,4 @@
-"""The Shape panel: coefficients, random shapes, read-outs; sums by hand on a body that is a box."""
+"""The Shape panel: coefficients, random shapes, read-outs; hand calculation on a box body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.shape import rest_joints, shaped
 
 @pytest.fixture
 def shape(box):
-    """A hand on the Shape panel of the box."""
+    """A test driver on the Shape panel of the box."""
     box.show_panel("Shape")
     return box
 
@@ -99,7 +99,7 @@ def test_random_samples_the_shape_of_the_shown_seed(shape):
     shape.click("Random")
     assert shape.state.of(Posing).shape_seed == 1
     first = _weights(shape).copy()
-    # The numbers that a person gets who writes the seed down.
+    # The coefficients reproduced from a noted seed.
     assert_array_equal(first, np.random.default_rng(1).standard_normal(2))
     shape.click("Random")
     assert shape.state.of(Posing).shape_seed == 2 and (_weights(shape) != first).all()

@@ -1,4 +1,4 @@
-"""Numbers that the window shows: angles in the unit of the panel, and no minus before a zero."""
+"""Numbers shown in the window: angles in the panel's unit, and no negative zero."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.app.posing.move_tool import _shift_text
 
 @pytest.fixture
 def tooltips(monkeypatch):
-    """What tooltips said, the last one last."""
+    """Tooltip texts, latest last."""
     said = []
     show = imgui.set_tooltip
     monkeypatch.setattr(imgui, "set_tooltip", lambda text: (said.append(text), show(text))[1])
@@ -23,7 +23,7 @@ def tooltips(monkeypatch):
 
 @pytest.fixture
 def sliders(monkeypatch):
-    """What sliders showed, by their label."""
+    """Slider texts by label."""
     shown = {}
     draw = imgui.slider_float
 

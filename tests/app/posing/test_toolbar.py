@@ -1,4 +1,4 @@
-"""The tools in the view's corner: buttons, reasons, keys, clips, and poses between figures."""
+"""The toolbar: buttons, greyed reasons, shortcuts, clips, and poses between figures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def arm(drive):
 
 @pytest.fixture
 def moved(drive):
-    """A hand on an arm with a keyed clip, with the tool Rotate at its shoulder."""
+    """A test driver on an arm with a keyed clip, with the tool Rotate at its shoulder."""
     scene = arm_scene()
     scene.actors[0].clip = waving()
     hand = drive(scene=scene, size=SIZE, samples=1)
@@ -170,7 +170,7 @@ def test_click_on_a_handle_does_not_pause(moved, shake):
     time = moved.state.clock.time
     moved.move((x + shake, y))
     moved.step(3)
-    # Time waits as long as the handle is held.
+    # Time stands still while the handle is held.
     assert moved.state.clock.playing and moved.state.clock.time == time
     moved.let_go()
     moved.step(3)
@@ -193,7 +193,7 @@ def test_key_button_adds_the_pose_to_the_clip_and_is_undone(moved):
     moved.key("z", "ctrl")
     assert moved.state.actor.clip is old
     moved.key("z", "ctrl")
-    assert moved.dofs()[2] == pytest.approx(0.5)  # half way of the clip
+    assert moved.dofs()[2] == pytest.approx(0.5)  # halfway through the clip
 
 
 def test_slider_pauses_the_clip_too(moved):
@@ -206,7 +206,7 @@ def test_slider_pauses_the_clip_too(moved):
 
 @pytest.fixture
 def two(drive):
-    """A hand on two arms whose DOFs are in other orders; the second has no joint "hand"."""
+    """A driver showing two arms with differently ordered DOFs; the second has no joint "hand"."""
     first = arm_figure(orders=("xyz", "xyz", "xyz"), name="first")
     second = arm_figure(orders=("zyx", "yxz", ""), name="second")
     object.__setattr__(second.skeleton, "names", ("shoulder", "elbow", "claw"))

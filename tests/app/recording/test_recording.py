@@ -1,4 +1,4 @@
-"""Recording from the window: the dialog, what is written, progress, and cancelling."""
+"""Recording from the window: the dialog, output files, progress, and cancelling."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.motion.instances import pose_actors
 
 @pytest.fixture
 def moving(drive, rig):
-    """A hand on the tiny figure whose root moves right, 0.5 a second, for a second."""
+    """A test driver on the tiny figure whose root moves right, 0.5 a second, for a second."""
     hand = drive(*rig, size=(1000, 700), samples=1)
     channel = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
     hand.state.actor.clip = Clip("slide", (channel,), 0.0, 1.0)
@@ -185,7 +185,7 @@ def test_window_stays_responsive_while_recording(moving, tmp_path):
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=60.0)
     moving.step(3)
     azimuth = moving.state.camera.azimuth
-    x, y = moving.middle[0], moving.middle[1] + 80  # beside the progress bar
+    x, y = moving.middle[0], moving.middle[1] + 80  # next to the progress bar
     moving.pull((x, y), (x + 40, y))
     assert moving.state.camera.azimuth != azimuth
     finish(moving)
@@ -223,7 +223,7 @@ def test_existing_images_are_not_replaced(moving, tmp_path):
 
 
 def test_input_images_are_not_replaced(moving, tmp_path):
-    """Nobody opened it: the figure's own file names it."""
+    """Not opened directly: the figure's own file names it."""
     texture = tmp_path / "cloth.png"
     texture.write_bytes(b"precious")
     moving.state.scene.files = (texture,)

@@ -1,4 +1,4 @@
-"""The template laid onto the target by hand: gizmo, numbers, landmarks."""
+"""Manual alignment of the template: gizmo, typed values, landmarks."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ pytestmark = pytest.mark.usefixtures("quick_fits")
 
 @pytest.fixture
 def hand(drive):
-    """A hand on an app with mesh and template, the panel open; the camera looks along -z."""
+    """A test driver on an app with mesh and template, the panel open; the camera looks along -z."""
     opened = drive(scene=rig_scene.scene(), size=(1000, 1000), samples=1)
     opened.menu("menu Window", "Rig")
     opened.step(2)
     opened.key("_1")
-    opened.key("_5")  # parallel: the same way on the screen is as long everywhere
+    opened.key("_5")  # orthographic: screen distances do not depend on depth
     opened.key("f")
     return opened
 
@@ -49,7 +49,7 @@ def similarity(hand):
 
 
 def middle(hand):
-    """Return where the gizmo is in the scene, and on the screen."""
+    """Return the position of the gizmo in the scene and on the screen."""
     template = current_template(hand.state)
     box = bounding_box(posed_template(hand.state.of(Rigging), template).positions)
     point = apply_transform(ghost_place(hand.state, template), box.mean(axis=0)[None])[0]
@@ -57,7 +57,7 @@ def middle(hand):
 
 
 def unit_way(hand, axis):
-    """Return how the screen shows a unit along an axis of the scene."""
+    """Return the screen vector of a unit along an axis of the scene."""
     frame, (point, place) = view_frame(hand.state), middle(hand)
     return np.array(frame.place(point + axis)) - place
 
@@ -93,7 +93,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
     assert_allclose(after.rotation, before.rotation, atol=1e-6)
     assert after.scale == pytest.approx(before.scale, rel=1e-6)
     assert hand.state.camera.azimuth == camera
-    hand.finish_job()  # once it was let go of its error is measured
+    hand.finish_job()  # its error is measured after release
     alignment = hand.state.of(Rigging).placing.alignment
     assert alignment.how == "given" and alignment.error > 0.01
 
@@ -139,9 +139,7 @@ def test_drag_is_one_undo_step_including_its_error(hand):
     hand.key("z", "ctrl")
     hand.step(2)
     assert_allclose(similarity(hand).matrix, first.matrix)
-    assert (
-        hand.state.of(Rigging).placing.alignment.error == error
-    )  # measured before, and known again
+    assert hand.state.of(Rigging).placing.alignment.error == error  # measured before and cached
     hand.key("z", "ctrl")
     hand.step(2)
     assert hand.state.of(Rigging).placing is None
@@ -278,7 +276,7 @@ def click_pair(hand, triangle):
 
 
 def faces_eye(hand, mesh, matrix, triangle):
-    """Return whether a triangle is seen: it faces the eye, and nothing lies before it."""
+    """Return whether a triangle is visible: facing the eye and not occluded."""
     frame = view_frame(hand.state)
     corners = apply_transform(matrix, mesh.positions)[mesh.triangles]
     middle = corners[triangle].mean(axis=0)

@@ -67,7 +67,7 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
 )
 def test_text_next_to_the_error_describes_the_alignment(rigging, texts, factors, own, words):
     hand = rigging()
-    hand.finish_job()  # the gap where it was laid is being measured
+    hand.finish_job()  # the error of the alignment is being measured
     placing = placing_now(hand.state)
     where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
     found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")

@@ -1,4 +1,4 @@
-"""Rig panel: settings, templates of files, messages, and results that are saved."""
+"""Rig panel: settings, templates from files, messages, and saved results."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_progress_shows_step_and_fraction(rigging, texts, monkeypatch):
 def test_template_is_posed_to_fit_and_shown_in_that_pose(rigging, texts):
     hand = rigging(placed=False)
     actor = hand.state.scene.actors[1]
-    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is turned by half a radian more
+    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is rotated by another half radian
     hand.step(2)
     hand.click("Align")
     hand.finish_job()
@@ -136,7 +136,7 @@ def test_template_is_posed_to_fit_and_shown_in_that_pose(rigging, texts):
     wanted = target_mesh(state).positions
     gaps = [np.linalg.norm(points - wanted, axis=1).max() for points in (shown, own)]
     assert gaps[0] < 0.2 * gaps[1]
-    assert actor.pose.dofs[8] == 0.2  # the actor stands as before
+    assert actor.pose.dofs[8] == 0.2  # the actor is unchanged
     hand.click("Run")
     hand.finish_job()
     assert_allclose(seen(hand, 0), wanted, atol=1e-6)
@@ -160,7 +160,7 @@ def test_mesh_is_added_by_dialog_and_the_body_is_loaded_on_demand(drive, tmp_pat
     assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox"]
     hand.pick("Template", 2)
     assert hand.state.of(Rigging).template_key == "fox"
-    hand.click("rig tool move")  # the template has to be there to be moved
+    hand.click("rig tool move")  # the template must be loaded to be moved
     hand.finish_job()
     assert hand.state.of(Rigging).template.figure.name == "fox"
     hand.click("Pose it…")
@@ -168,7 +168,7 @@ def test_mesh_is_added_by_dialog_and_the_body_is_loaded_on_demand(drive, tmp_pat
     assert names(hand) == ["fox", "scan", "fox-2"]
     chosen = hand.state.scene.actors[2]
     assert hand.state.of(Rigging).template_key == f"actor {id(chosen)}"
-    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # beside the others
+    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # in addition to the others
     hand.key("z", "ctrl")
     hand.step(2)
     assert names(hand) == ["fox", "scan"]
@@ -187,7 +187,7 @@ def test_template_from_a_file_is_unchanged_by_fitting(drive, tmp_path):
     start_reading(hand.state, (tmp_path / "arm.npz",))
     hand.finish_job()
     template = hand.state.of(Rigging).template
-    hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
+    hand.click("Run")  # aligns the resting template and rotates its joints
     hand.finish_job()
     assert hand.state.of(Rigging).template is template
     assert placing_now(hand.state).fitted is not None

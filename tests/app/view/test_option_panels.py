@@ -14,7 +14,7 @@ from viewer.rig.scene import Actor
 
 @pytest.fixture
 def tall(drive, rig):
-    """A hand on a window that shows every widget without scrolling."""
+    """A test driver on a window that shows every widget without scrolling."""
     return drive(*rig, size=(900, 1000))
 
 
@@ -200,7 +200,7 @@ def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     assert vertices() == "12"
     tall.key("y", "ctrl")
     assert vertices() == "24"
-    # Another figure in the place of one.
+    # One figure replaced by another.
     bare = replace(tall.state.actor.figure, mesh=None, skin=None)
     tall.state.scene.actors[1] = Actor(bare)
     tall.step(2)

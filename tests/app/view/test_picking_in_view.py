@@ -1,4 +1,4 @@
-"""Clicks in the view: they choose actors and joints, and aim the camera."""
+"""Clicks in the view: activating actors, selecting joints, aiming the camera."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.scene import actor_points
 
 @pytest.fixture
 def pair(drive, rig, tmp_path):
-    """A hand on two tiny figures side by side."""
+    """A test driver on two tiny figures side by side."""
     hand = drive(*rig, *rig, size=(1280, 800), samples=1)
     hand.step(3)
     return hand

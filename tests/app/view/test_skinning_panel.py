@@ -1,4 +1,4 @@
-"""The Skinning panel: method, few influences, normalising."""
+"""The Skinning panel: method, influence limit, normalising."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def skinning(drive, rig):
-    """A hand on the Skinning panel of the tiny rig, which is bent and turned."""
+    """A test driver on the Skinning panel of the tiny rig, which is bent and rotated."""
     hand = drive(*rig, size=(900, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
@@ -20,7 +20,7 @@ def skinning(drive, rig):
 
 @pytest.fixture
 def wide(drive_body):
-    """A hand on the Skinning panel of a body with many influences a vertex, posed."""
+    """A test driver on the Skinning panel of a body with many influences a vertex, posed."""
     hand = drive_body("smpl", n_vertices=96)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 

@@ -1,4 +1,4 @@
-"""The mouse that rests on a surface, clicks on vertices, and joints that are seen through it."""
+"""Hovering over a surface, clicks on vertices, and joints visible through the skin."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from viewer.rig.skinning import deform, joint_matrices
 
 @pytest.fixture
 def column(drive, rig):
-    """A hand on the Weights panel of the tiny column."""
+    """A test driver on the Weights panel of the tiny column."""
     hand = drive(*rig, size=(1280, 800), samples=1)
     hand.show_panel("Weights")
     hand.step(3)
@@ -36,7 +36,7 @@ def vertices(hand, index=0):
 
 
 def near(hand, triangle, corner):
-    """Return the window place of a point of a triangle close to one of its corners."""
+    """Return the window position of a point of a triangle close to one of its corners."""
     corners = hand.state.actor.figure.mesh.triangles[triangle]
     places = vertices(hand)[corners]
     return seen_at(hand, 0.8 * places[corner] + 0.2 * places.mean(axis=0))

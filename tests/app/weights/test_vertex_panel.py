@@ -1,4 +1,4 @@
-"""Why is it here: a pinned vertex, its numbers, its lines in the view, and letting go of it."""
+"""The Vertex panel: a pinned vertex, its skinning terms, its lines in the view, and unpinning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 @pytest.fixture
 def pinned(drive, rig):
-    """A hand on a column whose vertex 4 is pinned: half of it follows the root, half the arm."""
+    """A driver on a column whose vertex 4 is pinned: half of it follows the root, half the arm."""
     hand = drive(*rig, size=(1280, 1000), samples=1)
     hand.state.actor.pose.dofs[hand.dof_index("arm.z")] = 0.9
     hand.state.history.start(hand.state.scene, hand.state.options)
@@ -54,7 +54,7 @@ def rows_of(numbers):
 
 
 def holds(listed, wanted):
-    """Return whether some texts follow one another."""
+    """Return whether some labels follow one another."""
     count = len(wanted)
     return any(listed[at : at + count] == wanted for at in range(len(listed) - count + 1))
 
@@ -146,7 +146,7 @@ def test_lines_lead_to_the_rigid_images(pinned):
 
 
 def beside(hand, picture, weight_place):
-    """Return the pixels around a share of the way from the vertex to its first rigid image."""
+    """Return the pixels around a fraction of the way from the vertex to its first rigid image."""
     size = picture.shape[1], picture.shape[0]
     explanation = hand.state.of(Weights).explanation
     start, end = explanation.position, explanation.images[0]

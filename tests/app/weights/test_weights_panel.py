@@ -1,4 +1,4 @@
-"""The Weights panel: numbers as colours, their range and legend, and the tools for vertices."""
+"""The Weights panel: scalar colours, range and legend, and vertex tools."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def bent(drive, rig):
-    """A hand on the Weights panel of the tiny rig, which is bent and turned."""
+    """A test driver on the Weights panel of the tiny rig, which is bent and rotated."""
     hand = drive(*rig, size=(900, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
@@ -27,7 +27,7 @@ def bent(drive, rig):
 
 @pytest.fixture
 def wide(drive_body):
-    """A hand on the Weights panel of a body with many influences a vertex, posed."""
+    """A test driver on the Weights panel of a body with many influences a vertex, posed."""
     hand = drive_body("smpl", n_vertices=96)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 
@@ -48,7 +48,7 @@ def _chosen(hand) -> Skinning:
 
 
 def _legend_colours(hand):
-    """Return where the legend has its dark, middle and bright colour, None without a legend."""
+    """Return where the legend's dark, middle and bright colours are, or None."""
     x, y, width, _ = hand.state.view_rect
     screen, colours = hand.screen(), colormap(256)[:, :3].astype(int)
     for row in range(int(y), int(y) + 70):
@@ -228,7 +228,7 @@ def test_image_with_a_legend_gets_no_second_one(wide, texts):
     texts.clear()
     wide.step()
     assert "Distance to few influences, mm" not in texts
-    assert _legend_colours(wide) is not None  # drawn into the picture
+    assert _legend_colours(wide) is not None  # drawn into the image
 
 
 def test_fixed_range_starts_as_the_automatic_one_and_stays_ordered(bent):
