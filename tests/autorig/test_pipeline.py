@@ -1,4 +1,4 @@
-"""The whole transfer, on targets whose rig is known."""
+"""The complete rigging pipeline on targets with a known rig."""
 
 from dataclasses import replace
 
@@ -158,7 +158,7 @@ def test_body_correctives_are_transferred():
 
 
 def test_joints_follow_the_surface_and_copies_do_not():
-    # Without alignment the target stands 0.1 beside the template. Closest points see the part of
+    # Without alignment the target is offset by 0.1. Closest points measure the component of
     # that across the surface: about half of it, as cos^2 around a section has the mean 1 / 2.
     figure, pose = arm(), rest_pose(arm().skeleton)
     target = mesh_of(figure.mesh.positions + np.array([0.1, 0, 0]), figure.mesh.triangles)

@@ -1,4 +1,4 @@
-"""A scale along each axis: found exactly, with the rotation if that is asked."""
+"""A scale along each axis: found exactly, with the rotation if requested."""
 
 import numpy as np
 import pytest

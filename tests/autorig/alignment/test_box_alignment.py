@@ -1,4 +1,4 @@
-"""The seed's alignment of boxes."""
+"""Bounding-box alignment."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Closest points, iterated: alignments that are known are found again."""
+"""Iterated closest points recover known alignments."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Candidates for an orientation, and the one that fits."""
+"""Candidate orientations and the best fit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A template that stands otherwise than the target: its joints find the target's pose."""
+"""Template joints fitted to the pose of the target."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_longer_limb_is_found():
     longer = resized(figure, limbs_of(figure), np.array([1.0, 1.3]), np.ones(2))
     found, gaps = fitted(longer, bent(longer), figure)
     assert np.sqrt(np.mean(gaps**2)) < 2e-3
-    # How much the whole grew is for all limbs: only their ratio is known.
+    # Overall scale and limb scales are ambiguous: only their ratio is determined.
     along = found.grown[0]
     assert_allclose(along[1] - along[0], np.log(1.3), atol=0.08)
 

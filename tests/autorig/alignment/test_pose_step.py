@@ -1,4 +1,4 @@
-"""One linear round: what is known to have moved is found."""
+"""One linear step of the pose fit recovers known motions."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_overall_translation_and_scale_are_found():
 
 def test_longer_limb_is_distinguished_from_overall_scale():
     fraction = LIMBS.fractions[:, 1]
-    # The base is 5 % longer: its own vertices stretch, and the tip goes along.
+    # The base is 5 % longer: its own vertices stretch, and the tip moves with it.
     up = 0.05 * ((1 - fraction) * X[:, 1] + fraction)
     step = solved(X + up[:, None] * [0.0, 1.0, 0.0])
     along, across = step.limb_growths + step.growth
@@ -72,10 +72,10 @@ def test_steps_are_bounded():
 
 
 def test_unsupported_rotations_of_earlier_iterations_decay():
-    # The tip's own axis is y: a turn about it moves a round section along itself only; here there
-    # are no pairs but one, which tells nothing of the tip.
+    # The tip's own axis is y: a rotation about it slides a round section along itself; here there
+    # is only one pair, which does not constrain the tip.
     pairs = Pairs(np.array([0]), X[:1], np.array([[0.0, 0, 1.0]]), np.array([0]), X[:1])
     rotated = np.array([[0.0, 0, 0], [0, 0.1, 0]])
     step = solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, rotated, np.zeros((2, 2)), True)
-    # Price of all turns 3e-6 against 1e-5 for one round: 0.1 * 3 / 13 is taken back.
+    # Penalty 3e-6 on total rotation against 1e-5 on one step: 0.1 * 3 / 13 is reverted.
     assert step.rotation_vectors[1, 1] == pytest.approx(-0.1 * 3 / 13, rel=1e-6)

@@ -37,7 +37,7 @@ def aligned(figure, target, fits=True, report=silent, **settings):
 
 @pytest.fixture(scope="module")
 def standing():
-    """The bundled body with lowered arms and longer legs, turned to face -z."""
+    """The bundled body with lowered arms and longer legs, facing -z."""
     figure = load(bundled_body()).actors[0].figure
     pose = rest_pose(figure.skeleton)
     names = figure.skeleton.names
@@ -161,7 +161,7 @@ def bent(angle):
 
 
 def fit_of(figure, pose, angle):
-    """Return what a fit comes to that turned the tip by an angle, and then stopped."""
+    """Return the result of a fit that stopped after rotating the tip by an angle."""
     rotated = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, angle]])
     similarity = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
     return Fitted(figure, pose, similarity, rotated, np.zeros((2, 2)))

@@ -1,4 +1,4 @@
-"""Limbs longer and thicker: where vertices, joints and bind pose go."""
+"""Limb length and girth: effect on vertices, joints and bind pose."""
 
 from dataclasses import replace
 
@@ -72,5 +72,5 @@ def test_offsets_follow_a_rotated_bind_pose():
     skin = replace(figure.skin, inverse_bind=np.linalg.inv(bind))
     rotated = replace(figure, skin=skin)
     longer = resized(rotated, limbs_of(rotated), np.array([2.0, 1.0]), ONES)
-    # One unit more along y is one along x in axes that are turned by a quarter about z.
+    # One more unit along y is one along x in axes rotated by 90 degrees about z.
     assert_allclose(longer.skeleton.rest_translations[1], [1, 1, 0], atol=1e-12)

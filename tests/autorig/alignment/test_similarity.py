@@ -1,4 +1,4 @@
-"""Similarities: fitted to pairs that one was made from, and to pairs worked out by hand."""
+"""Similarities: fitted to pairs generated from one, and to hand-calculated pairs."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Alignment as a whole: left alone, searched, by landmarks, given; and what is said of it."""
+"""Complete alignment: unchanged, searched, by landmarks or given; and its report."""
 
 import numpy as np
 import pytest

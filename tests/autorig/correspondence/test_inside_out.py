@@ -1,4 +1,4 @@
-"""Parts wound the wrong way: closed ones and the most of a mesh are turned round, linings not."""
+"""Parts wound the wrong way: closed parts and the bulk of a mesh are flipped, linings are not."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_unrequested_part_is_kept():
 
 
 def test_open_lining_is_kept_and_an_open_whole_is_flipped():
-    inner = OUTWARD[2:, ::-1]  # a side of two triangles is missing
+    inner = OUTWARD[2:, ::-1]  # a face of two triangles is missing
     lining = two(OUTWARD, inner)
     assert not any(found(*lining, [1]))
     assert all(found(CUBE, inner.astype(np.int32), [0]))

@@ -15,7 +15,7 @@ FLAT = Template(
 
 
 def triangle(height=0.0, tilt=0.0, flipped=False):
-    """Return a triangle about the z axis: raised, turned about x, facing +z if not flipped."""
+    """Return a triangle about the z axis: raised, rotated about x, facing +z if not flipped."""
     positions = 0.1 * np.array([[1.0, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
     turn = np.array(
         [[1, 0, 0], [0, math.cos(tilt), -math.sin(tilt)], [0, math.sin(tilt), math.cos(tilt)]]

@@ -14,7 +14,7 @@ COUNT = 9
 
 
 def grid(step=1.0, start=0.0):
-    """Return a square of two triangles a cell in the plane z = 0."""
+    """Return a grid in the plane z = 0, two triangles per cell."""
     line = start + step * np.arange(COUNT)
     x, y = np.meshgrid(line, line, indexing="ij")
     positions = np.stack([x.ravel(), y.ravel(), np.zeros(COUNT * COUNT)], axis=1)
@@ -56,7 +56,7 @@ def test_rotated_tessellation_has_other_vertices():
     cosine, sine = np.cos(0.5), np.sin(0.5)
     rotated = (positions - 4.0) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]) + 4.0
     same = found((positions, triangles), (rotated, triangles))
-    assert (same >= 0).mean() < 0.2  # those about the middle of the turn
+    assert (same >= 0).mean() < 0.2  # those near the centre of rotation
 
 
 def test_points_near_vertices_snap_and_others_stay():

@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 def grid(count, rng=None):
-    """Return a flat grid of count x count vertices, the inner ones shaken."""
+    """Return a flat grid of count x count vertices, the inner ones jittered."""
     x, y = np.meshgrid(np.arange(count, dtype=float), np.arange(count, dtype=float))
     positions = np.stack([x.ravel(), y.ravel(), np.zeros(count * count)], axis=1)
     index = np.arange(count * count).reshape(count, count)
@@ -57,7 +57,7 @@ def test_cotangent_laplacian_stays_positive_with_slivers():
     rng = np.random.default_rng(2)
     positions, triangles, _ = grid(5, rng)
     positions[:, 1] *= rng.choice([1e-6, 1.0], len(positions))  # needles and caps
-    positions[7] = 0.5 * (positions[6] + positions[8])  # without area
+    positions[7] = 0.5 * (positions[6] + positions[8])  # zero area
     operator = cotangent_laplacian(positions, triangles).toarray()
     assert np.isfinite(operator).all()
     np.testing.assert_allclose(operator, operator.T, atol=ROUNDING)

@@ -1,4 +1,4 @@
-"""Samples of surfaces: on it, as many as the area asks for."""
+"""Surface samples: on the surface, in proportion to area."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Winding numbers of a cube, whole and with a side missing."""
+"""Winding numbers of a cube, closed and with one face missing."""
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -22,7 +22,7 @@ def test_winding_number_of_an_inside_out_cube_is_minus_one():
 
 
 def test_missing_face_subtracts_its_solid_angle():
-    # Seen from the middle each of the six sides covers a sixth.
+    # Seen from the centre each of the six faces covers a sixth.
     assert_allclose(winding_numbers(CORNERS, CUBE[2:], MIDDLE[None]), [5 / 6], atol=1e-12)
 
 

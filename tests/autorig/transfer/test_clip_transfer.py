@@ -1,4 +1,4 @@
-"""A template's clips for the figure that took over its rig."""
+"""Transfer of a template's clips to the rigged figure."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 
-SKELETON = arm().skeleton  # DOFs 0 to 2 move, the others turn
+SKELETON = arm().skeleton  # DOFs 0 to 2 translate, the others rotate
 
 
 def curve(target):

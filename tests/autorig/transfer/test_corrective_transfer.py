@@ -1,4 +1,4 @@
-"""Pose correctives on another mesh."""
+"""Transfer of pose correctives to another mesh."""
 
 import numpy as np
 import pytest

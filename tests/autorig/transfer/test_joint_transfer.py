@@ -1,4 +1,4 @@
-"""Joints that go with the surface around them."""
+"""Joints transferred with the surrounding surface."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The ratio of legs: by hand, for a stick figure of two legs."""
+"""Leg-length ratio, calculated by hand for a two-legged stick figure."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from viewer.rig.skeleton import ball_skeleton
 
 
 def stick(up="y", leg=1.0, arm=0.5):
-    """Return a root with two legs of two bones, and an arm that is held up."""
+    """Return a root with two legs of two bones, and a raised arm."""
     names = ("root", "knee_l", "foot_l", "knee_r", "foot_r", "hand")
     places = np.zeros((6, 3))
     places[:, 0] = 0.0, 0.1, 0.1, -0.1, -0.1, 0.0

@@ -1,4 +1,4 @@
-"""Rest skeletons fitted to posed joints: what was put in by forward kinematics comes back."""
+"""Rest skeletons fitted to posed joints: forward kinematics is inverted."""
 
 from dataclasses import replace
 
@@ -131,7 +131,7 @@ def spread() -> Figure:
     ("transferred", "left", "right"),
     [
         ([True] * 4, 1.25, 1.25),  # both were measured: their mean
-        ([True, True, False, True], 1.4, 1.4),  # one was: it counts for both
+        ([True, True, False, True], 1.4, 1.4),  # one was measured: used for both
         ([True, False, False, True], 1.25, 1.25),
     ],
 )
@@ -144,7 +144,7 @@ def test_symmetric_skeletons_stay_symmetric(transferred, left, right):
     found = fit_rest_skeleton(figure, pose, straight, joints, np.array(transferred))
     offsets = found.skeleton.rest_translations
     assert_allclose(offsets[1:3], [[left, 0, 0], [-right, 0, 0]], atol=EXACT)
-    # The middle joint is its own partner: it comes back to the middle.
+    # The middle joint is its own mirror counterpart: it returns to the middle.
     assert_allclose(offsets[3], [0, 1, 0], atol=EXACT)
 
 
@@ -161,7 +161,7 @@ def test_bind_pose_agrees_with_the_rest_pose():
 
 
 def test_root_uses_angles_within_its_limits():
-    # Turned by 120 degrees about y: as angles (180, 60, 180) or (0, 120, 0).
+    # Rotated by 120 degrees about y: as angles (180, 60, 180) or (0, 120, 0).
     figure = arm(limit=2.2)
     pose = rest_pose(figure.skeleton)
     similarity = Similarity(1.0, turn([0, 1, 0], np.radians(120)), np.zeros(3), np.ones(3))

@@ -35,7 +35,7 @@ def problem(rng):
     weights[:, [0, 2, 3]] = rng.dirichlet([1, 1, 1], count)
     unknown = np.zeros(count, dtype=bool)
     unknown[30:52] = True
-    weights[unknown] = 99.0  # must not be looked at
+    weights[unknown] = 99.0  # must not be read
     return operator, areas, weights, unknown
 
 
@@ -100,7 +100,7 @@ def test_inpainting_skips_vertices_that_are_neither_known_nor_wanted():
 
 
 def failing(times):
-    """Return a factorisation that fails so many times before it works."""
+    """Return a factorisation that fails a given number of times before succeeding."""
     real, calls = linear.splu, []
 
     def splu(*arguments, **options):
@@ -139,7 +139,7 @@ def test_inpainting_falls_back_to_harmonic_weights(monkeypatch, times, method):
 
 def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
     operator, areas, weights, unknown = problem(np.random.default_rng(6))
-    # Cut off from everything that is known.
+    # Disconnected from all known vertices.
     inside, outside = np.nonzero(unknown)[0], np.nonzero(~unknown)[0]
     dense = operator.toarray()
     dense[np.ix_(inside, outside)] = 0.0

@@ -47,7 +47,7 @@ def test_within_follows_edges():
     assert within(positions, STRIP, sources, 0.9).tolist() == [1, 0, 0, 0, 0]
     assert within(positions, STRIP, sources, 1.0).tolist() == [1, 1, 0, 0, 0]
     assert within(positions, STRIP, sources, 1.5).tolist() == [1, 1, 1, 0, 0]
-    # Vertex 4 is near, but no edge leads there.
+    # Vertex 4 is near but not connected by an edge.
     assert within(positions, STRIP, sources, 9.0).tolist() == [1, 1, 1, 1, 0]
 
 

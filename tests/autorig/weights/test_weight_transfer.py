@@ -113,7 +113,7 @@ def test_transfer_inpaints_vertices_away_from_the_template():
     assert (result.matched | result.inpainted).all()
     found = dense(result)
     np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
-    # The third joint does not reach this far; the others change places across the bump.
+    # The third joint does not reach this far; the others swap across the bump.
     assert found[bump, 2].max() < 0.05
     order = [found[np.isclose(x, value), 0].mean() for value in np.unique(x[bump])]
     assert order == sorted(order, reverse=True)
