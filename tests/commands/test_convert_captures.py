@@ -1,4 +1,4 @@
-"""``viewer convert`` with captures: keypoints alone, people who are away, or without a track."""
+"""``viewer convert`` with captures: keypoints alone, absent people, and untracked people."""
 
 from __future__ import annotations
 

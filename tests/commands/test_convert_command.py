@@ -1,4 +1,4 @@
-"""``viewer convert``: what a person asks for is what another program reads."""
+"""``viewer convert``: the requested output, verified by independent readers."""
 
 from __future__ import annotations
 
@@ -282,7 +282,7 @@ def test_several_actors_become_numbered_files(tmp_path, capsys):
     counts = [" 3 vertices, 1 triangle", " 3 vertices, 1 triangle", " 48 vertices, 92 triangles"]
     paths = [out, tmp_path / "out-2.obj", tmp_path / "out-3.obj"]
     assert lines == [f"{path}:{text}" for path, text in zip(paths, counts, strict=True)]
-    # Where they stand in the scene is no part of them.
+    # Placement in the scene is not exported.
     assert_array_equal(read_obj(paths[1]).v, read_obj(paths[0]).v)
     assert_allclose(read_obj(paths[2]).v, arrays["v_template"], rtol=0, atol=DIGITS)
 

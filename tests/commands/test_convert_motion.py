@@ -1,4 +1,4 @@
-"""``viewer convert`` with motions: which exporter, which frames, which files, and refusals."""
+"""``viewer convert`` with motions: exporters, frames, files, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Single poses of captures as files: y is up in glTF, and others say what is."""
+"""Single poses of captures as files: y is up in glTF, and other formats record the up axis."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OVER = np.diag([1.0, -1.0, -1.0])
 
 @pytest.fixture
 def recording(tmp_path):
-    """A model with y up, and a folder of two frames in which somebody stands along z."""
+    """A model with y up, and a folder of two frames with a person upright along z."""
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     folder = tmp_path / "take" / "smpl"

@@ -1,4 +1,4 @@
-"""Captures whose people hang head down come back from ``viewer convert`` as they were."""
+"""Upside-down captures round-trip through ``viewer convert``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def smpl(tmp_path):
 
 @pytest.fixture
 def hanging(tmp_path):
-    """Bodies that the fixture's other tests have standing along y, turned over by hand."""
+    """Bodies upright along y, turned upside down explicitly."""
     frames = {}
     for frame in range(3):
         record = body(0, seed=0.01 * frame)

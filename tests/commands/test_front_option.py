@@ -1,4 +1,4 @@
-"""--front and the first view: the same in pictures, in pictures with panels, and in the window."""
+"""--front and the first view: identical in images, images with panels, and the window."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_the_up_axis_cannot_be_the_front(tmp_path, capsys):
 
 
 def test_window_gets_the_same_first_view(tmp_path):
-    """What ``viewer`` hands to the window, and what named views there count from."""
+    """The first view passed to the window, and the reference of its named views."""
     scene = viewer.load(sided_skel(tmp_path / "turned.skel", "-z"))
     parser = argparse.ArgumentParser()
     add_camera_arguments(parser)
@@ -83,7 +83,7 @@ def test_window_gets_the_same_first_view(tmp_path):
 
 
 def test_image_with_panels_fits_the_whole_motion_between_them(tmp_path):
-    """The figure of the picture with panels is nowhere cut off, and no smaller than it need be."""
+    """In the image with panels the figure is not clipped, and no smaller than necessary."""
     from app.captured import people
     from app.tiny import write_rig
 

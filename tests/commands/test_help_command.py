@@ -13,7 +13,7 @@ from viewer.manual import PAGES, page_text
 
 
 class Terminal(io.StringIO):
-    """Standard output that says it is a terminal."""
+    """Standard output that claims to be a terminal."""
 
     def isatty(self) -> bool:
         return True

@@ -1,4 +1,4 @@
-"""``viewer info`` of captures and morphs: who is where, what is up, which frames are missing."""
+"""``viewer info`` of captures and morphs: positions, up axis and missing frames."""
 
 from __future__ import annotations
 

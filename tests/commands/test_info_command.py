@@ -1,4 +1,4 @@
-"""``viewer info``: numbers counted by hand, as text and as JSON."""
+"""``viewer info``: hand-counted values, as text and as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""--xray, --joint-names, --joint-axes: what is drawn, what is said."""
+"""--xray, --joint-names, --joint-axes: rendering and messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def rig(tmp_path):
 
 @pytest.fixture
 def render(tmp_path, capsys):
-    """Draw a picture; return its pixels, or None, with what was said to the error stream."""
+    """Render an image; return its pixels or None, and the error output."""
 
     def drawn(*arguments):
         path = tmp_path / "x.png"

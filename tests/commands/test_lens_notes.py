@@ -1,4 +1,4 @@
-"""``viewer render --view`` through a lens that bends: what is left out is said with its size."""
+"""``viewer render --view`` with lens distortion: ignored distortion is reported with its size."""
 
 from __future__ import annotations
 

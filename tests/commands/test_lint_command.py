@@ -17,7 +17,7 @@ from viewer.loading import bundled_files
 
 @pytest.fixture
 def rig(tmp_path: Path) -> list[str]:
-    """A skeleton and a skin with one wrong sum of weights."""
+    """A skeleton and a skin with one wrong weight sum."""
     (tmp_path / "a.skel").write_text(skel_text.GOOD)
     (tmp_path / "a.skin").write_text(skin_text.GOOD.replace("2 0 0.25", "2 0 0.5", 1))
     return [str(tmp_path / "a.skel"), str(tmp_path / "a.skin")]

@@ -1,4 +1,4 @@
-"""``viewer info`` of body models: numbers worked out by hand, as text and as JSON."""
+"""``viewer info`` of body models: hand-calculated values, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_inside_out_box_is_measured_the_same(describe, tmp_path):
 
 
 def test_pose_does_not_change_the_rest_body(describe, box):
-    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # moved, turned, twice as large
+    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # moved, rotated, twice as large
     assert describe(box, "--pose", pose)["rest"]["height"] == pytest.approx(3)
 
 
@@ -127,7 +127,9 @@ def test_parts_of_an_animal_are_counted(describe, lines, box):
     found = describe(box)
     assert found["body_parts"] == {"NOT_BODY": 0, "FEET": 4, "BACK": 4}
     assert found["reduced"] == {"vertices": 4, "triangles": 4}
-    assert found["asymmetry"] == 2  # y is 0 and 2, so partners miss the plane y = 0 by 1 each
+    assert (
+        found["asymmetry"] == 2
+    )  # y is 0 and 2, so mirror counterparts miss the plane y = 0 by 1 each
     told = lines(box)
     assert "parts      NOT_BODY 0, FEET 4, BACK 4" in told
     assert "reduced    4 vertices, 4 triangles" in told
@@ -146,12 +148,12 @@ def test_plain_rig_has_no_model_facts(describe, tmp_path):
     assert not {"facts", "shapes", "rest", "body_parts", "keypoints", "asymmetry"} & set(found)
 
 
-# What ways of skinning change
+# Effects of skinning options
 
 
 def test_limit_of_six_influences_is_measured(describe, lines, box):
     # Vertex 7 follows joint 4 by 0.15; with four influences joints 0 to 3 are left of it.
-    # Whole, its distance from the axis is 1 - 2 * 0.15 of what the cut leaves alone.
+    # Whole, its distance from the axis is 1 - 2 * 0.15 of the distance without the limit.
     options = about_z(4, HALF_TURN)
     effects = describe(box, *options)["effects"]
     assert effects["pruned to 4 influences"] == pytest.approx(0.3 * ACROSS)

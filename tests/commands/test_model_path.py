@@ -27,7 +27,7 @@ FILES = {
 
 @pytest.fixture(autouse=True)
 def settings(tmp_path, monkeypatch):
-    """The file that remembers is this test's own."""
+    """A separate settings file for this test."""
     path = tmp_path / "settings" / "deeper" / "models.json"
     monkeypatch.setattr(models, "_settings_file", lambda: path)
     monkeypatch.chdir(tmp_path)
@@ -46,7 +46,7 @@ def folder(tmp_path):
 
 
 def told(capsys, *arguments):
-    """Return the name and the kind of the first figure that ``info`` opens."""
+    """Return the name and the family of the first figure that ``info`` opens."""
     assert run(["info", *arguments, "--json"]) == 0
     actor = json.loads(capsys.readouterr().out)["actors"][0]
     return actor["name"], actor["model"]["facts"]["model"]

@@ -69,7 +69,7 @@ def test_body_shapes_have_names_too(folder):
 
 
 def test_names_of_a_body_opened_with_a_morphed_rig(folder):
-    """A list goes to the body, whose coefficients it always meant; names go to who has them."""
+    """A list sets the coefficients of the body; names apply to the figures that have them."""
     first = vertices(*RIG, "smpl.npz", "--shape", "sharp=1")
     assert_allclose(first[11], [0.2, 5, -0.2], atol=1e-12)
     first = vertices(*RIG, "smpl.npz", "--shape", "1")

@@ -1,4 +1,4 @@
-"""Options that shape, pose and skin, given wrongly: one line each, with what was expected."""
+"""Invalid shape, pose and skinning options: one line each, stating what was expected."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def refused(capsys, *arguments):
 
 
 def described(capsys, *arguments):
-    """Return what ``info --json`` says of the first actor, and the warnings on the way."""
+    """Return the ``info --json`` entry of the first actor, and the warnings."""
     assert run(["info", *arguments, "--json"]) == 0
     captured = capsys.readouterr()
     return json.loads(captured.out)["actors"][0], captured.err.splitlines()
@@ -217,7 +217,7 @@ def test_first_figure_that_fits_is_posed(folder, capsys):
     assert actors[1]["model"]["shape_weights"][0] == 1
 
 
-# Options of what is drawn
+# Display options
 
 
 @pytest.mark.parametrize(

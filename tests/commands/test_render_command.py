@@ -1,4 +1,4 @@
-"""``viewer render``: every option changes the picture as it says; outputs are never lost."""
+"""``viewer render``: every option has its described effect; outputs are never lost."""
 
 from __future__ import annotations
 
@@ -368,7 +368,7 @@ def test_image_can_be_written_to_standard_output(rig, tmp_path, into):
     assert done.returncode == 0
     data = target.read_bytes() if into == "file" else done.stdout
     assert Image.open(io.BytesIO(data)).size == (40, 30)
-    assert data.endswith(b"IEND\xaeB`\x82")  # no words after the picture
+    assert data.endswith(b"IEND\xaeB`\x82")  # no text after the image
     assert b"40 x 30" in done.stderr
 
 

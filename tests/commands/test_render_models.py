@@ -1,4 +1,4 @@
-"""``viewer render`` of body models: each option changes the picture where it should."""
+"""``viewer render`` of body models: each option changes the expected part of the image."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def covered(picture):
 
 
 def rows(mask):
-    """Return the first and the last row in which something is."""
+    """Return the first and last non-empty row."""
     found = np.flatnonzero(mask.any(axis=1))
     return found[0], found[-1]
 
@@ -115,7 +115,7 @@ def test_part_shading_without_parts_is_plain(draw, tmp_path):
     assert len(found) and np.ptp(found, axis=0).max() < 0.02
 
 
-# A coarser mesh
+# Reduced meshes
 
 
 def test_reduced_mesh_is_a_corner_of_the_box(draw, box):
@@ -124,7 +124,7 @@ def test_reduced_mesh_is_a_corner_of_the_box(draw, box):
     assert not (covered(reduced) & ~covered(whole)).any()
     # Seen along an axis, four corners of a box are half of its rectangle.
     assert covered(reduced).sum() / covered(whole).sum() == pytest.approx(0.5, abs=0.03)
-    assert rows(covered(reduced))[1] == rows(covered(whole))[1]  # all of its foot is there
+    assert rows(covered(reduced))[1] == rows(covered(whole))[1]  # its base is complete
 
 
 def test_reduced_mesh_option_does_not_affect_other_figures(draw, tmp_path):

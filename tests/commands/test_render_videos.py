@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture
 def fox(tmp_path) -> list[str]:
-    """The bundled fox's files, and a clip of half a second that turns its head."""
+    """The bundled fox's files, and a half-second clip that rotates its head."""
     from viewer.loading import bundled_files
 
     channels = 3 + 3 * viewer.load().actors[0].figure.skeleton.n_joints
@@ -90,7 +90,7 @@ def test_video_that_skips_frames_keeps_the_speed(draw, walk):
     said = draw(walk, "z.gif", "--frames", "0:31:3", size="32x32")
     assert "11 frames, 1.1 s, 32 x 32, 10 frames per second (one of 3 frames" in said.out
     said = draw(walk, "{frame}.png", "--frames", "0:31:3", size="16x16")
-    assert "one of" not in said.out  # nobody plays pictures
+    assert "one of" not in said.out  # images are not played
 
 
 def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
@@ -149,7 +149,7 @@ def test_missing_library_is_one_line(draw, walk, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     said = draw(walk, "x.mp4", code=2)
     assert said.err == ("viewer: videos need PyAV, which is not installed: pip install av\n")
-    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # pictures need no such thing
+    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # images do not need it
 
 
 @pytest.mark.parametrize("name", ["x.mp4", "x.gif", "x.webm"])

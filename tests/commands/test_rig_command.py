@@ -1,4 +1,4 @@
-"""``viewer rig``: a mesh goes in, a figure that moves comes out."""
+"""``viewer rig``: from a bare mesh to an animatable figure."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A fox in centimetres, turned by a quarter about y, and the fox's pose."""
+    """A fox in centimetres, rotated by 90 degrees about y, and the fox's pose."""
     folder = tmp_path_factory.mktemp("rig")
     fox = viewer.load().actors[0]
     positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0][:, [2, 1, 0]] * [1, 1, -1]
@@ -330,7 +330,7 @@ def test_landmarks_are_points_or_posed_joints(tmp_path):
             'expected a joint of fox, found "hed"; did you mean head?',
         ),
         (
-            "head 1 2 1_0\n",  # Python would take it for 10
+            "head 1 2 1_0\n",  # Python would parse it as 10
             1,
             'expected six numbers, or a joint and three numbers, found "head 1 2 1_0"',
         ),

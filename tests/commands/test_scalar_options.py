@@ -1,4 +1,4 @@
-"""Scalar quantities on the command line: what is drawn, what is said, what is refused."""
+"""Scalar quantities on the command line: rendering, messages and refusals."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def rig(tmp_path):
 
 @pytest.fixture
 def render(tmp_path, capsys):
-    """Draw a small picture; return its pixels, or None, with what was said."""
+    """Render a small image; return its pixels or None, and the messages."""
 
     def drawn(*arguments):
         path = tmp_path / "x.png"

@@ -1,4 +1,4 @@
-"""No way of writing replaces a file that nobody said may be replaced, nor ever an input."""
+"""No output replaces an existing file without --force, and never an input."""
 
 from __future__ import annotations
 

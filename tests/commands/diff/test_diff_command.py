@@ -1,4 +1,4 @@
-"""``viewer diff``: differences put in by hand, exit codes, the table and JSON."""
+"""``viewer diff``: known differences, exit codes, the table and JSON."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_a_stray_skeleton_is_named_and_the_figure_of_the_same_name_is_compared(t
     # It comes before a.skel, and is the reference's very skeleton.
     (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
     code, lines, _ = said(capsys, reference, other, "--poses", "0", "--tolerance", "1")
-    assert code == 1  # something is there that was not asked for
+    assert code == 1  # there is one data set without a tolerance
     assert lines[:3] == [
         f"{other}:",
         f"  only in {other}: 0 (a skeleton)",
@@ -132,7 +132,7 @@ def test_pairing_by_different_names_is_reported(tmp_path, capsys):
     (tmp_path / "other" / "a.skel").rename(tmp_path / "other" / "b.skel")
     (tmp_path / "other" / "a.skin").rename(tmp_path / "other" / "b.skin")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
-    assert not any("held against" in line for line in lines)  # there is nothing else
+    assert not any("held against" in line for line in lines)  # there is no other figure
     (tmp_path / "other" / "c.skel").write_text(SKEL % "3")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
     assert lines[1:4] == [
@@ -207,7 +207,7 @@ def test_heat_maps_of_several_pairs_form_one_sheet(tmp_path, capsys):
     output = tmp_path / "heat.png"
     _, lines, _ = said(capsys, first, second, first, "--poses", "0", "-o", str(output))
     assert lines[-1] == f"{output}: 2 heat maps with a common scale"
-    # Nothing differs on the second: it is dark, beside the bright corner of the first.
+    # Nothing differs on the second: it is dark, next to the bright corner of the first.
     sheet = picture(output)
     bright = (sheet[:, :, 0] > 220) & (sheet[:, :, 2] < 160)
     height = sheet.shape[0] // 2

@@ -1,4 +1,4 @@
-"""Who ``viewer diff`` holds against whom."""
+"""Pairing of figures by ``viewer diff``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.skin import skin_from_lists
 
 
 def bones() -> Skeleton:
-    """Return one joint with the six DOFs of a course rig."""
+    """Return one joint with the six DOFs of a .skel-style rig."""
     return Skeleton(
         names=("root",),
         parents=np.array([-1], dtype=np.int32),
@@ -62,7 +62,7 @@ def motion(name: str) -> Clip:
 
 
 def paired(first: list[Actor], second: list[Actor]) -> list[tuple[int, int]]:
-    """Return the numbers of those that are paired, by their figures."""
+    """Return the indices of the paired actors."""
     figures = [[actor.figure for actor in actors] for actors in (first, second)]
     pairs = pair_actors(first, second).pairs
     return [(figures[0].index(a.figure), figures[1].index(b.figure)) for a, b in pairs]

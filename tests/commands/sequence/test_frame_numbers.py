@@ -1,4 +1,4 @@
-"""Numbers of frames on the command line: the same in render, convert and info, and their ends."""
+"""Frame numbers on the command line: consistent in render, convert and info, and their limits."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_capture_times_match_its_frames():
 
 @pytest.fixture
 def hundred(tmp_path):
-    """A model and frames 100 to 104 of one person, who goes 1 along y a frame."""
+    """A model and frames 100 to 104 of one person, who moves by 1 along y per frame."""
     np.savez(tmp_path / "SMPL.npz", **model("smpl", 32))
     straight = {"Rh": [[0.0, 0.0, 0.0]], "poses": [[0.0] * 72], "shapes": [[0.0] * 10]}
     frames = {100 + n: [body(0, Th=[[0.0, float(n), 0.0]], **straight)] for n in range(5)}

@@ -1,4 +1,4 @@
-"""``viewer render`` of motions: numbered pictures, videos, contact sheets; never half a file."""
+"""``viewer render`` of motions: numbered images, videos and contact sheets; never partial files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOTHING_MOVES = "nothing moves: no file has a motion (--turntable rotates the ca
 
 
 def single(files, seconds, camera, box, size=(64, 48), **options) -> np.ndarray:
-    """Return the picture of one time, drawn without this command's code."""
+    """Return the image at one time, rendered without the code of the command."""
     from viewer.rendering.offscreen import Offscreen
 
     scene = viewer.load(*files)
@@ -49,7 +49,7 @@ def test_numbered_images_match_the_frames(draw, walk, tmp_path):
 def test_sequence_shows_the_same_as_single_frames(draw, walk, tmp_path):
     """At a given distance only the target is fitted: that of the middle of all frames."""
     options = ("--distance", "30", "--no-grid", "--background", "transparent")
-    axis = ("--front", "+z")  # as cameras have it that know nothing of figures
+    axis = ("--front", "+z")  # as for cameras independent of figures
     draw(walk, "{frame}.png", "--frames", "0:31", *axis, *options)
     assert len(names(tmp_path, ".png")) == 31
     scene = viewer.load(*walk)
@@ -227,7 +227,7 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
     assert ": 8 frames of 80 x 80, " in said.out
 
 
-# What does not go together
+# Incompatible options
 
 
 @pytest.mark.parametrize(
@@ -310,7 +310,7 @@ def test_existing_files_are_checked_before_rendering(draw, walk, tmp_path):
 
 def test_inputs_are_never_replaced(draw, tmp_path):
     skel, skin = write_rig(tmp_path)
-    clip = tmp_path / "walk_1.png"  # a clip under the name of a picture
+    clip = tmp_path / "walk_1.png"  # a clip with an image suffix
     clip.write_text(anim_text(1.0, 9, {}))
     kept = clip.read_bytes()
     said = draw([str(skel), str(skin), str(clip)], "walk_{frame}.png", "--force", code=5)
