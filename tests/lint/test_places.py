@@ -31,7 +31,7 @@ def test_locations_follow_pose_and_placement() -> None:
     actor.placement[:3, 3] = 0.0, 10.0, 0.0
     places = places_of(about(vertices=[5], joints=[1]), scene)
     assert places.vertices.tolist() == [[2, 11, 1]] and places.joints.tolist() == [[3, 12, 0]]
-    # In its binding space the mesh has no pose.
+    # In bind pose the mesh has no pose.
     bound = places_of(about(vertices=[5]), scene, binding=True)
     assert bound.vertices.tolist() == [[-1, 11, 1]]
 
