@@ -1,4 +1,4 @@
-"""The orbit camera: where points land, by hand and by projecting with plain numpy."""
+"""The orbit camera: projected points, by hand and with plain numpy."""
 
 from __future__ import annotations
 

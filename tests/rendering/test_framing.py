@@ -1,4 +1,4 @@
-"""Cameras that see a whole motion, all the way round, and find whom they follow."""
+"""Cameras that frame a whole motion, also as a turntable, and find their follow target."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stored pictures, and proof that comparing with them notices what it should."""
+"""Golden images, and tests of the comparison itself."""
 
 from __future__ import annotations
 

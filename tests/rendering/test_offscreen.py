@@ -1,4 +1,4 @@
-"""Pictures without a window: sizes, samples, several contexts, threads, memory."""
+"""Images without a window: sizes, samples, several contexts, threads, memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Palettes: neighbours are told apart, by eyes that lack a kind of cone as well."""
+"""Palettes: neighbours are distinguishable, also with colour vision deficiency."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Body parts in distinct colours, hidden parts, and the coarser mesh."""
+"""Body parts in distinct colours, hidden parts, and the reduced mesh."""
 
 from __future__ import annotations
 

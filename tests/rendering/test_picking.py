@@ -1,4 +1,4 @@
-"""Clicks on known places: which actor, joint, triangle and keypoint, and where in the scene."""
+"""Picking at known positions: actor, joint, triangle, keypoint and scene position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Looking through calibrated cameras: points land on the pixels that OpenCV's formula gives."""
+"""Calibrated cameras: points project to the pixels given by OpenCV's formula."""
 
 from __future__ import annotations
 

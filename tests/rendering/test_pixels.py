@@ -1,4 +1,4 @@
-"""What single pixels must be: orientation, colours, transparency, by hand."""
+"""Single pixels against hand calculation: orientation, colours, transparency."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where points are in the picture: by hand for a camera on an axis, and behind it."""
+"""Projected points: by hand for a camera on an axis, and behind it."""
 
 from __future__ import annotations
 

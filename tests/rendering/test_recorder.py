@@ -1,4 +1,4 @@
-"""Many frames in order: the pixels of single pictures, on copies, and an orderly end any time."""
+"""The recorder: frames match single images, use copies, and end cleanly at any time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How numbers become colours: ranges that one bad triangle does not take over."""
+"""Mapping of values to colours: ranges that are robust to outliers."""
 
 from __future__ import annotations
 

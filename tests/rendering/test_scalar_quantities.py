@@ -1,4 +1,4 @@
-"""Scalar quantities: the numbers on the GPU, their range, and their colours in the picture."""
+"""Scalar quantities: values on the GPU, their range, and their rendered colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shader programs: what does not compile names our file and line, whatever the driver says."""
+"""Shader programs: compile errors name our file and line with every driver."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words beside points: which are drawn where there is no room for all, and how large."""
+"""Labels next to points: priority where not all fit, and size."""
 
 from __future__ import annotations
 

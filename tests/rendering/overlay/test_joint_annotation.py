@@ -1,4 +1,4 @@
-"""Pictures of joints: bones through the skin, names, axes, and what is picked there."""
+"""Rendered joints: bones through the skin, names, axes, and picking."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joints over the picture: bones, axes, dots, and which of them is at a pixel."""
+"""Joint overlays: bones, axes, dots, and picking them at a pixel."""
 
 from __future__ import annotations
 

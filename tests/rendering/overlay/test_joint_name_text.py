@@ -1,4 +1,4 @@
-"""Names beside joints: the selected one first, then the nearer, and how many are left out."""
+"""Joint names: the selected one first, then the nearer, and the omitted count."""
 
 from __future__ import annotations
 

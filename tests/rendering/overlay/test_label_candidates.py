@@ -1,4 +1,4 @@
-"""Places of labels: what is said of all at once is what one finds point by point."""
+"""Label candidates: batched results match point-by-point checks."""
 
 from __future__ import annotations
 

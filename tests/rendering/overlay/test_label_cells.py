@@ -1,4 +1,4 @@
-"""A picture in cells: what lies in rectangles, compared with looking at every dot."""
+"""Label cells: contents of rectangles, compared with brute force."""
 
 from __future__ import annotations
 

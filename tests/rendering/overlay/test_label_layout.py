@@ -1,4 +1,4 @@
-"""Labels beside their own points, where room is; never over each other, nor nearer to others."""
+"""Label layout: next to their own points, without overlap or ambiguity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Legends as data: round numbers, units, things by area, notes."""
+"""Legends as data: round numbers, units, entries by area, notes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns of a legend: as few as their lines allow, and what has no room is counted."""
+"""Legend columns: as few as possible, with overflow counted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Legends in pictures: where they are, what of them is seen, and what they leave alone."""
+"""Rendered legends: position, visibility and undisturbed surroundings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words as pixels: their size, their rim, and shelves of them."""
+"""Text as pixels: size, outline, and packing on shelves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Marks in the picture: where, how large, over what, and nothing of what lies behind the eye."""
+"""Rendered marks: position, size, depth, and clipping behind the eye."""
 
 from __future__ import annotations
 

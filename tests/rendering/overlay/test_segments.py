@@ -1,4 +1,4 @@
-"""Segments and dots on the screen: how wide, how round, in front or behind."""
+"""Segments and dots on the screen: width, roundness and depth."""
 
 from __future__ import annotations
 

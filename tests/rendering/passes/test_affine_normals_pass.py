@@ -1,4 +1,4 @@
-"""Normals that the GPU gives figures whose joints scale, shear or mirror."""
+"""GPU normals of figures whose joints scale, shear or reflect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Annotations in pictures: segments and words of several, over each other, and how many fit."""
+"""Rendered annotations: segments and labels of several, their order, and how many fit."""
 
 from __future__ import annotations
 

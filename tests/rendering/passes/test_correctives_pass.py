@@ -1,4 +1,4 @@
-"""Shape and pose correctives on the GPU, summed in the shader or before it, and what is sent."""
+"""Shape and pose correctives on the GPU, summed in the shader or before it, and uploads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dual quaternion skinning in the shader, and the mixture, held to the float64 reference."""
+"""Dual quaternion skinning in the shader, also blended with LBS, against the float64 reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ghosts: surfaces over the scene that are no part of it."""
+"""Ghosts: surfaces drawn over the scene without being part of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keypoints in the picture: where they are, through the surface, and only when asked for."""
+"""Rendered keypoints: position, visibility through the surface, only on request."""
 
 from __future__ import annotations
 

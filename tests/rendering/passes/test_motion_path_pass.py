@@ -1,4 +1,4 @@
-"""Paths in the picture: where, how wide, what part of them, and computed only when needed."""
+"""Rendered motion paths: position, width, visible part, and caching."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Captured keypoints in the picture: where, how large, in what colour, how opaque."""
+"""Rendered captured keypoints: position, size, colour and opacity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Seams on the GPU: a row for every split vertex, all copies of one posed alike."""
+"""Seams on the GPU: a row for every split vertex, all copies of one posed identically."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the skinning shader writes, held to the float64 reference, and when it runs at all."""
+"""Output of the skinning shader against the float64 reference, and when it runs."""
 
 from __future__ import annotations
 
