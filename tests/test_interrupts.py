@@ -1,4 +1,4 @@
-"""Signals at chosen moments: what ends the program, what comes too late, what stays behind.
+"""Signals at chosen moments: termination, late signals, and leftover files.
 
 Programs signal themselves at the moment that is tested, so nothing depends on how fast they are.
 """

@@ -1,4 +1,4 @@
-"""BVH among other files: units that agree, models that are driven, and what is said of both."""
+"""BVH among other files: common units, driven models, and messages about both."""
 
 from __future__ import annotations
 

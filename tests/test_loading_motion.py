@@ -1,4 +1,4 @@
-"""Files that move or change figures, opened together: who gets what, and what is refused."""
+"""Motions, poses and morphs opened together with figures: assignment and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Body models that a person has on disk, found by their published names."""
+"""Body models on disk, found by their published names."""
 
 import json
 import os

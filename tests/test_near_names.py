@@ -1,4 +1,4 @@
-"""Names that are offered in place of one that does not exist."""
+"""Names suggested in place of an unknown one."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Actors and scenes are called after what was opened, and no two alike."""
+"""Actors and scenes are named uniquely after the opened files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Each registry is exactly its folder, and what it names can be loaded."""
+"""Each registry is exactly its folder, and its entries can be loaded."""
 
 from importlib import import_module
 from inspect import signature

@@ -1,4 +1,4 @@
-"""Standard streams that are closed, full, redirected or read by nobody: one line at most."""
+"""Standard streams that are closed, full, redirected or without a reader: one line at most."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The real window under Xvfb, driven by xdotool; pictures of the screen are compared."""
+"""The real window under Xvfb, driven by xdotool; screenshots are compared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When the window rests: frames that show what was awaited, then none."""
+"""The idle window: frames that show the awaited event, then none."""
 
 from __future__ import annotations
 
