@@ -205,7 +205,7 @@ class Renderer:
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
-        self._draw_motion_paths(scene, view, options, target.size)
+        self.late.draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
@@ -353,22 +353,6 @@ class Renderer:
         markers.update(actor.require_pose(), options.skinning)
         # Marker positions already include the placement of the pose.
         self.late.keypoint_pass.draw(markers, actor.placement, view, options)
-
-    def _draw_motion_paths(
-        self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
-    ) -> None:
-        if not options.path_joints:
-            return
-        from viewer.rendering.passes.motion_path_pass import Moment
-
-        at = Moment(scene.time or 0.0, options.path_seconds)
-        for index, actor in enumerate(scene.actors):
-            joints = tuple(joint for owner, joint in options.path_joints if owner == index)
-            # Paths are drawn across gaps: they show past and future positions of absent actors.
-            if joints and actor.visible and actor.clip is not None:
-                paths = self.buffers.motion_path(actor)
-                paths.update(actor, joints, options.min_confidence)
-                self.late.motion_path_pass.draw(paths, actor.placement, view, size, at)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed mesh, created on first use; its figure must have a mesh."""
