@@ -97,7 +97,9 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     occlusion *= ambient;
     for (int i = 0; i < 2; ++i) {
         float cosine = max(dot(normal, u_light_directions[i]), 0.0);
-        float seen = visibility(i, position, normal, cosine, ambient);
+        float seen = visibility(i, position, normal, cosine);
+        // Only the key light has a shadow map; occlusion stands for the rim light's shadow.
+        seen *= i == 1 ? mix(1.0, ambient, 0.7) : 1.0;
         color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
         // The studio's key box hangs about where the key light is, and the same things hide it.
         if (i == 0)
