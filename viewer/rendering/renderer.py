@@ -201,6 +201,7 @@ class Renderer:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+        self._draw_blended(meshes, view, options)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
@@ -296,6 +297,11 @@ class Renderer:
         drawn += [instances.mesh for _, instances in meshes.instanced]
         self.late.use_pictures(drawn, options)
         self._draw_layer(meshes, view, options, blended=False)
+
+    def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        """Draw translucent surfaces, over all that is opaque and the ground."""
+        drawn = [mesh.mesh for _, mesh in meshes.singles]
+        drawn += [instances.mesh for _, instances in meshes.instanced]
         if any(mesh.is_blended for mesh in drawn):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
