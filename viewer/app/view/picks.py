@@ -17,7 +17,7 @@ from viewer.app.posing.tool_actions import no_tool
 from viewer.app.view.hovering import hover_actor, joint_near
 from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
-from viewer.app.weights.hover_text import tells_vertices
+from viewer.app.weights.hover_text import shows_vertex_info
 from viewer.app.weights.state import Hover, Weights, wants_vertex
 from viewer.errors import ViewerError
 from viewer.phrases import printable
@@ -253,7 +253,7 @@ def _look_under_mouse(
     place = (io.mouse_pos.x, io.mouse_pos.y)
     is_inside = x <= place[0] < x + width and y <= place[1] < y + height
     view.is_waiting = False
-    if not tells_vertices(state) or not is_inside:
+    if not shows_vertex_info(state) or not is_inside:
         view.hover = Hover()
         return
     now, hover = imgui.get_time(), view.hover
