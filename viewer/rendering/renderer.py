@@ -75,8 +75,6 @@ class Renderer:
         Annotations, drawn over everything except legends.
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
-    outlines : sequence of Outlined
-        Parts of the scene to outline; if empty, the selection with ``DisplayOptions.outline``.
     names_left_out : (int, int)
         Number of joint names omitted from the last picture for lack of room, and number of
         joints within it.
@@ -96,7 +94,6 @@ class Renderer:
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
-        self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
         self.lighting = Lighting(context, self.programs)
         self.late = LatePasses(
@@ -170,9 +167,8 @@ class Renderer:
         self.names_left_out = draw_overlays(
             self.late, over, scene, view, options, target.size, selected
         )
-        if self.outlines or options.outline:
-            outlined = self.outlines or [Outlined(*selected)]
-            self.late.outline_pass.draw(outlined, scene, view, options, target)
+        if options.outline:
+            self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
 
@@ -252,6 +248,20 @@ class Renderer:
         """
         self.buffers.keep_only(scene.actors)
         return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
+
+    def draw_outlines(
+        self,
+        outlined: Sequence[Outlined],
+        scene: Scene,
+        camera: Camera,
+        options: DisplayOptions,
+        target: Target,
+        box: Floats,
+    ) -> None:
+        """Draw outlines alone, with straight alpha; parameters are those of ``draw``."""
+        self._prepare(target)
+        view = view_of(camera, target.size, box)
+        self.late.outline_pass.draw(outlined, scene, view, options, target, is_layer=True)
 
     def prepare(self, scene: Scene) -> None:
         """Upload a scene's buffers in advance, so that failure leaves the previous scene intact.
