@@ -110,7 +110,7 @@ def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
         refuse(command, f"{target}: exists already")
         assert contents(folder) == {target.name: b"precious"}
         target.unlink()
-        # The mesh's own picture is read, though nobody named it.
+        # The mesh's own texture is read without being named.
         for path in (*inputs.of_roof[:2], mesh.with_name("mesh_0.png")):
             target.symlink_to(path)
             refuse([*command, "--force"], f"{target}: is an input file")

@@ -1,4 +1,4 @@
-"""``viewer rig --clip``: the template's motions for the mesh that got its rig."""
+"""``viewer rig --clip``: transfer of the template's motions to the rigged mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``viewer FILES`` without a display: one line, a picture in the current folder, exit code 0."""
+"""``viewer FILES`` without a display: one line, an image in the current folder, exit code 0."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbered pictures and contact sheets; digits without a font."""
+"""Numbered images and contact sheets; digits without a font."""
 
 from __future__ import annotations
 

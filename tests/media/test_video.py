@@ -1,4 +1,4 @@
-"""Videos: colours, sizes, rates and transparency come back; nothing broken is ever left."""
+"""Videos: colours, sizes, rates and transparency round-trip; no partial files remain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machines without a usable OpenGL, brought about by the environment; each has its message."""
+"""Machines without a usable OpenGL, simulated by the environment; each has its message."""
 
 from __future__ import annotations
 
