@@ -127,7 +127,7 @@ def export_animations(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """One written person: original animation, animation with closed gaps, records, read-back."""
+    """One written person: original animation, animation with filled gaps, records, read-back."""
 
     original: SampledAnimation
     animation: SampledAnimation

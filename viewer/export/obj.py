@@ -110,7 +110,7 @@ def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
 
 
 def _materials(mesh: Mesh, path: Path) -> dict[Path, bytes]:
-    """Return the pictures and finally their ``.mtl``; empty if there is no picture."""
+    """Return the images and finally their ``.mtl``; empty if there is no image."""
     files: dict[Path, bytes] = {}
     parts = [f"newmtl {_PLAIN}\nKd 1 1 1\n"]
     stem = path.stem[:80]  # longer names would be truncated after the number

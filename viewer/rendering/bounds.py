@@ -17,22 +17,22 @@ from viewer.rig.skin import Skin, bind_positions, owners
 
 __all__ = ["Bounds", "stretch"]
 
-_MARGIN = 1.03  # for pose correctives and skinning methods that do not blend linearly
-_MOST = 32  # figures whose radii are kept
+_MARGIN = 1.03  # margin for pose correctives and skinning methods that do not blend linearly
+_MOST = 32  # maximum number of figures with cached radii
 
 
 class Bounds:
     """Spheres that contain the drawn surfaces of actors, at the cost of their joints.
 
-    A vertex skinned linearly is a weighted mean of what each joint does to it, so it lies in the
-    convex hull of spheres about the joints that reach to their farthest vertices.
+    A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
+    it lies in the convex hull of spheres about the joints that reach to their farthest vertices.
     """
 
     def __init__(self) -> None:
         self._radii: dict[int, tuple[Figure, Floats, Floats]] = {}
 
     def spheres(self, actor: Actor, options: DisplayOptions) -> Floats:
-        """Return spheres around what is drawn of an actor.
+        """Return spheres around the drawn parts of an actor.
 
         Parameters
         ----------

@@ -31,7 +31,7 @@ class Shadow:
     texel : float
         Side of a texel, scene units.
     strength : float
-        0 to 1: fraction of the light that a shadow takes away.
+        0 to 1: fraction of the light that a shadow removes.
     """
 
     texture: moderngl.Texture
@@ -47,9 +47,9 @@ class Occlusion:
     Attributes
     ----------
     texture : moderngl.Texture
-        Fraction of the light, and depth in camera space, at half of the picture's resolution.
+        Fraction of the light, and depth in camera space, at half of the image's resolution.
     strength : float
-        0 to 1: how much of it counts.
+        Strength of the occlusion, 0 to 1.
     """
 
     texture: moderngl.Texture
@@ -58,7 +58,7 @@ class Occlusion:
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """What changes the light on surfaces besides the lights themselves."""
+    """Effects on the light at surfaces: shadows and occlusion."""
 
     shadow: Shadow | None = None
     occlusion: Occlusion | None = None
@@ -78,7 +78,7 @@ class Effects:
                 "u_shadow_map": SHADOW_UNIT,
                 "u_shadow_matrix": as_uniform(shadow.matrix @ np.linalg.inv(view)),
                 "u_shadow_radius": FILTER_RADIUS / size,
-                # As far as the filter reaches, or the surface would shade itself.
+                # As far as the filter reaches, or the surface would shadow itself.
                 "u_shadow_offset": (FILTER_RADIUS + 1.0) * shadow.texel,
                 "u_shadow_strength": shadow.strength,
             }

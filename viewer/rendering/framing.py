@@ -137,7 +137,7 @@ def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> N
     points : (N, 3)
         Points to frame, scene space.
     aspect : float
-        Width / height of the picture.
+        Width / height of the image.
     turn : float
         Rotation about the target in degrees.
     """

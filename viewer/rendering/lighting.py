@@ -23,11 +23,11 @@ from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = ["Lighting"]
 
-_SHADOW_STRENGTH = 0.9  # the rest stands for light that other surfaces reflect
+_SHADOW_STRENGTH = 0.9  # the rest represents light reflected by other surfaces
 
 
 class Lighting:
-    """Draws what the light on a scene depends on, before each pass of a picture.
+    """Draws the maps that the lighting depends on, before each pass of an image.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ class Lighting:
         return made
 
     def begin(self, casters: Casters, up: str, box: Floats) -> None:
-        """Draw what all passes of a picture share.
+        """Draw the maps shared by all passes of an image.
 
         Parameters
         ----------
         casters : Casters
-            What casts shadows.
+            The shadow casters.
         up : str
             The scene's up axis.
         box : (2, 3)
@@ -82,18 +82,18 @@ class Lighting:
             self._contact = self._contact_pass.draw(casters.draw, self._spheres, size, axes, height)
 
     def light(self, casters: Casters, view: View, sample: Sample, strength: float) -> View:
-        """Draw what one pass of a picture needs; return its view with the effects.
+        """Draw the maps that one pass of an image needs; return its view with the effects.
 
         Parameters
         ----------
         casters : Casters
-            What casts shadows.
+            The shadow casters.
         view : View
             The camera's matrices.
         sample : Sample
             The pass.
         strength : float
-            0 to 1: how much of shadows and occlusion counts.
+            Strength of shadows and occlusion, 0 to 1.
         """
         options, shadow = casters.options, None
         if self._spheres is not None and options.lights.key.strength > 0.0:

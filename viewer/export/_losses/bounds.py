@@ -136,12 +136,12 @@ def _lengths(directions: Floats | None) -> Floats:
 
 
 def _norms(turns: Floats) -> Floats:
-    """Return the norm of the nine numbers of each joint: (F, J)."""
+    """Return the norm of the nine corrective weights of each joint: (F, J)."""
     return np.asarray(np.linalg.norm(turns.reshape(len(turns), -1, _NUMBERS), axis=2))
 
 
 def _stretches(correctives: Floats | None) -> Floats:
-    """Return upper bounds of the displacement by nine numbers of norm 1: (J,)."""
+    """Return upper bounds of the displacement by nine corrective weights of norm 1: (J,)."""
     if correctives is None:
         return np.zeros(0)
     squares = np.einsum("pva,pva->pv", correctives, correctives)

@@ -120,7 +120,7 @@ class SegmentPass:
         view : View
             The camera's matrices.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         manner : Manner
             Style of the segments.
         """

@@ -25,7 +25,7 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
-_CUBE_SIZE = 0.015  # of the skeleton's size, for a skeleton without boxes
+_CUBE_SIZE = 0.015  # fraction of the skeleton's size, for a skeleton without boxes
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
 

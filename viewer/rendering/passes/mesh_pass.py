@@ -26,7 +26,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)
 
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
-_NORMAL_LENGTH = 0.02  # of the figure's size
+_NORMAL_LENGTH = 0.02  # fraction of the figure's size
 _USUAL = DisplayOptions().shading
 _TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # lower units belong to the skinning shader
 
