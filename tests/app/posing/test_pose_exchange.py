@@ -166,7 +166,7 @@ def test_figure_without_skeleton_has_no_pose_to_copy(drive, rig):
 def test_pose_menu_of_the_panel_copies_pastes_and_mirrors(box):
     box.enter_value("joint_1.x", "45")
     before = _key(box)
-    for entry in ("Copy as JSON", "Copy as the file's numbers"):
+    for entry in ("Copy as JSON", "Copy as raw pose values"):
         box.click("Pose…")
         box.click(entry)
         box.key("r")
@@ -361,7 +361,7 @@ def test_what_is_open_is_never_written_over(drive_body, tmp_path):
         for save in (save_export, save_pose):
             hand.state.error = ""
             save(hand.state, model)
-            assert hand.state.error == f"{model}: is an input file, which is never replaced"
+            assert hand.state.error == f"{model}: input files are never overwritten"
     assert model.read_bytes() == b"precious"
 
 

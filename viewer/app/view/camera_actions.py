@@ -14,7 +14,7 @@ __all__ = ["face", "fit_view", "look", "look_through", "toggle_projection"]
 
 
 def fit_view(state: AppState) -> None:
-    """Aim the camera at the scene as it is posed and fill the view with it."""
+    """Aim the camera at the scene in its current pose and fill the view with it."""
     fit_shown(state)
 
 

@@ -41,11 +41,11 @@ def draw_view_menu(state: AppState) -> None:
     if menu_item(state, text, "V", shows, "" if shows else no_view(state, "weight")):
         toggle_weights(state)
     why = no_mesh(state)
-    if menu_item(state, "Vertex under the mouse", "", view.tells_always, why):
+    if menu_item(state, "Inspect vertex under cursor", "", view.tells_always, why):
         toggle_telling(state)
     if menu_item(state, "Pick vertices", "", view.picks_vertices, why):
         toggle_picking(state)
     why = "" if view.pinned is not None else "no vertex is pinned: Alt+click one"
-    if menu_item(state, "Unpin the vertex", "Esc", why=why):
+    if menu_item(state, "Unpin vertex", "Esc", why=why):
         unpin(state)
     imgui.end_menu()

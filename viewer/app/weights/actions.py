@@ -130,7 +130,7 @@ def toggle_telling(state: AppState) -> None:
     """Choose whether hover text is shown always or only while the Weights panel is visible."""
     view = state.of(Weights)
     view.tells_always = not view.tells_always
-    state.say_status(f"Vertex under the mouse {'on' if view.tells_always else 'off'}")
+    state.say_status(f"Inspect vertex under cursor {'on' if view.tells_always else 'off'}")
 
 
 def toggle_picking(state: AppState) -> None:
