@@ -326,7 +326,7 @@ def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, ca
     out.write_text("precious")
     assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 2
     assert capsys.readouterr().err == (
-        f"viewer: {out}: expected a picture (.png, .jpg, .jpeg, .bmp, .gif, .ppm, .tga, .tif, "
+        f"viewer: {out}: expected an image (.png, .jpg, .jpeg, .bmp, .gif, .ppm, .tga, .tif, "
         f".tiff, .webp) or a video (.mp4, .webm, .gif), found {suffix}\n"
     )
     assert out.read_text() == "precious"
