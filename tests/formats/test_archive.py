@@ -127,7 +127,7 @@ def test_transfer_in_text_mode_is_named(protocol: int) -> None:
 
 def test_text_that_is_no_pickle() -> None:
     line = refused(opened, b"positions 4 {\n", "x.pkl")
-    assert line == ("F002.archive", None, {"found": "something else"})
+    assert line == ("F002.archive", None, {"found": "an unknown format"})
 
 
 def test_single_array(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Material libraries (``.mtl``) referenced by an ``.obj``: the picture of each material.
+"""Material libraries (``.mtl``) referenced by an ``.obj``: the image of each material.
 
 ::
 
@@ -30,12 +30,12 @@ _VECTORS = ("-o", "-s", "-t")
 def read_libraries(
     source: Source, libraries: list[tuple[bytes, int]], names: list[str]
 ) -> tuple[Material, ...]:
-    """Return materials by name, with their pictures where these can be read.
+    """Return materials by name, with their images where these can be read.
 
     Parameters
     ----------
     source : Source
-        The ``.obj``; warned of libraries, materials and pictures that are missing.
+        The ``.obj``; warned of libraries, materials and images that are missing.
     libraries : list of (bytes, int)
         Text after each ``mtllib``, and its offset.
     names : list of str
@@ -85,7 +85,7 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
 
 
 def _read(library: Source, pictures: dict[str, tuple[str, int, Source]], known: set[str]) -> None:
-    """Record the location of each material's picture."""
+    """Record the location of each material's image."""
     name = ""
     position = 0
     for line in library.data.replace(b"\r", b"\n").split(b"\n"):
