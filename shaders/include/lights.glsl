@@ -1,10 +1,10 @@
-// The lights of the scene, for every shading that is lit by them.
+// The lights of the scene, for all lit shading modes.
 
 uniform vec3 u_light_directions[2];  // key and rim: towards each light, unit length, camera space
 uniform vec3 u_light_colors[2];      // linear, times strength
 uniform vec3 u_up;                   // the scene's up axis, unit length, camera space
 uniform vec3 u_sky;                  // ambient light on a surface that faces up, linear
-uniform vec3 u_ground;               // on one that faces down
+uniform vec3 u_ground;               // ambient light on a surface that faces down, linear
 
 // Hemisphere lighting: what a surface receives from a sky above and a ground below it.
 vec3 ambient_light(vec3 normal) {
