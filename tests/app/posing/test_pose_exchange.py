@@ -130,7 +130,7 @@ RUBBISH = {
     '{"dofs": {"tail.x": 1}}': "tail",
     '{"dofs": {"joint_1.x": "far"}}': "joint_1.x: expected a number",
     '{"shape": [1, 2, 3]}': "2 shape coefficients, found 3",
-    '{"a":' * 50_000: "too many nested levels",
+    '{"a":' * 50_000: "JSON nested too deeply",
 }
 
 
