@@ -125,7 +125,7 @@ def test_writer_refuses_what_is_no_pose(figures, tmp_path):
         UnsupportedFormatError, match=r"^\.json stores a pose, not a figure or clip$"
     ):
         viewer.write(figures["smpl"], tmp_path / "a.json")
-    with pytest.raises(UnsupportedFormatError, match="has no numbers of its own to write"):
+    with pytest.raises(UnsupportedFormatError, match="has no raw pose vector to write"):
         viewer.write(PoseRecord(dofs={"a.x": 1.0}), tmp_path / "a.txt")
     assert not list(tmp_path.iterdir())
 

@@ -76,7 +76,8 @@ def test_pictures_that_are_finished_stay_when_the_rest_is_given_up(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("missing/0.png", "does not exist"), ("0.psd", "cannot be written as this")]
+    ("name", "words"),
+    [("missing/0.png", "does not exist"), ("0.psd", "cannot be written in this format")],
 )
 def test_picture_that_cannot_be_written_is_one_line(tmp_path, name, words):
     with pytest.raises(OutputError, match=words):

@@ -95,7 +95,7 @@ def test_frames_are_counted_from_0_as_fps_counts(draw, walk, tmp_path, options, 
 
 def test_frames_behind_the_end_are_drawn_and_said(draw, walk, tmp_path):
     said = draw(walk, "{frame}.png", "--frames", "29:33", size="16x16")
-    assert said.err == "warning: --frames: frames 31 to 32 are beyond the motion's end\n"
+    assert said.err == "warning: --frames: frames 31 to 32 are beyond the end of the motion\n"
     assert len(names(tmp_path, ".png")) == 4
 
 
