@@ -86,7 +86,7 @@ def test_missing_files_are_named(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].unlink()
     again = lint_again(scene, files)
-    assert again.notes == ("a.skin is gone: only what is open was checked",)
+    assert again.notes == ("a.skin is missing: only the open scene was checked",)
     (gone,) = [f for f in again.findings if f.severity == "error" and f.code[0] == "F"]
     assert (gone.code, gone.file) == ("F001", files[1])
     found = {f.code: f for f in again.findings}

@@ -156,7 +156,7 @@ KEYS = (
     Shortcut(
         (_K.k,),
         "K",
-        "attached skin, or skin in binding space",
+        "posed skin, or skin in bind pose",
         "view.display_actions.toggle_binding",
     ),
     Shortcut((_K.w,), "W", "wireframe", _OPTION, ("wireframe", "Wireframe")),
@@ -206,7 +206,7 @@ KEYS = (
     Shortcut(
         (_CTRL | _SHIFT | _K.c,),
         "Ctrl+Shift+C",
-        "copy the pose as the file's own numbers",
+        "copy the pose as raw pose values",
         "posing.pose_actions.copy_numbers",
     ),
     Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", "posing.pose_actions.paste_pose"),

@@ -266,7 +266,7 @@ class Frame:
     def open(self, paths: Sequence[Path]) -> None:
         """Begin to read files; the current scene is shown until they have been read.
 
-        A skin opened while the scene is a lone skeleton, or the reverse, is attached if it fits.
+        A skin opened while the scene is a lone skeleton, or the reverse, is attached if it matches.
         """
         if not paths:
             return
@@ -362,12 +362,12 @@ class Frame:
         state.clock.playing, recording.settings = False, None
 
     def _save_screenshot(self) -> None:
-        """Save a picture of the scene under an unused name in the current folder."""
+        """Save an image of the scene under an unused name in the current folder."""
         try:
             path = free_path(Path.cwd(), self.state.scene.title, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
-            if "##legend" in self.state.item_rects:  # drawn over the picture, not in it
+            if "##legend" in self.state.item_rects:  # drawn over the image, not in it
                 self.state.say(
                     'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
                 )
@@ -377,7 +377,7 @@ class Frame:
             self.state.error = f"the current folder: {problem.strerror}"
 
     def scene_picture(self) -> Bytes:
-        """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
+        """Return the last image of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
         if self.pace.is_unfinished:  # a picture gets all its passes

@@ -1,4 +1,4 @@
-"""Key that identifies the picture in the view: the picture is redrawn when the key changes."""
+"""Key that identifies the image in the view: the image is redrawn when the key changes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PictureKeys:
         ghost: Ghost | None = None,
         annotations: Sequence[Annotation] = (),
     ) -> tuple[object, ...]:
-        """Return everything the picture of the scene depends on.
+        """Return everything the image of the scene depends on.
 
         Parameters
         ----------

@@ -244,7 +244,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
 def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
     """Return a message about a calibrated camera's visible lens distortion, which is not drawn.
 
-    Raises ViewerError if there is no such camera, or its files lack the size of its pictures.
+    Raises ViewerError if there is no such camera, or its files lack the size of its images.
     """
     if arguments.view is None:
         return []
@@ -288,11 +288,11 @@ def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def _joint_notes(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return messages about requested joint marks that are not visible."""
+    """Return messages about requested joint markers that are not visible."""
     has_one = any(actor.figure.skeleton is not None for actor in scene.actors)
     if has_one and options.show != "binding":
         return []
-    why = "there are no joints in binding space" if has_one else "no figure has a skeleton"
+    why = "no joints are shown in the bind pose" if has_one else "no figure has a skeleton"
     names = "xray", "joint_names", "joint_axes"
     requested = [name for name in names if getattr(options, name)]
     return [f"--{name.replace('_', '-')}: {why}" for name in requested]

@@ -72,7 +72,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
 
 
 def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
-    """Return the description of an actor; its box is in scene space, with up axis ``up``."""
+    """Return the description of an actor; its box is in world space, with up axis ``up``."""
     figure = actor.figure
     points = actor_points(actor) if actor.is_present else np.zeros((0, 3))
     box = bounding_box(points) if len(points) else None

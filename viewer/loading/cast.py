@@ -33,7 +33,7 @@ class Cast:
     views : list of CameraView
         Calibrated cameras, in scene space.
     diagnostics : list of Diagnostic
-        Messages from the construction.
+        Messages from assembling the scene.
     """
 
     actors: list[Actor]

@@ -1,4 +1,4 @@
-"""Rendering of integers into pictures without a font, with digits of 5 x 7 dots."""
+"""Draws integers into images without a font, with digits of 5 x 7 dots."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def digits(number: int) -> Bools:
 
 
 def write_number(pixels: Bytes, number: int) -> None:
-    """Draw a number into the lower left corner of a picture, on a translucent dark background.
+    """Draw a number into the lower left corner of an image, on a translucent dark background.
 
     Parameters
     ----------
     pixels : (H, W, 4) uint8
-        Changed in place; unchanged if the number does not fit.
+        Modified in place; unchanged if the number does not fit.
     number : int
         0 or more.
     """
@@ -53,7 +53,7 @@ def write_number(pixels: Bytes, number: int) -> None:
     if ink.shape[0] > height or ink.shape[1] > width:
         return
     corner = pixels[height - ink.shape[0] :, : ink.shape[1]]
-    # Over a transparent picture the opacity of the background becomes its alpha.
+    # Over a transparent image the opacity of the background becomes its alpha.
     under = corner.astype(np.float64)
     opacity = _PAPER_OPACITY
     under[..., :3] *= under[..., 3:] / 255.0

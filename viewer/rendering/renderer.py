@@ -1,4 +1,4 @@
-"""Renderer of a scene into a framebuffer, used for the window and for picture files."""
+"""Renderer of a scene into a framebuffer, used for the window and for image files."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Renderer:
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
     names_left_out : (int, int)
-        Number of joint names omitted from the last picture for lack of room, and number of
+        Number of joint names omitted from the last image for lack of room, and number of
         joints within it.
     """
 
@@ -240,9 +240,9 @@ class Renderer:
         options : DisplayOptions
             Display options.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         x, y : float
-            Pixels from the picture's left and upper edge.
+            Pixels from the image's left and upper edge.
         box : (2, 3)
             Bounds, as in ``draw``.
         """
@@ -343,7 +343,7 @@ class Renderer:
 
     def _draw_legend(self, size: tuple[int, int]) -> None:
         assert self.legend is not None  # meshes were drawn with their numbers
-        note = f"a picture of {size[0]} x {size[1]} pixels has no room for a legend"
+        note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
         if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)
 
