@@ -255,7 +255,9 @@ ACTIONS = (
     Action("Selection outlines", "view.outlines.toggle_outlines"),
     Action("Pick vertices", "weights.actions.toggle_picking", why="core.reasons.no_mesh"),
     Action(
-        "Vertex under the mouse", "weights.actions.toggle_vertex_info", why="core.reasons.no_mesh"
+        "Inspect vertex under cursor",
+        "weights.actions.toggle_vertex_info",
+        why="core.reasons.no_mesh",
     ),
     Action("Reset layout", "shown_panels.reset_layout"),
 )
