@@ -34,8 +34,7 @@ def _skeleton(hand):
 
 
 def _lights(hand):
-    x0, y0, _, _ = hand.state.item_rects["Distance"]
-    hand.click((x0 + 112, y0 - 20))
+    hand.show_panel("Lights")
 
 
 def _keys(hand):

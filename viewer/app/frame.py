@@ -29,6 +29,8 @@ from viewer.app.overlays import draw_hints
 from viewer.app.picture_key import PictureKeys
 from viewer.app.posing.gizmo_drawing import draw_gizmo
 from viewer.app.posing.shape_guard import drop_unreadable_shapes
+from viewer.app.preferences.applying import follow_preferences
+from viewer.app.preferences.state import Preferences
 from viewer.app.recording.record_dialog import draw_record_dialog
 from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
@@ -36,7 +38,7 @@ from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
 from viewer.formats import FORMATS, free_path, save_image
-from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
+from viewer.loading import Contents, MotionSettings, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
 from viewer.phrases import printable
 from viewer.rendering.gpu.target import Target
@@ -102,6 +104,7 @@ class Frame:
         """Run a frame without painting the panels."""
         state = self.state
         drop_motion_before_press()
+        follow_preferences(state)
         if not stops_time(state):
             state.clock.advance(imgui.get_io().delta_time)
         drop_unreadable_shapes(state)
@@ -247,7 +250,9 @@ class Frame:
         if is_part and paths[0].suffix.lower() not in _ADDED:
             attempts.insert(0, [*state.paths, *paths])
         opened = state.paths or bundled_files()
-        state.of(Files).loader = Loader(paths, attempts, self.wake, opened=opened)
+        up = state.of(Preferences).up
+        settings = MotionSettings(up=up) if up else None
+        state.of(Files).loader = Loader(paths, attempts, self.wake, settings, opened)
 
     def _take_loaded(self) -> None:
         """Show the files that were read, or the error."""

@@ -21,6 +21,7 @@ from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.clip_actions import new_clip
 from viewer.app.features import PANELS
 from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.model_folder import set_model_folder
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
@@ -35,13 +36,13 @@ from viewer.app.posing.pose_actions import (
     save_export,
     save_pose,
 )
+from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.state import Recording, RecordSettings
 from viewer.app.shown_panels import ShownPanels, is_open, set_open
 from viewer.app.view.view_menu import draw_view_menu
-from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, files_written
 from viewer.formats import FORMATS, file_stem, opened_text
-from viewer.models import known_models, load_model_folder, save_model_folder
+from viewer.models import known_models, load_model_folder
 from viewer.phrases import printable
 
 __all__ = ["draw_menus"]
@@ -136,18 +137,8 @@ def _draw_models(state: AppState) -> list[Path]:
     imgui.separator()
     if menu_item(state, "Choose model folder…"):
         start = load_model_folder() or folder_of(state.paths)
-        files.dialog = FileDialog(start, _set_model_folder, "folder", "Folder of body models")
+        files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
     return chosen
-
-
-def _set_model_folder(state: AppState, paths: list[Path]) -> None:
-    try:
-        folder = save_model_folder(paths[0])
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
-    count = len(known_models(folder))
-    state.say(f"{count} body models in {printable(folder, 200)}")
 
 
 def _ask_for_pose(state: AppState) -> None:
@@ -199,3 +190,6 @@ def _draw_edit_menu(state: AppState) -> None:
     imgui.separator()
     if menu_item(state, "Check the rig", why=no_job_room(state)):
         check_rig(state)
+    imgui.separator()
+    if menu_item(state, "Preferences…", "Ctrl+,"):
+        open_preferences(state)

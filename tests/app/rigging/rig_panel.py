@@ -5,7 +5,7 @@ from __future__ import annotations
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.skinning import deform
 
-SIZE = (900, 1250)
+SIZE = (1000, 1250)
 
 
 def names(hand):

@@ -27,7 +27,7 @@ def test_menu_and_key_switch_what_is_seen_of_joints(hand, name):
 
 
 def test_boxes_of_the_display_panel(drive, rig):
-    hand = drive(*rig, size=(900, 1000), samples=1)
+    hand = drive(*rig, size=(1000, 1000), samples=1)
     for short, name in (("X-ray", "xray"), ("Names", "joint_names"), ("Axes", "joint_axes")):
         hand.click(f"{short}###{name}")
         assert getattr(hand.state.options, name)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
@@ -32,7 +33,6 @@ from viewer.phrases import printable
 
 __all__ = ["draw_results"]
 
-_WARNING = (1.0, 0.77, 0.30, 1.0)
 _LINES_HEIGHT = 9.0  # visible lines of the report
 
 
@@ -138,7 +138,7 @@ def _draw_lines(state: AppState, result: Result) -> None:
         for line in result.rigged.lines:
             warns = line.severity == "warning"
             if warns:
-                imgui.push_style_color(imgui.Col_.text, _WARNING)
+                imgui.push_style_color(imgui.Col_.text, ink(WARNING))
             imgui.text_wrapped(printable(line.labelled, 400))
             if warns:
                 imgui.pop_style_color()
