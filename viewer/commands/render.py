@@ -84,6 +84,8 @@ def run(arguments: argparse.Namespace) -> int:
     if request is None or request.kind != "pictures":
         check_targets([output], inputs_of(arguments), arguments.force)
     options = display_of(arguments)
+    if arguments.quality is None and (request is not None or arguments.panels):
+        options.quality = "normal"
     _check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format has no transparency"])
@@ -121,7 +123,8 @@ def _draw_still(
         fits = arguments.distance is None and arguments.view is None
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
     else:
-        pixels = draw_scene(scene, size, camera, options, box, arguments.gpu)
+        is_chosen = arguments.quality is not None
+        pixels = draw_scene(scene, size, camera, options, box, arguments.gpu, is_chosen)
     save_image(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
     colors = scalar_text(scene, options)
@@ -152,11 +155,18 @@ def draw_scene(
     options: DisplayOptions,
     box: Floats,
     device: int | None = None,
+    is_chosen: bool = False,
 ) -> Bytes:
-    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed."""
+    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed.
+
+    A quality that was not chosen is lowered where drawing it in software takes long.
+    """
     from viewer.rendering.offscreen import Offscreen
+    from viewer.rendering.software_limits import limit_passes
 
     with deferred(), Offscreen(device) as offscreen:
+        if not is_chosen:
+            print_warnings(limit_passes(options, scene, size, offscreen.context))
         pixels = offscreen.render(scene, size, camera, options, box)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:

@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_display_arguments(parser)
     add_skinning_arguments(parser)
     # Options that are not given have the user's preferred values.
-    parser.set_defaults(samples=None, up=None)
+    parser.set_defaults(samples=None, quality=None, up=None)
 
 
 def _scale(text: str) -> float:
@@ -109,6 +109,7 @@ def _fill_in(arguments: argparse.Namespace) -> None:
     preferences = load_preferences()
     if arguments.samples is None:
         arguments.samples = preferences.samples
+    arguments.quality = arguments.quality or preferences.quality
     arguments.up = arguments.up or preferences.up or None
 
 

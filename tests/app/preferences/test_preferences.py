@@ -14,7 +14,7 @@ from viewer.app.preferences.state import Appearance, Preferences
 from viewer.app.preferences.storage import load_preferences, preferences_file, save_preferences
 
 WIREFRAME = next(key.name for key in KEYS if key.label == "W")
-CHANGED = Preferences("light", 1.5, 18.0, False, "final", 8, "z", {WIREFRAME: "Shift+P"})
+CHANGED = Preferences("light", 1.5, 18.0, False, "draft", 8, "z", {WIREFRAME: "Shift+P"})
 
 
 @pytest.fixture

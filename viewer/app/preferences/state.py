@@ -62,7 +62,7 @@ class Preferences:
     scale: float = 0.0
     font_size: float = 15.0
     in_degrees: bool = True
-    quality: str = "normal"
+    quality: str = "final"
     samples: int = 4
     up: str = ""
     keys: dict[str, str] = field(default_factory=dict)

@@ -66,7 +66,7 @@ def draw_alignment(state: AppState) -> None:
     """Draw the settings of the alignment, its error, and the tools to move the template by hand."""
     rigging, why = state.of(Rigging), no_job_room(state)
     choices = rigging.choices
-    axes = {"": "searched", **{axis: axis for axis in AXES}}
+    axes = {"": "automatic", **{axis: axis for axis in AXES}}
     choices.up = choice(state, "Up", choices.up, axes)
     explain("the target's axis that points up")
     choices.facing = choice(state, "Facing", choices.facing, axes)
@@ -77,7 +77,7 @@ def draw_alignment(state: AppState) -> None:
     if button(state, "Align", why):
         start_align(state)
     if not why:
-        explain(f"searched for by closest points{_FITS if choices.fits else ''}")
+        explain(f"finds the best placement by closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):

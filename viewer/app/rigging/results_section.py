@@ -16,9 +16,12 @@ from viewer.app.rigging.results import (
     RESULT_COLORS,
     TARGET,
     no_motion_of,
+    no_trial_of,
     plays_motion,
+    plays_trial,
     save_rigged,
     set_motion,
+    set_trial,
     show_colors,
     show_version,
     shown_result,
@@ -51,6 +54,12 @@ def draw_results(state: AppState) -> None:
         explain("play the template's motion at the target's position")
     if plays != moves:
         set_motion(state, result, plays)
+    tries, still = plays_trial(result), no_trial_of(result)
+    chosen = checkbox(state, "Trial motion", tries, still)
+    if not still:
+        explain("bend each joint to both sides, to see how the weights deform the mesh")
+    if chosen != tries:
+        set_trial(state, result, chosen)
     _draw_table(state)
     if button(state, "Save rigged…", no_job_room(state)):
         _ask_where(state, result)
@@ -100,13 +109,13 @@ def _draw_table(state: AppState) -> None:
         [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
     )
     _row(
-        "residual",
+        "largest error",
         "largest distance of the posed result from the target, relative to its size",
         [f"{one.residual:.1e}" for one in rigged],
     )
     _row(
-        "guarded",
-        "vertices bent too far for exact inverse skinning: their rest position is an estimate",
+        "estimated",
+        "vertices bent too far to find their rest position exactly: it is an estimate",
         [f"{int(one.guarded.sum()):,}" for one in rigged],
     )
     _row(
