@@ -1,5 +1,6 @@
 """Motions as AMASS: what smplx makes of the file is what the figure showed."""
 
+import faults
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
@@ -44,7 +45,7 @@ def family(tmp_path_factory):
 
 def written(animation, path, **options):
     """Export an animation; return the arrays of the file and the notes."""
-    notes = export_animation(animation, path, "amass", MotionOptions(**options))
+    notes = faults.lines(export_animation(animation, path, "amass", MotionOptions(**options)))
     with np.load(path) as arrays:
         return dict(arrays), notes
 
@@ -80,7 +81,7 @@ def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
         assert_allclose(found, expected, rtol=0, atol=ATOL)
 
 
-def test_transl_is_the_formula_of_the_specification(family, tmp_path):
+def test_transl_follows_the_formula_of_the_specification(family, tmp_path):
     motion = family_motion(24)
     arrays, _ = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     numbers = model("smpl")
@@ -121,7 +122,7 @@ def test_large_angles_keep_their_rotation(family, tmp_path):
     assert_allclose(found[2], [0, 0, 1e-9], rtol=1e-12, atol=0)
 
 
-def test_other_up_axis_turns_the_world(family, tmp_path):
+def test_other_up_axis_rotates_the_world(family, tmp_path):
     motion = family_motion(24)
     animation = family_animation(family("smpl"), motion)
     plain, _ = written(animation, tmp_path / "y.npz", world_up="y")
@@ -139,7 +140,7 @@ def test_other_up_axis_turns_the_world(family, tmp_path):
         assert_allclose(after, expected, rtol=0, atol=ATOL)
 
 
-def test_changing_shapes_have_a_row_a_frame(family, tmp_path):
+def test_changing_shapes_have_a_row_per_frame(family, tmp_path):
     shapes = waves(4, 10, seed=7.0)
     motion = family_motion(24, shape=shapes)
     arrays, notes = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
@@ -167,7 +168,7 @@ def test_gaps_are_held_and_marked(family, tmp_path):
     expected = motion.vectors.reshape(4, 72)[rows]
     assert_allclose(arrays["poses"], expected, rtol=0, atol=ATOL)
     assert notes[1:] == [
-        "frames 10, 13 to 14 missing: the last pose is held, and the frames are marked in present"
+        "missing frames 10, 13 to 14: the last pose is held, and the frames are marked in present"
     ]
     back = read(Source.open(tmp_path / "a.npz"))
     assert (back.timing.rows >= 0).tolist() == arrays["present"].tolist()
@@ -189,15 +190,15 @@ def test_gaps_are_bridged(family, tmp_path):
 
 def test_gaps_split_the_file(family, tmp_path):
     motion = family_motion(24, rows=GAPS)
-    notes = export_animation(
+    notes = faults.lines(export_animation(
         family_animation(family("smpl"), motion), tmp_path / "a.npz", "amass",
         MotionOptions(gaps="split"),
-    )  # fmt: skip
+    ))  # fmt: skip
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.npz", "a-2.npz"]
     assert notes == [
         f"{tmp_path}/a-1.npz: 2 frames of SMPL at 50 fps, y up",
         f"{tmp_path}/a-2.npz: 2 frames of SMPL at 50 fps, y up",
-        "frames 0, 3 to 4 missing: omitted between the files",
+        "missing frames 0, 3 to 4: omitted between the files",
     ]
     with np.load(tmp_path / "a-2.npz") as arrays:
         assert_allclose(arrays["poses"], motion.vectors[2:].reshape(2, 72), rtol=0, atol=ATOL)
@@ -207,7 +208,7 @@ def test_gaps_split_the_file(family, tmp_path):
 # What the format cannot hold
 
 
-def test_losses_are_told(family, tmp_path):
+def test_losses_are_reported(family, tmp_path):
     figure = family("smpl")
     rotations = np.tile([0.0, 0, 0, 1], (2, 24, 1))
     moved = np.zeros((2, 24, 3))
@@ -224,7 +225,7 @@ def test_losses_are_told(family, tmp_path):
     ]
 
 
-def test_bundled_body_says_whose_shape_it_is(tmp_path):
+def test_bundled_body_export_names_the_model_of_its_shape(tmp_path):
     from viewer.loading.bundled import bundled_body
 
     figure = viewer.load(bundled_body()).actors[0].figure
@@ -233,7 +234,7 @@ def test_bundled_body_says_whose_shape_it_is(tmp_path):
     assert notes[1].startswith(f"shape and translation are those of {figure.name}, which is no")
 
 
-def test_figures_of_other_kinds_are_refused(family, tmp_path):
+def test_figures_of_other_families_are_refused(family, tmp_path):
     rotations = np.tile([0.0, 0, 0, 1], (1, 16, 1))
     hand = SampledClip("a", Timing(30.0, np.arange(1)), rotations)
     with pytest.raises(RigError) as caught:
@@ -245,7 +246,7 @@ def test_figures_of_other_kinds_are_refused(family, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_options_and_empty_motions_are_refused(family, tmp_path):
+def test_unknown_options_and_empty_motions_are_refused(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24, rows=np.array([0, -1, 1])))
     for words, message in (
         (
@@ -265,7 +266,7 @@ def test_options_and_empty_motions_are_refused(family, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_folder_that_is_not_there(family, tmp_path):
+def test_missing_folder_is_refused(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     with pytest.raises(OutputError):
         written(animation, tmp_path / "none" / "a.npz")

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
@@ -41,7 +42,7 @@ def frames_in(folder):
 
 
 def written(animation, path, **options):
-    notes = export_animation(animation, path, "easymocap", MotionOptions(**options))
+    notes = faults.lines(export_animation(animation, path, "easymocap", MotionOptions(**options)))
     return frames_in(path), notes
 
 
@@ -90,7 +91,7 @@ def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
         assert_allclose(record["Rh"][0], motion.vectors[frame, 0], rtol=0, atol=1e-7)
 
 
-def test_text_is_as_easymocap_writes_it(family, tmp_path):
+def test_text_matches_easymocap_output(family, tmp_path):
     motion = family_motion(24, frames=1)
     written(family_animation(family("smpl"), motion), tmp_path / "out")
     data = (tmp_path / "out" / "smpl" / "000000.json").read_bytes()
@@ -120,7 +121,7 @@ def animation_of_clip(figure, clip):
     return sample_animation(Actor(figure, clip=clip))
 
 
-def test_recording_comes_back(shared_data, tmp_path):
+def test_recording_round_trips(shared_data, tmp_path):
     folder = shared_data / "smpl_synthetic"
     if not folder.is_dir():
         pytest.skip("no synthetic recording")
@@ -129,7 +130,9 @@ def test_recording_comes_back(shared_data, tmp_path):
         animation_of_clip(figure, clip_of(folder / "easymocap", figure, person))
         for person in (0, 1)
     ]
-    notes = easymocap.export_animations(animations, tmp_path / "out", MotionOptions(world_up="z"))
+    notes = faults.lines(
+        easymocap.export_animations(animations, tmp_path / "out", MotionOptions(world_up="z"))
+    )
     assert notes[0].startswith(f"{tmp_path}/out/smpl: 30 frames of 2 people, z up")
     found = frames_in(tmp_path / "out")
     wanted = frames_in(folder / "easymocap")
@@ -142,13 +145,15 @@ def test_recording_comes_back(shared_data, tmp_path):
                 assert_allclose(other[key], record[key], rtol=0, atol=ATOL)
 
 
-def test_people_and_gaps_land_in_the_same_files(family, tmp_path):
+def test_people_and_gaps_end_up_in_the_same_files(family, tmp_path):
     figure = family("smpl")
     first = family_animation(figure, family_motion(24, rows=np.array([0, -1, 1]), first_frame=5))
     second = family_animation(
         figure, family_motion(24, first_frame=9, shape=waves(1, 10, seed=9.0))
     )
-    notes = easymocap.export_animations([first, second], tmp_path, MotionOptions(), [7, 3])
+    notes = faults.lines(
+        easymocap.export_animations([first, second], tmp_path, MotionOptions(), [7, 3])
+    )
     frames = frames_in(tmp_path)
     assert {frame: [record["id"] for record in people] for frame, people in frames.items()} == {
         5: [7], 6: [], 7: [7], 8: [], 9: [3], 10: [3], 11: [3], 12: [3],
@@ -167,7 +172,7 @@ def test_expression_is_written(family, tmp_path):
     assert_allclose(found, waves(4, 10, seed=5.0), rtol=0, atol=1e-7)
 
 
-def test_other_up_axis_turns_rh_and_th(family, tmp_path):
+def test_other_up_axis_rotates_rh_and_th(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     frames, notes = written(animation, tmp_path / "out", up="z")
     quarter = rotation([np.pi / 2, 0, 0])
@@ -183,7 +188,7 @@ def test_other_up_axis_turns_rh_and_th(family, tmp_path):
 # Folders
 
 
-def test_older_frames_do_not_stay(family, tmp_path):
+def test_older_frames_are_removed(family, tmp_path):
     long = family_animation(family("smpl"), family_motion(24, frames=6))
     short = family_animation(family("smpl"), family_motion(24, frames=2))
     written(long, tmp_path / "out")
@@ -243,7 +248,7 @@ def test_interrupted_export_leaves_what_was_there(family, tmp_path, monkeypatch,
 # Refusals
 
 
-def test_people_must_fit_each_other(family, tmp_path):
+def test_people_must_be_compatible(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     other = replace(animation, frame_rate=25.0)
     for animations, persons, message in (

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
 from family_animations import family_animation, family_motion, waves
@@ -18,6 +18,7 @@ from rig import hand_made
 from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_animation
 
 import viewer
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import MotionOptions, export, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
@@ -35,21 +36,35 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
+from viewer.rig.units import METRES
 
 TOLD = 5e-3  # three digits are told
 
 
-def said(notes: list[str]) -> dict[str, tuple[float, str]]:
-    """Return what the one line of differences says: by joints and vertices, size and place."""
-    lines = [note for note in notes if " differ from " in note]
-    assert len(lines) <= 1
-    if not lines:
-        return {}
-    found = re.findall(r"(joints|vertices)[^;]*? by up to (\S+) mm \(([^)]*)\)", lines[0])
-    return {what: (float(size), place) for what, size, place in found}
+def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
+    """Return the only measured error: of joints and vertices, size in mm and place."""
+    measured = errors(notes)
+    assert len(measured) <= 1
+    found = {}
+    for note in measured:
+        for what, part in (("joints", "joint"), ("vertices", "vertex")):
+            if part in note.values:
+                far = note.values[part].values
+                place = far["joint"] if part == "joint" else f"vertex {far['vertex']}"
+                place += f", frame {far['frame']}" if "frame" in far else ""
+                found[what] = (1000.0 * METRES[far["unit"]] * far["distance"], place)
+    return found
 
 
-def write(animation: SampledAnimation, folder: Path, kind: str, name: str, **options) -> list[str]:
+def errors(notes: list[Diagnostic]) -> list[Diagnostic]:
+    """Return the measured errors of whole files."""
+    keys = ("X002.joints", "X002.vertices", "X002.both")
+    return [note for note in notes if note.key in keys]
+
+
+def write(
+    animation: SampledAnimation, folder: Path, kind: str, name: str, **options
+) -> list[Diagnostic]:
     return export_animation(animation, folder / name, kind, MotionOptions(**options))
 
 
@@ -57,7 +72,7 @@ def write(animation: SampledAnimation, folder: Path, kind: str, name: str, **opt
 
 
 @pytest.mark.parametrize("unit", ["m", "cm", "in"])
-def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_path, unit):
+def test_bvh_reports_joint_and_skin_error_where_bones_stretch(tmp_path, unit):
     """Each bone grows by 0.1, so the highest joint is 0.2 away, and what it carries 0.5."""
     animation = chain_animation(unit)
     found = said(write(animation, tmp_path, "bvh", "a.bvh", digits=9))
@@ -74,7 +89,7 @@ def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_pat
         assert_allclose(place, [-JOINTS[joint, 1], 0, 0], rtol=0, atol=1e-8 / scale)
 
 
-def test_frames_that_are_missing_are_not_compared(tmp_path):
+def test_missing_frames_are_not_compared(tmp_path):
     rows = np.arange(len(WEIGHTS))
     rows[WORST] = -1
     whole = chain_animation()
@@ -87,22 +102,20 @@ def test_frames_that_are_missing_are_not_compared(tmp_path):
         assert found["vertices"] == (pytest.approx(375, rel=TOLD), "vertex 3, frame 4")
 
 
-def test_files_of_parts_tell_their_own_losses(tmp_path):
+def test_each_part_file_reports_its_own_losses(tmp_path):
     rows = np.array([0, 1, -1, 3, 4])
     whole = chain_animation()
     clip = replace(whole.motion, timing=Timing(10.0, rows))
     animation = sample_animation(Actor(whole.figure, clip=clip))
     for kind, suffix in (("bvh", "bvh"), ("gltf", "glb")):
         notes = write(animation, tmp_path, kind, f"a.{suffix}", gaps="split")
-        lines = [note for note in notes if " differ from " in note]
-        assert [line.split(":")[0] for line in lines] == [
-            str(tmp_path / f"a-{number}.{suffix}") for number in (1, 2)
-        ]
-        assert said(lines[:1])["joints"] == (pytest.approx(100, rel=TOLD), "high, frame 1")
-        assert said(lines[1:])["joints"] == (pytest.approx(200, rel=TOLD), "high, frame 3")
+        found = errors(notes)
+        assert [note.path for note in found] == [tmp_path / f"a-{i}.{suffix}" for i in (1, 2)]
+        assert said(found[:1])["joints"] == (pytest.approx(100, rel=TOLD), "high, frame 1")
+        assert said(found[1:])["joints"] == (pytest.approx(200, rel=TOLD), "high, frame 3")
 
 
-def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
+def test_gltf_reports_the_same_loss_for_the_baked_shape(tmp_path):
     notes = write(chain_animation(), tmp_path, "gltf", "a.glb")
     assert said(notes) == {
         "joints": (pytest.approx(200, rel=TOLD), f"high, frame {WORST}"),
@@ -115,7 +128,7 @@ def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
 
 
 @pytest.mark.slow
-def test_expressions_are_no_part_of_a_bvh(tmp_path):
+def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
     """SMPL-X, faces that move: what a skin on the file's joints lacks, by plain formulas."""
     figure = replace(family_figure("smplx", tmp_path), correctives=None)
     motion = family_motion(55, frames=12, expression=4.0 * waves(12, 10, seed=5.0))
@@ -169,7 +182,7 @@ def weighted(weights, count: int, peak: int, far: float) -> SampledAnimation:
 
 
 @pytest.mark.parametrize("peak", [0, 7, 50, 101, 119])
-def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, peak):
+def test_raw_weights_report_the_normalisation_error_in_the_worst_frame(tmp_path, peak):
     """Vertex 2 is at (0, 0, 1), half on each joint, with a sum of 0.998.
 
     Scaled, it goes to (1.5, 0, 1) where the second joint is at x = 3; as stored, to 0.998 of that.
@@ -180,12 +193,11 @@ def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, p
     assert_allclose(drawn[2], [1.5, 0, 1], rtol=0, atol=1e-5)  # times are in single precision
     wanted = 1000 * 0.002 * np.hypot(1.5, 1.0)
     assert said(notes) == {"vertices": (pytest.approx(wanted, rel=TOLD), f"vertex 2, frame {peak}")}
-    assert [note for note in notes if "do not add up to 1" in note] == [
-        note for note in notes if " differ from " in note
-    ]
+    (note,) = errors(notes)
+    assert note.values["causes"] == [Phrase("weights-unnormalized", n=1, negative=0)]
 
 
-def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
+def test_explicitly_normalised_weights_lose_nothing(tmp_path):
     weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
     animation = weighted(weights, 5, 2, 3.0)
     assert (
@@ -194,19 +206,20 @@ def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("peak", [13, 77])
-def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path, peak):
+def test_four_influence_error_is_reported_for_the_worst_frame(tmp_path, peak):
     """The weakest of five influences, 0.05, is cut; its joint jumps by 2 m."""
     row = (0.3, 0.3, 0.2, 0.15, 0.05)
     animation = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
     assert said(notes) == {}
-    (line,) = [note for note in notes if "JOINTS_0" in note]
-    assert line.startswith("up to 5 influences per vertex") and line.endswith("of up to 100 mm")
+    (note,) = [note for note in notes if note.key == "X002.first-influences"]
+    assert note.values["most"] == 5 and note.values["distance"] == pytest.approx(0.1, rel=TOLD)
     cut = write(animation, tmp_path, "gltf", "b.glb", skinning=Skinning(max_influences=4))
-    assert said(cut) == {} and not [note for note in cut if "JOINTS_0" in note]
+    assert said(cut) == {}
+    assert not any(note.key in ("X002.first-influences", "X005.influences") for note in cut)
 
 
-def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path):
+def test_four_influence_error_is_measured_over_the_motion(tmp_path):
     """Weights that add up to 0.95, the joint of the weakest, 0.05, 2 m along x in one frame.
 
     As the figure moves it, vertex 1 goes from (0, 1, 0) to (0.1, 0.95, 0); the other four weights,
@@ -215,21 +228,20 @@ def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path
     row = (0.3, 0.3, 0.2, 0.1, 0.05)
     animation = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
-    (line,) = [note for note in notes if "JOINTS_0" in note]
-    size = float(re.search(r"errors of up to (\S+) mm", line)[1])
-    assert size == pytest.approx(1000 * np.hypot(0.1, 0.05), rel=TOLD)
+    (note,) = [note for note in notes if note.key == "X002.first-influences"]
+    assert note.values["distance"] == pytest.approx(np.hypot(0.1, 0.05), rel=TOLD)
 
 
-def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
+def test_negligible_influences_are_reported_without_an_error(tmp_path):
     animation = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
-    assert "up to 5 influences per vertex, all of them written, strongest first" in notes
+    assert ("X005.influences", {"most": 5}) in faults.told(notes)
 
 
 # Formats without a place for something
 
 
-def test_amass_and_easymocap_tell_what_they_leave_out(tmp_path):
+def test_amass_and_easymocap_report_omissions(tmp_path):
     """A knee that comes out of its joint by 0.25 m, with all below it, is not in the file."""
     figure = family_figure("smpl", tmp_path)
     knee = figure.skeleton.names.index("left_knee")
@@ -244,7 +256,7 @@ def test_amass_and_easymocap_tell_what_they_leave_out(tmp_path):
         assert found["vertices"][0] <= 250 * (1 + TOLD)
 
 
-def test_anim_tells_of_the_mesh_too(tmp_path):
+def test_anim_reports_the_mesh_error_too(tmp_path):
     """A tip a metre long, turned by 1 radian where its limit is 0.5: 2 sin 0.25 away."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, "x", 0.0), (1, "y", 0.0), (1, "z", 0.0, -0.5, 0.5)]
@@ -268,7 +280,7 @@ def test_anim_tells_of_the_mesh_too(tmp_path):
 
 
 @pytest.mark.slow
-def test_nothing_is_said_where_nothing_is_lost(tmp_path):
+def test_lossless_exports_report_nothing(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
     animation = family_animation(figure, family_motion(24, frames=30))
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb"), ("amass", "a.npz"), ("easymocap", "e")):
@@ -281,17 +293,18 @@ def test_nothing_is_said_where_nothing_is_lost(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "skel"])
-def test_bodies_at_rest_in_another_shape_lose_nothing(tmp_path, suffix):
+def test_still_bodies_in_another_shape_lose_nothing(tmp_path, suffix):
     """Correctives add nothing at rest, so nothing is off by 0 mm either."""
     np.savez(tmp_path / "body.npz", **model("smplx"))
     actor = viewer.load(tmp_path / "body.npz").actors[0]
     actor.pose.shape_weights[:3] = 2.0, -1.0, 0.5
     notes = export(actor, tmp_path / f"a.{suffix}")
-    assert said(notes) == {} and not [note for note in notes if " mm" in note]
-    assert any("pose correctives" in note for note in notes if note.startswith("not held by"))
+    assert not any(note.code == "X002" for note in notes)
+    (note,) = [note for note in notes if note.key == "X003.parts"]
+    assert Phrase("part-correctives") in note.values["parts"]
 
 
-def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
+def test_corrective_loss_is_taken_from_the_worst_frame(tmp_path):
     """More frames than are looked at at once, by all of them the slow way."""
     figure = family_figure("smpl", tmp_path)
     animation = family_animation(figure, family_motion(24, frames=150))
@@ -323,7 +336,7 @@ def spike(at: float) -> SampledAnimation:
 
 
 @pytest.mark.parametrize("at", [1.25, 2.5])
-def test_a_peak_between_frames_is_told(tmp_path, at):
+def test_a_peak_between_frames_is_reported(tmp_path, at):
     """Frames on both sides of the peak lie on its flanks; straight between them is lower."""
     animation = spike(at)
     before, after = np.floor(at), np.ceil(at)
@@ -332,13 +345,14 @@ def test_a_peak_between_frames_is_told(tmp_path, at):
     size = pytest.approx(1000 * (3.0 - low), rel=TOLD)
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
         notes = write(animation, tmp_path, kind, name)
-        (line,) = [note for note in notes if " differ from " in note]
-        assert line.endswith(": written at 1 fps") and " between frames by " in line
-        found = said([line])
+        (note,) = errors(notes)
+        assert note.values["rate"] == 1.0
+        assert note.values["original"] == Phrase("motion-between-frames")
+        found = said([note])
         assert found["joints"][0] == size and found["vertices"][0] == size
 
 
-def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
+def test_captures_at_another_rate_report_dropped_frames(tmp_path):
     """Every second frame is written; the one between stands 2 m aside."""
     moves = np.zeros((7, 3))
     moves[3, 0] = 2.0
@@ -353,7 +367,7 @@ def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
             assert found.get("joints", (None,))[0] == (size and pytest.approx(size, rel=TOLD))
 
 
-def test_motions_that_hang_are_compared_as_they_are_written(tmp_path):
+def test_upside_down_motions_are_compared_as_written(tmp_path):
     """Turned over, a capture at another rate still differs by what it leaves out alone."""
     moves = np.zeros((7, 3))
     moves[:, 1] = np.arange(7)

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 from formats.pig_text import write as write_pig
@@ -13,6 +14,7 @@ from rig.hand_made import skeleton
 from seamed import JOINTS, PICTURE, POSITIONS, TRIANGLES, UVS, seamed_actor, seamed_mesh
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
 from viewer.export import export
 from viewer.rig.figure import Figure
@@ -35,13 +37,19 @@ def there_and_back(actor, folder, **skinning):
 
 
 def told_error(notes):
-    """Return how far vertices are said to be off, number and unit; 0 if nothing is said."""
-    lines = [note for note in notes if " differ from the pose by " in note]
-    if not lines:
+    """Return the largest error of the vertices, number and unit; 0 if there is none."""
+    measured = [note for note in notes if note.code == "X002"]
+    if not measured:
         return 0.0, ""
-    (line,) = lines
-    found = re.search(r"rig\.skin: (?:joints .*; )?vertices .*?by up to (\S+) (.+) \(", line)
-    return float(found[1]), found[2]
+    (note,) = measured
+    assert note.path.name == "rig.skin" and note.values["original"] == Phrase("the-original-pose")
+    number, unit = note.values["vertex"].values["length"].split(" ", 1)
+    return float(number), unit
+
+
+def parts_not_held(notes):
+    """Return the parts of the figure that the files do not hold."""
+    return [part for note in notes if note.key == "X003.parts" for part in note.values["parts"]]
 
 
 def vertices(actor):
@@ -69,7 +77,7 @@ def body(tmp_path):
 SHAPE = [1.5, -1.0, 0.5]
 
 
-def test_posed_body_comes_back_without_its_correctives(tmp_path, body):
+def test_posed_body_round_trips_without_correctives(tmp_path, body):
     actor, arrays, numbers = body
     again, notes = there_and_back(actor, tmp_path, correctives=False)
     expected, joints = smpl_forward(arrays, SHAPE, numbers, correct=False)
@@ -80,7 +88,7 @@ def test_posed_body_comes_back_without_its_correctives(tmp_path, body):
     assert told_error(notes) == (0, "")
 
 
-def test_error_is_that_of_the_correctives_left_out(tmp_path, body):
+def test_reported_error_is_that_of_the_omitted_correctives(tmp_path, body):
     actor, arrays, numbers = body
     again, notes = there_and_back(actor, tmp_path)
     whole = smpl_forward(arrays, SHAPE, numbers)[0]
@@ -101,9 +109,8 @@ def test_shape_is_baked_into_the_rest_mesh(tmp_path, body):
     inverse_bind = again.figure.skin.inverse_bind[place]
     assert_allclose(inverse_bind[:, :3, 3], -joints, rtol=0, atol=EXACT)
     assert again.figure.n_shapes == 0
-    (lost,) = [note for note in notes if note.startswith("not held")]
-    assert "10 blend shapes (the current shape is kept)" in lost
-    assert "pose correctives" in lost and "the joint regressor" in lost
+    shapes, correctives = Phrase("part-current-shape", n=10), Phrase("part-correctives")
+    assert parts_not_held(notes) == [shapes, correctives, Phrase("part-regressor")]
 
 
 def test_weights_follow_their_joints_into_the_new_order(tmp_path, body):
@@ -142,7 +149,7 @@ def test_several_roots_stay_roots(tmp_path):
 
 def test_skeleton_without_mesh_writes_one_file(tmp_path):
     actor = Actor(Figure("bones", skeleton=ball_skeleton(("hip",), np.array([-1]), np.eye(1, 3))))
-    notes = export(actor, tmp_path / "rig.skin")
+    notes = faults.lines(export(actor, tmp_path / "rig.skin"))
     assert names(tmp_path) == ["rig.skel"]
     assert notes == [f"{tmp_path / 'rig.skel'}: 1 joint"]
 
@@ -171,7 +178,7 @@ def test_limits_and_missing_dofs_are_kept(tmp_path):
     assert_array_equal(found.dof_limits, limits)
 
 
-def test_boxes_are_kept_or_made(tmp_path):
+def test_boxes_are_kept_or_generated(tmp_path):
     boxes = np.array([[[-1, -2, -3], [1, 2, 3]]], dtype=float)
     joints = skeleton([-1], [(0, "x", 0)], boxes=boxes)
     again, _ = there_and_back(Actor(Figure("box", skeleton=joints)), tmp_path)
@@ -195,11 +202,11 @@ def test_figure_translation_goes_to_the_root(tmp_path):
     assert told_error(notes) == (0, "")
 
 
-def test_scale_becomes_part_of_all_lengths(tmp_path):
+def test_scale_is_baked_into_all_lengths(tmp_path):
     actor = seamed_actor(unit="m")
     actor.pose.figure_scale = 1.5
     again, notes = there_and_back(actor, tmp_path)
-    assert not [note for note in notes if "not held" in note and "scale" in note]
+    assert parts_not_held(notes) == []
     assert told_error(notes) == (0, "")
     wanted = 1.5 * actor.figure.mesh.positions
     found = viewer.deform(again.figure, again.pose)[0]
@@ -207,7 +214,7 @@ def test_scale_becomes_part_of_all_lengths(tmp_path):
     assert np.allclose(found.min(axis=0), wanted.min(axis=0), atol=1e-12)
 
 
-def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeypatch):
+def test_error_of_a_figure_without_unit_is_relative_to_its_size(tmp_path, monkeypatch):
     # As if the scale were lost.
     monkeypatch.setattr("viewer.export.rig.scaled", lambda figure, factor: figure)
     actor = seamed_actor()
@@ -217,9 +224,9 @@ def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeyp
     assert told_error(notes) == (pytest.approx(50, rel=5e-3), "% of the size")
 
 
-def test_up_axis_is_said_to_be_lost(tmp_path):
+def test_loss_of_the_up_axis_is_reported(tmp_path):
     _, notes = there_and_back(seamed_actor(up="z"), tmp_path)
-    assert "not held by .skel and .skin: the up axis z" in notes
+    assert parts_not_held(notes) == [Phrase("part-up", up="z")]
 
 
 # Weights and seams
@@ -234,25 +241,24 @@ def test_raw_weights_are_kept(tmp_path):
     assert told_error(notes) == (0, "")
     sums = np.add.reduceat(again.figure.skin.weights, again.figure.skin.starts[:-1])
     assert_array_equal(sums, [0.5, 1, 1, 1, 1, 1, 0.75])  # vertices 1 and 2 are split
-    assert "5 vertices are 7 in the .skin" in " ".join(notes)
+    assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
-def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
+def test_error_caused_by_raw_weights_is_reported(tmp_path):
     rows = "0 0 0.5\n1 1 1\n0 2 1\n2 3 1\n2 4 0.75\n"
     actor = viewer.load(write_pig(tmp_path / "pig", skinning_weights=rows)).actors[0]
     actor.pose.figure_translation[:] = 3, 4, 0
     _, notes = there_and_back(actor, tmp_path)
     # As part of the skin only half of the 5 m reach vertex 0.
     assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
-    lost = " ".join(notes)
-    for words in ("the up axis z", "body parts", "the symmetry map", "the reduced mesh"):
-        assert words in lost
+    lost = ["part-up", "part-body-parts", "part-symmetry", "part-reduced", "part-regressor"]
+    assert [part.key for part in parts_not_held(notes)] == lost
 
 
 @pytest.mark.parametrize(
     ("options", "sums"), [({"normalize": True}, [1, 1]), ({"max_influences": 1}, [1, 1])]
 )
-def test_weights_are_written_as_they_are_used(tmp_path, options, sums):
+def test_weights_are_written_as_used(tmp_path, options, sums):
     weights = [[0.5, 0], [0, 1], [1, 0], [0.5, 0.75], [1, 0]]
     again, notes = there_and_back(seamed_actor(weights=weights), tmp_path, **options)
     skin = again.figure.skin
@@ -262,7 +268,7 @@ def test_weights_are_written_as_they_are_used(tmp_path, options, sums):
     assert np.diff(skin.starts)[5] == (1 if "max_influences" in options else 2)
 
 
-def test_dual_quaternions_are_no_part_of_a_skin(tmp_path):
+def test_loss_of_dual_quaternions_is_reported(tmp_path):
     weights = [[0.5, 0.5]] * 5
     actor = seamed_actor(weights=weights, unit="m")
     actor.pose.dofs[3] = np.pi / 2  # the tip about x, the line through both joints
@@ -279,10 +285,10 @@ def test_seams_are_split(tmp_path):
     assert_array_equal(mesh.positions[mesh.triangles], POSITIONS[TRIANGLES])
     corners = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 3]])
     assert_array_equal(mesh.uvs[mesh.triangles], UVS[corners])
-    assert "split at texture seams: 5 vertices are 7 in the .skin" in notes
+    assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
-def test_texture_goes_along(tmp_path):
+def test_texture_is_copied_too(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     again, _ = there_and_back(seamed_actor(mesh=mesh), tmp_path)
     assert names(tmp_path) == ["cloth0.png", "rig.skel", "rig.skin"]
@@ -328,7 +334,7 @@ def test_scaled_joints_are_refused(tmp_path):
     assert refused(actor, tmp_path) == ".skel cannot hold the scale of joint tip"
 
 
-def test_translations_of_joints_below_the_root_are_refused_unless_they_are_0(tmp_path):
+def test_nonzero_joint_translations_below_the_root_are_refused(tmp_path):
     joints = skeleton([-1, 0], [(1, "ty", 0)], names=["hip", "knee"])
     actor = Actor(Figure("a", skeleton=joints))
     actor.pose.dofs[0] = 1e-3
@@ -344,13 +350,13 @@ def test_mesh_without_skeleton_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a{b", "two\nlines", "offset"])
-def test_names_that_would_be_read_otherwise_are_refused(tmp_path, name):
+def test_names_that_would_not_round_trip_are_refused(tmp_path, name):
     joints = ball_skeleton((name,), np.array([-1]), np.zeros((1, 3)))
     actor = Actor(Figure("a", skeleton=joints))
     assert "joint name" in refused(actor, tmp_path, UnsupportedFormatError)
 
 
-def test_refusal_of_the_skin_takes_the_skeleton_back(tmp_path):
+def test_refusal_of_the_skin_reverts_the_skeleton(tmp_path):
     mesh = replace(seamed_mesh(), triangles=np.zeros((0, 3), np.int32), uvs=None,
                    uv_triangles=None, triangle_materials=None)  # fmt: skip
     actor = seamed_actor(mesh=mesh)
@@ -364,7 +370,7 @@ def test_refusal_of_the_skin_takes_the_skeleton_back(tmp_path):
     assert names(tmp_path) == ["rig.skel", "rig.skin"]
 
 
-def test_picture_of_another_content_is_never_replaced(tmp_path):
+def test_texture_with_different_content_is_never_replaced(tmp_path):
     (tmp_path / "cloth0.png").write_bytes(b"precious")
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     with pytest.raises(OutputError) as caught:

@@ -10,6 +10,7 @@ from bvh_text import GOOD, one_joint, read
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewer.diagnostics import Phrase
 from viewer.formats import Source, detect
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -98,7 +99,7 @@ def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() 
     np.testing.assert_allclose(worlds(motion)[0, 3, :3, 3], [0, 1.75, 0])
 
 
-def test_positions_of_0_below_the_root_are_added() -> None:
+def test_zero_positions_below_the_root_keep_the_offset() -> None:
     six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     text = GOOD.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
     body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + "0 " * 24
@@ -133,14 +134,14 @@ def test_root_offset_is_replaced_too() -> None:
     ids=["crlf", "cr", "cr cr lf", "one line", "blanks", "capitals", "small", "glued", "bom",
          "no end", "empty lines", "glued numbers", "time first", "named end"],
 )  # fmt: skip
-def test_quirks_load_without_a_word(text: str) -> None:
+def test_quirks_load_without_warnings(text: str) -> None:
     motion, warnings = read(text)
     assert warnings == []
     expected = worlds(read(GOOD)[0])
     np.testing.assert_array_equal(worlds(motion), expected)
 
 
-def test_names_repeat_are_missing_or_hold_blanks() -> None:
+def test_names_may_repeat_be_missing_or_contain_blanks() -> None:
     text = GOOD.replace("LeftUpLeg", "arm").replace("LeftFoot", "arm").replace("Head", "")
     motion, warnings = read(text.replace("Hips", "my  hips é"))
     assert motion.figure.skeleton.names == ("my hips é", "arm", "arm", "")
@@ -220,56 +221,66 @@ def test_quaternions_keep_their_sign_from_frame_to_frame() -> None:
         ("0.034567", 1 / 0.034567),
     ],
 )
-def test_frame_rate_is_the_usual_one_that_rounds_to_the_time(written: str, rate: float) -> None:
+def test_frame_rate_snaps_to_the_common_one_matching_the_frame_time(
+    written: str, rate: float
+) -> None:
     motion, warnings = read(GOOD.replace("0.0333333", written))
     assert warnings == []
     assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-15)
+
+
+def near(number: float) -> float:
+    return pytest.approx(number, rel=1e-9)
+
+
+def of_size(unit: str, size: float, metres: float = 0.0) -> Phrase:
+    return Phrase("unit-from-size", unit=unit, size=near(size), metres=near(metres))
 
 
 @pytest.mark.parametrize(
     ("factor", "unit", "warnings"),
     [
         (1, "m", []),
-        (100, "cm", ["taken for centimetres (skeleton 170 high)"]),
-        (1000, "mm", ["taken for millimetres (skeleton 1700 high)"]),
+        (100, "cm", [of_size("centimetres", 170)]),
+        (1000, "mm", [of_size("millimetres", 1700)]),
         (
             40,
             "cm",
-            ["taken for centimetres (skeleton 68 high; inches would be 1.73 m)"],
+            [of_size("centimetres", 68, 1.7272)],
         ),
-        (10, "", ["unit unknown (skeleton 17 high)"]),
-        (1e5, "", ["unit unknown (skeleton 1.7e+05 high)"]),
+        (10, "", [Phrase("unit-unknown", size=near(17), metres=0.0)]),
+        (1e5, "", [Phrase("unit-unknown", size=near(1.7e5), metres=0.0)]),
     ],
 )
-def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[str]) -> None:
+def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[Phrase]) -> None:
     text = one_joint("Xrotation", "0").replace("0 1.7 0", f"0 {1.7 * factor:g} 0")
     motion, found = read(text)
     assert (motion.figure.unit, found) == (unit, warnings)
     assert motion.figure.facts[0][0] == "unit"
 
 
-def test_z_is_up_where_the_head_is_above_the_feet_along_z() -> None:
+def test_z_is_up_if_the_head_is_above_the_feet_along_z() -> None:
     text = GOOD.replace("0.0 -0.9 0.0", "0 0 -0.9").replace("0.0 0.6 0.0", "0.0 0.0 0.6")
     motion, warnings = read(text.replace("0.0 1.0 0.0 0 0 0", "0 0 1 0 0 0"))
     assert motion.figure.up == "z"
-    assert warnings == ["z taken for up: the head is above the feet along z"]
+    assert warnings == [Phrase("up-of-head", up="z")]
 
 
-def test_z_is_up_where_a_nameless_skeleton_is_longest_along_z() -> None:
+def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
     motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
     assert motion.figure.up == "z"
-    assert warnings == ["z taken for up: the rest skeleton is longest along z"]
+    assert warnings == [Phrase("up-of-longest", up="z")]
 
 
-def test_frames_that_stand_along_another_axis_are_announced() -> None:
+def test_frames_upright_along_another_axis_are_reported() -> None:
     # A rest pose along y, turned by 90 degrees about x in every frame: a z-up world.
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
     assert motion.figure.up == "y"
-    assert warnings == ["y taken for up, but in its frames it stands along +z"]
+    assert warnings == [Phrase("up-against-frames", up="y", axis="+z")]
 
 
-def test_content_tells_the_format() -> None:
+def test_content_determines_the_format() -> None:
     assert detect(Source("x.bvh", GOOD.encode())) == "bvh"
     assert detect(Source("x.txt", b"  hierarchy\nroot a{}")) == "bvh"
 

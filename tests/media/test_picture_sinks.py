@@ -15,7 +15,7 @@ def plain(color, size=(40, 30)):
     return np.full((size[1], size[0], 4), color, dtype=np.uint8)
 
 
-def test_digits_are_told_apart_and_look_like_digits():
+def test_digits_are_distinct_and_look_like_digits():
     glyphs = [digits(number) for number in range(10)]
     assert all(glyph.shape == (7, 5) for glyph in glyphs)
     assert len({glyph.tobytes() for glyph in glyphs}) == 10
@@ -26,7 +26,7 @@ def test_digits_are_told_apart_and_look_like_digits():
     assert eight == eight[::-1]
 
 
-def test_number_is_its_digits_side_by_side():
+def test_frame_number_is_drawn_digit_by_digit():
     number = digits(407)
     assert number.shape == (7, 17)
     for place, digit in enumerate((4, 0, 7)):
@@ -34,7 +34,7 @@ def test_number_is_its_digits_side_by_side():
     assert not number[:, [5, 11]].any()
 
 
-def test_number_is_white_in_the_lower_left_corner():
+def test_frame_number_is_white_in_the_lower_left_corner():
     pixels = plain((100, 100, 100, 255), (60, 40))
     write_number(pixels, 1)
     # One pixel per dot and a margin of two: 9 x 11 pixels, 45 % of the gray shows through.
@@ -44,20 +44,20 @@ def test_number_is_white_in_the_lower_left_corner():
     assert ink == digits(1).tolist()
 
 
-def test_number_is_seen_on_transparent_pictures():
+def test_frame_number_is_visible_on_transparent_images():
     pixels = plain((0, 0, 0, 0), (60, 40))
     write_number(pixels, 1)
     assert pixels[-1, 0].tolist() == [0, 0, 0, 140]  # 55 % of 255
     assert pixels[-9, 4].tolist() == [255, 255, 255, 255]
 
 
-def test_number_that_does_not_fit_is_left_out():
+def test_frame_number_that_does_not_fit_is_left_out():
     pixels = plain((9, 9, 9, 255), (12, 10))
     write_number(pixels, 123456)
     assert (pixels == plain((9, 9, 9, 255), (12, 10))).all()
 
 
-def test_pictures_are_written_one_by_one(tmp_path):
+def test_images_are_written_one_by_one(tmp_path):
     paths = [tmp_path / f"{n}.png" for n in (3, 5)]
     sink = PictureSink(paths)
     sink.write(1, plain((1, 2, 3, 4)))
@@ -68,7 +68,7 @@ def test_pictures_are_written_one_by_one(tmp_path):
     assert sink.n_bytes == sum(path.stat().st_size for path in paths)
 
 
-def test_pictures_that_are_finished_stay_when_the_rest_is_given_up(tmp_path):
+def test_finished_images_are_kept_when_the_rest_is_aborted(tmp_path):
     sink = PictureSink([tmp_path / "0.png", tmp_path / "1.png"])
     sink.write(0, plain((1, 2, 3, 255)))
     sink.abort()
@@ -78,7 +78,7 @@ def test_pictures_that_are_finished_stay_when_the_rest_is_given_up(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"), [("missing/0.png", "does not exist"), ("0.psd", "cannot be written as this")]
 )
-def test_picture_that_cannot_be_written_is_one_line(tmp_path, name, words):
+def test_unwritable_image_is_one_line(tmp_path, name, words):
     with pytest.raises(OutputError, match=words):
         PictureSink([tmp_path / name]).write(0, plain((1, 2, 3, 255)))
 
@@ -93,7 +93,7 @@ def test_picture_that_cannot_be_written_is_one_line(tmp_path, name, words):
         ((100, 1200), 5, (1, 5)),
     ],
 )
-def test_layout_fills_the_picture(size, count, wanted):
+def test_sheet_layout_fills_the_image(size, count, wanted):
     assert sheet_layout(size, count) == wanted
 
 
@@ -116,7 +116,7 @@ def test_sheet_shows_every_frame_in_its_cell(tmp_path):
     assert (sheet[46:, 60:] == colors[0]).all()  # empty: the first frame's background
 
 
-def test_sheet_that_is_given_up_leaves_nothing(tmp_path):
+def test_aborted_sheet_leaves_no_file(tmp_path):
     sink = SheetSink(tmp_path / "sheet.png", (120, 92), [0])
     sink.write(0, plain((1, 2, 3, 255), sink.cell))
     sink.abort()

@@ -265,7 +265,7 @@ ACTIONS = (
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),
     Action("Pick vertices", "weights.actions.toggle_picking", why="core.reasons.no_mesh"),
-    Action("Vertex under the mouse", "weights.actions.toggle_telling", why="core.reasons.no_mesh"),
+    Action("Vertex under the mouse", "weights.actions.toggle_vertex_info", why="core.reasons.no_mesh"),
     Action("Reset layout", "shown_panels.reset_layout"),
 )
 """Actions of menus and panels that have no key."""
@@ -276,10 +276,10 @@ MOUSE = (
     ("Alt click", "explain this vertex"),
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
-    ("Right click", "menu of the joint, vertex, actor or background there"),
+    ("Right click", "menu of actions"),
     ("Wheel", "zoom to the pointer"),
     ("Alt drag in the timeline", "seek between whole frames"),
-    ("Axis gizmo", "a click looks along an axis, a drag orbits"),
+    ("Axis gizmo", "click for a view, drag to orbit"),
     ("Drop files", "open them"),
 )
 """Actions of the mouse, listed with the keys."""

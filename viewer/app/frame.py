@@ -42,7 +42,7 @@ from viewer.app.screenshot import save_screenshot
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
 from viewer.app.view.hovering import draw_hovered_name, hover_joint
-from viewer.app.view.outlines import outlined_parts
+from viewer.app.view.outline_layer import OutlineLayer
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
@@ -90,6 +90,7 @@ class Frame:
         self.renderer = Renderer(context)
         self.target: Target | None = None
         self._preview = Preview(context)
+        self.outlines = OutlineLayer(context)
         self._drawn: object = None
         self._keys = PictureKeys()
         self.pace = Pace()
@@ -207,9 +208,7 @@ class Frame:
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)
-        renderer.outlines = outlined_parts(state)
-        drawn_over = renderer.marks, renderer.ghost, renderer.annotations, renderer.outlines
-        key = self._keys.key(state, size, *drawn_over)
+        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         self._drawn = key
         # Even if drawing fails, it is retried only after a change.
         step = self.pace.step(key, state.options, time.perf_counter())
@@ -217,11 +216,13 @@ class Frame:
             self._draw_target(size, step)
         self._preview.draw(state, key)
         if self.target is not None:
-            picture = imgui.ImTextureRef(self.target.texture.glo)
             corner = (x + size[0] / scale, y + size[1] / scale)
             draw_list = imgui.get_background_draw_list()
-            # Textures have their first row at the bottom.
-            draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
+            outlines = self.outlines.texture(state, renderer, size, key)
+            for texture in filter(None, (self.target.texture, outlines)):
+                picture = imgui.ImTextureRef(texture.glo)
+                # Textures have their first row at the bottom.
+                draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
             draw_hovered(state)
             draw_hovered_name(state)
             draw_gizmo(state)
@@ -373,9 +374,8 @@ class Frame:
         """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
-        if self.renderer.outlines or self.pace.is_unfinished:
-            # Outlines of the window are not part of the scene, and a picture gets all its passes.
-            self.renderer.outlines, options = (), self.state.options
+        if self.pace.is_unfinished:  # a picture gets all its passes
+            options = self.state.options
             self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))
             self.pace.restart()
         return self.target.read()
@@ -388,4 +388,5 @@ class Frame:
         if self.target is not None:
             self.target.release()
         self._preview.release()
+        self.outlines.release()
         self.renderer.release()

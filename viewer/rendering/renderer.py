@@ -75,8 +75,6 @@ class Renderer:
         Annotations, drawn over everything except legends.
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
-    outlines : sequence of Outlined
-        Parts of the scene to outline; if empty, the selection with ``DisplayOptions.outline``.
     names_left_out : (int, int)
         Number of joint names omitted from the last picture for lack of room, and number of
         joints within it.
@@ -96,7 +94,6 @@ class Renderer:
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
-        self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
         self.lighting = Lighting(context, self.programs)
         self.late = LatePasses(
@@ -170,9 +167,8 @@ class Renderer:
         self.names_left_out = draw_overlays(
             self.late, over, scene, view, options, target.size, selected
         )
-        if self.outlines or options.outline:
-            outlined = self.outlines or [Outlined(*selected)]
-            self.late.outline_pass.draw(outlined, scene, view, options, target)
+        if options.outline:
+            self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
 
@@ -201,10 +197,11 @@ class Renderer:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+        self._draw_blended(meshes, view, options)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
-        self._draw_motion_paths(scene, view, options, target.size)
+        self.late.draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
@@ -252,6 +249,20 @@ class Renderer:
         self.buffers.keep_only(scene.actors)
         return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
 
+    def draw_outlines(
+        self,
+        outlined: Sequence[Outlined],
+        scene: Scene,
+        camera: Camera,
+        options: DisplayOptions,
+        target: Target,
+        box: Floats,
+    ) -> None:
+        """Draw outlines alone, with straight alpha; parameters are those of ``draw``."""
+        self._prepare(target)
+        view = view_of(camera, target.size, box)
+        self.late.outline_pass.draw(outlined, scene, view, options, target, is_layer=True)
+
     def prepare(self, scene: Scene) -> None:
         """Upload a scene's buffers in advance, so that failure leaves the previous scene intact.
 
@@ -296,6 +307,11 @@ class Renderer:
         drawn += [instances.mesh for _, instances in meshes.instanced]
         self.late.use_pictures(drawn, options)
         self._draw_layer(meshes, view, options, blended=False)
+
+    def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        """Draw translucent surfaces, over all that is opaque and the ground."""
+        drawn = [mesh.mesh for _, mesh in meshes.singles]
+        drawn += [instances.mesh for _, instances in meshes.instanced]
         if any(mesh.is_blended for mesh in drawn):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
@@ -347,22 +363,6 @@ class Renderer:
         markers.update(actor.require_pose(), options.skinning)
         # Marker positions already include the placement of the pose.
         self.late.keypoint_pass.draw(markers, actor.placement, view, options)
-
-    def _draw_motion_paths(
-        self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
-    ) -> None:
-        if not options.path_joints:
-            return
-        from viewer.rendering.passes.motion_path_pass import Moment
-
-        at = Moment(scene.time or 0.0, options.path_seconds)
-        for index, actor in enumerate(scene.actors):
-            joints = tuple(joint for owner, joint in options.path_joints if owner == index)
-            # Paths are drawn across gaps: they show past and future positions of absent actors.
-            if joints and actor.visible and actor.clip is not None:
-                paths = self.buffers.motion_path(actor)
-                paths.update(actor, joints, options.min_confidence)
-                self.late.motion_path_pass.draw(paths, actor.placement, view, size, at)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed mesh, created on first use; its figure must have a mesh."""

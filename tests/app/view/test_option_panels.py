@@ -7,14 +7,14 @@ from dataclasses import replace
 import pytest
 
 from viewer.rendering.camera import VIEWS
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BONES, SHOWN, Lights
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.options import BACKGROUNDS, BONES, MATCAPS, SHOWN, Lights
 from viewer.rig.scene import Actor
 
 
 @pytest.fixture
 def tall(drive, rig):
-    """A hand on a window that shows every widget without scrolling."""
+    """A test driver on a window that shows every widget without scrolling."""
     return drive(*rig, size=(1000, 1000))
 
 
@@ -74,15 +74,29 @@ def test_bones_are_chosen_from_a_list(tall):
 
 
 def test_shading_is_chosen_from_a_list(tall):
-    for number, name in enumerate(SHADING):
+    for number, name in enumerate(SHADING_CHOICES):
         tall.pick("Shading", number)
         assert tall.state.options.shading == name
 
 
+def test_shadings_show_what_they_need(tall):
+    tall.pick("Shading", list(SHADING_CHOICES).index("matcap"))
+    assert "Roughness" not in tall.state.item_rects
+    tall.pick("Matcap", list(MATCAPS).index("chrome"))
+    assert tall.state.options.matcap == "chrome"
+    tall.pick("Shading", list(SHADING_CHOICES).index("pbr"))
+    before = tall.scene_picture()
+    tall.drag("Metallic", 1.3, "Metallic")
+    assert tall.state.options.metallic == 1.0
+    assert (tall.scene_picture() != before).any()
+    assert "Matcap" not in tall.state.item_rects
+
+
 def test_background_is_chosen_from_a_list(tall):
-    tall.pick("Background", 1)
-    assert tall.state.options.background == "transparent"
-    tall.pick("Background", 2)
+    for number, name in enumerate(BACKGROUNDS):
+        tall.pick("Background", number)
+        assert tall.state.options.background == name
+    tall.pick("Background", len(BACKGROUNDS))
     assert tall.state.options.background == "#ffffff"
     assert "Colour" in tall.state.item_rects
     tall.click(tall.place("Colour", 0.35), held="ctrl")
@@ -109,7 +123,7 @@ def test_camera_slider_sets_its_angle(tall, label, attribute, low, high):
         assert getattr(tall.state.camera, attribute) == pytest.approx(wanted, abs=0.03 * 360)
 
 
-def test_camera_changes_are_no_undo_steps(tall):
+def test_camera_changes_are_not_undo_steps(tall):
     tall.drag("Azimuth", 0.9)
     tall.wheel(2, tall.middle)
     tall.click("Top")
@@ -126,7 +140,7 @@ def test_distance_slider_moves_the_eye(tall):
 
 
 @pytest.mark.parametrize("text", ["0", "-5", "nan", "inf", "1e39", "3e38", "1e-44", ""])
-def test_typed_camera_values_leave_a_camera_that_draws(tall, text):
+def test_typed_camera_values_leave_a_valid_camera(tall, text):
     for label in ("Distance", "Azimuth", "Inclination", "Field of view"):
         tall.enter_value(label, text)
     tall.wheel(2, tall.middle)
@@ -194,7 +208,7 @@ def test_light_colour_is_picked(tall):
     assert all(0 <= value <= 1 for value in tall.state.options.lights.key.color)
 
 
-def test_stats_follow_actors_that_come_go_and_change(tall, texts):
+def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     def vertices():
         texts.clear()
         tall.step()
@@ -208,7 +222,7 @@ def test_stats_follow_actors_that_come_go_and_change(tall, texts):
     assert vertices() == "12"
     tall.key("y", "ctrl")
     assert vertices() == "24"
-    # Another figure in the place of one.
+    # One figure replaced by another.
     bare = replace(tall.state.actor.figure, mesh=None, skin=None)
     tall.state.scene.actors[1] = Actor(bare)
     tall.step(2)

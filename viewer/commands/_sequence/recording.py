@@ -236,7 +236,7 @@ def _recording(
 ) -> Recording:
     """Return the recording, its camera framing the whole motion."""
     from viewer.rendering.camera import Camera
-    from viewer.rendering.framing import find_follow, fit_turning, frame_motion
+    from viewer.rendering.framing import find_follow, fit_turntable, frame_motion
     from viewer.rendering.recorder import Recording
 
     recording = Recording(
@@ -247,13 +247,13 @@ def _recording(
         options,
         moves=shots.moves,
         interpolate=arguments.interpolate_gaps,
-        turn=shots.turn,
+        turntable=shots.turntable,
         follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
     )
     points, recording.box = frame_motion(recording)
     recording.camera = camera_of(arguments, scene, points, size)
     if arguments.distance is None:
-        fit_turning(recording.camera, points, size[0] / size[1], shots.turn)
+        fit_turntable(recording.camera, points, size[0] / size[1], shots.turntable)
     return recording
 
 
