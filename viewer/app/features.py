@@ -265,7 +265,9 @@ ACTIONS = (
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),
     Action("Pick vertices", "weights.actions.toggle_picking", why="core.reasons.no_mesh"),
-    Action("Vertex under the mouse", "weights.actions.toggle_vertex_info", why="core.reasons.no_mesh"),
+    Action(
+        "Vertex under the mouse", "weights.actions.toggle_vertex_info", why="core.reasons.no_mesh"
+    ),
     Action("Reset layout", "shown_panels.reset_layout"),
 )
 """Actions of menus and panels that have no key."""

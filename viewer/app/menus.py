@@ -20,6 +20,7 @@ from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.clip_actions import new_clip
 from viewer.app.features import PANELS
+from viewer.app.files.export_formats import draw_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.model_folder import set_model_folder
 from viewer.app.files.motion_dialog import ask_for_motion
@@ -164,9 +165,10 @@ def ask_for_export(state: AppState) -> None:
         folder_of(state.paths),
         lambda state, paths: save_export(state, paths[0]),
         "save",
-        f"Export: {', '.join(suffixes)}",
+        "Export",
         suffixes,
         f"{file_stem(state.actor.name)}.obj",
+        more=draw_formats,
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 

@@ -72,6 +72,8 @@ def draw(state: AppState) -> None:
             "This figure has no skeleton: open it together with its .skel, or create one with "
             "Window > Rig."
         )
+        if button(state, "Open files…##joints"):
+            state.wants.add("open dialog")
         return
     _draw_head(state)
     skeleton = actor.figure.skeleton

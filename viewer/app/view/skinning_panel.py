@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
+    button,
     checkbox,
     count_slider,
     disabled,
@@ -28,6 +29,8 @@ def draw(state: AppState) -> None:
     figure, skinning = state.actor.figure, state.options.skinning
     if not figure.is_attached:
         imgui.text_wrapped("This figure has no skin attached to a skeleton.")
+        if button(state, "Open files…##skinning"):
+            state.wants.add("open dialog")
         return
     _draw_method(state, skinning)
     imgui.separator()
