@@ -65,6 +65,7 @@ class Window:
             **os.environ,
             "DISPLAY": display,
             "XDG_STATE_HOME": str(folder / "state"),
+            "XDG_CONFIG_HOME": str(folder / "config"),
             "PYTHONPATH": str(ROOT),
             "PYTHONWARNINGS": "error",
         }

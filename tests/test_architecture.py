@@ -57,6 +57,8 @@ ALLOWED_IN_APP = {
     "features": {"core"},
     "shown_panels": {"core", "features"},
     "files": {"core", "files"},
+    "theme": set(),
+    "preferences": {"core", "features", "files", "preferences", "theme"},
     "actors": {"core", "actors"},
     "playback": {"core", "files", "playback"},
     "curves": {"core", "files", "curves"},

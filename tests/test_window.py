@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from app.driver import Driver
 from app.tiny import write_rig
+from dragged_files import drag_files
 from driven_window import PATIENCE, ROOT, Window, _ask_to_close, _wait_for
+from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
 from PIL import Image
 
@@ -165,6 +167,20 @@ def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure)
     x, y = map(int, places[1][:2])
     rows = slice(120, height - 120)
     assert (shown[y : y + height, x : x + width][rows] == saved[rows, :, :3]).mean() > 0.999
+    app.key("ctrl+q")
+    app.finish()
+
+
+def test_files_and_folders_dragged_onto_the_window_open(window, tmp_path):
+    app = window()
+    parts = tmp_path / "other figure"
+    parts.mkdir()
+    drag_files(app.display, app.id, write_rig(parts))
+    _wait_for(lambda: "tiny" in app.tell("getwindowname", app.id), "the figure that was dropped")
+    folder = write_pig(tmp_path / "a pig")
+    drag_files(app.display, app.id, [folder])
+    _wait_for(lambda: "pig" in app.tell("getwindowname", app.id), "the folder that was dropped")
+    app.wait_until_quiet()
     app.key("ctrl+q")
     app.finish()
 

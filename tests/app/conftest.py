@@ -15,6 +15,7 @@ from imgui_bundle import imgui
 @pytest.fixture(autouse=True)
 def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     settings = tmp_path / "state" / "models.json"
     monkeypatch.setattr("viewer.models._settings_file", lambda: settings)
 
@@ -49,7 +50,7 @@ def hand(drive, rig):
 def drive_body(drive, tmp_path):
     """Open apps that show a made-up body model: "box" or a kind of the SMPL family."""
 
-    def open_body(kind="box", size=(900, 1000), **columns):
+    def open_body(kind="box", size=(1000, 1000), **columns):
         arrays = box_body.arrays() if kind == "box" else model(kind, **columns)
         path = tmp_path / f"{kind}.npz"
         np.savez(path, **arrays)

@@ -54,7 +54,7 @@ class Driver:
     def __init__(
         self,
         *paths,
-        size=(900, 640),
+        size=(1000, 640),
         scale=1.0,
         pixels_per_point=1.0,
         samples=1,
@@ -132,11 +132,9 @@ class Driver:
                 self.move((x0 + (x1 - x0) * k / steps, y0 + (y1 - y0) * k / steps))
             self.let_go(button)
 
-    def drag(self, label, fraction, text=""):
-        """Drag a slider to a fraction of its length; ``text`` is its label, if it shows one."""
+    def drag(self, label, fraction):
+        """Drag a slider to a fraction of its length."""
         x0, y0, x1, y1 = self.state.item_rects[label]
-        if text:
-            x1 -= imgui.calc_text_size(text).x + imgui.get_style().item_inner_spacing.x
         margin = 2 + imgui.get_style().grab_min_size / 2
         y = (y0 + y1) / 2
         end = x0 + margin + fraction * (x1 - x0 - 2 * margin)

@@ -108,7 +108,7 @@ def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
 
 
 def test_inapplicable_display_modes_are_greyed(drive, tooltips):
-    hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=(900, 1000), samples=1)
+    hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=(1000, 1000), samples=1)
     before = hand.state.options.show
     for label, why in (
         ("Attached skin", "there is no mesh"),
@@ -130,7 +130,7 @@ def test_texture_is_greyed_without_a_texture(hand, tooltips):
 
 
 def test_texture_can_be_toggled_if_present(drive):
-    fox = drive(size=(900, 1000))
+    fox = drive(size=(1000, 1000))
     fox.click("Texture")
     assert not fox.state.options.texture and fox.undo_steps == 1
     fox.click("Texture")

@@ -98,7 +98,7 @@ def test_tab_hides_the_panels_and_brings_them_back(hand):
     labels, rect = set(hand.state.item_rects), hand.state.view_rect
     hand.key("tab")
     assert not hand.state.item_rects
-    assert hand.state.view_rect == (0.0, 0.0, 900.0, 640.0)
+    assert hand.state.view_rect == (0.0, 0.0, 1000.0, 640.0)
     hand.key("tab")
     hand.step(2)
     assert set(hand.state.item_rects) == labels and hand.state.view_rect == rect

@@ -9,7 +9,52 @@ from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 
 from viewer.app.features import PANELS
+from viewer.app.layout import Layout
 from viewer.app.shown_panels import ShownPanels
+
+
+def resize(hand, *size):
+    hand.io.display_size = imgui.ImVec2(*size)
+    hand.step(4)
+
+
+@pytest.mark.parametrize("size", [(320, 240), (640, 480), (900, 600), (1280, 800), (2560, 1600)])
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_view_keeps_half_of_the_width(drive, rig, size, scale):
+    hand = drive(*rig, size=size, scale=scale)
+    assert hand.state.view_rect[2] >= 0.5 * size[0] - 4.0
+    resize(hand, size[0] // 2, size[1])
+    assert hand.state.view_rect[2] >= 0.25 * size[0] - 4.0
+
+
+def test_panels_join_one_column_where_the_window_is_narrow_and_part_again(hand):
+    left = hand.state.view_rect[0]
+    resize(hand, 700, 640)
+    assert left > 0.0 == hand.state.view_rect[0]
+    resize(hand, 1000, 640)
+    assert hand.state.view_rect[0] == left
+    assert {"Reset (R)", "Skeleton", "Distance"} <= set(hand.state.item_rects)
+
+
+def test_edge_that_was_dragged_stays(hand):
+    edge = hand.state.view_rect[0] - 1.0
+    hand.pull((edge, 300.0), (edge + 60.0, 300.0))
+    resize(hand, 700, 640)
+    resize(hand, 1000, 640)
+    assert hand.state.of(Layout).is_arranged
+    assert hand.state.view_rect[0] == pytest.approx(edge + 61.0, abs=2.0)
+
+
+def test_curves_get_room_for_a_plot_while_they_are_in_front(drive, rig):
+    hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
+    before = hand.state.view_rect[3]
+    hand.show_panel("Curves")
+    hand.step(2)
+    plot = next(one for one in imgui.get_current_context().windows if "##plot" in one.name)
+    assert plot.size.y > 800 / 3
+    hand.show_panel("Timeline")
+    hand.step(2)
+    assert hand.state.view_rect[3] == pytest.approx(before, abs=1.0)
 
 
 def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
@@ -35,7 +80,7 @@ def test_all_panels_closed_leave_the_view(hand):
             hand.menu("menu Window", panel.title)
     hand.step(3)
     x, _y, width, height = hand.state.view_rect
-    assert (x, width) == (0, 900) and height > 600
+    assert (x, width) == (0, 1000) and height > 600
     hand.pull(hand.middle, (hand.middle[0] + 50, hand.middle[1]))
 
 
@@ -97,8 +142,9 @@ def test_view_of_zero_size_is_skipped(hand):
     [(1.0, 1.0), (1.25, 1.0), (2.0, 1.0), (1.0, 1.5), (1.0, 2.0), (2.0, 2.0)],
 )
 def test_clicks_hit_their_target_at_every_scale(drive, rig, pixels, scale):
-    hand = drive(*rig, size=(900, 640), pixels_per_point=pixels, scale=scale)
-    assert hand.app.screen.size == (round(900 * pixels), round(640 * pixels))
+    size = round(1000 * scale), round(640 * scale)
+    hand = drive(*rig, size=size, pixels_per_point=pixels, scale=scale)
+    assert hand.app.screen.size == tuple(round(side * pixels) for side in size)
     width, height = (round(side * pixels) for side in hand.state.view_rect[2:])
     assert hand.scene_picture().shape == (height, width, 4)
     hand.drag("root.x", 0.8)
@@ -116,7 +162,9 @@ def test_clicks_hit_their_target_at_every_scale(drive, rig, pixels, scale):
 def test_unit_buttons_stay_within_the_panel(drive, rig, size, scale):
     hand = drive(*rig, size=size, scale=scale)
     for label in ("Reset (R)", "degrees", "radians"):
-        assert hand.state.item_rects[label][2] <= hand.state.view_rect[0], label
+        # A narrow window has its panels on the right.
+        edge = hand.state.view_rect[0] or size[0]
+        assert hand.state.item_rects[label][2] <= edge, label
 
 
 def test_scene_fills_exactly_its_area_of_the_window(drive, rig):

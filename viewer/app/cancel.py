@@ -8,6 +8,8 @@ from viewer.app.keys import Keyboard
 from viewer.app.linting.state import Linting
 from viewer.app.manual.manual_window import Manual
 from viewer.app.posing.tool_actions import cancel_drag
+from viewer.app.preferences.preferences_window import close_preferences
+from viewer.app.preferences.state import Appearance
 from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import drop_rig_tool
 from viewer.app.weights.actions import unpin
@@ -31,6 +33,8 @@ def cancel(state: AppState) -> None:
         files.dialog = None
     elif state.messages.is_open:
         state.messages.is_open = False
+    elif state.of(Appearance).is_open:
+        close_preferences(state)
     elif manual.topic:
         manual.topic = ""
     elif files.loader is not None:

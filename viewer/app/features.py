@@ -89,6 +89,11 @@ class Shortcut:
     action: str
     arguments: tuple[object, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """Name of the action, for preferences: it stays while keys and texts change."""
+        return " ".join([self.action, *map(str, self.arguments)])
+
     def run(self, state: AppState) -> None:
         """Run the action."""
         _function(self.action)(state, *self.arguments)
@@ -193,6 +198,12 @@ KEYS = (
     Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", "window_actions.toggle_messages"),
     Shortcut((_K.f12,), "F12", "save a screenshot", "window_actions.want", ("screenshot",)),
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", "window_actions.want", ("open dialog",)),
+    Shortcut(
+        (_CTRL | _K.comma,),
+        "Ctrl+,",
+        "preferences",
+        "preferences.preferences_window.open_preferences",
+    ),
     Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", f"{_UNDO}.undo"),
     Shortcut(
         (_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo_actions.redo"

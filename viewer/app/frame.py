@@ -32,9 +32,13 @@ from viewer.app.palette.palette_window import draw_palette
 from viewer.app.picture_key import PictureKeys
 from viewer.app.posing.gizmo_drawing import draw_gizmo
 from viewer.app.posing.shape_guard import drop_unreadable_shapes
+from viewer.app.preferences.applying import follow_preferences
+from viewer.app.preferences.state import Preferences
+from viewer.app.recording.preview import Preview
 from viewer.app.recording.record_dialog import draw_record_dialog
 from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
+from viewer.app.screenshot import save_screenshot
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
 from viewer.app.view.hovering import draw_hovered_name, hover_joint
@@ -42,8 +46,8 @@ from viewer.app.view.outline_layer import OutlineLayer
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
-from viewer.formats import FORMATS, free_path, save_image
-from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
+from viewer.formats import FORMATS
+from viewer.loading import Contents, MotionSettings, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
 from viewer.phrases import printable
 from viewer.rendering.gpu.context import is_software
@@ -85,6 +89,7 @@ class Frame:
         self.keeps_recent = keeps_recent
         self.renderer = Renderer(context)
         self.target: Target | None = None
+        self._preview = Preview(context)
         self.outlines = OutlineLayer(context)
         self._drawn: object = None
         self._keys = PictureKeys()
@@ -114,6 +119,7 @@ class Frame:
         """Run a frame without painting the panels."""
         state = self.state
         drop_motion_before_press()
+        follow_preferences(state)
         if not stops_time(state):
             state.clock.advance(imgui.get_io().delta_time)
         drop_unreadable_shapes(state)
@@ -208,6 +214,7 @@ class Frame:
         step = self.pace.step(key, state.options, time.perf_counter())
         if step is not None:
             self._draw_target(size, step)
+        self._preview.draw(state, key)
         if self.target is not None:
             corner = (x + size[0] / scale, y + size[1] / scale)
             draw_list = imgui.get_background_draw_list()
@@ -280,7 +287,9 @@ class Frame:
         if is_part and paths[0].suffix.lower() not in _ADDED:
             attempts.insert(0, [*state.paths, *paths])
         opened = state.paths or bundled_files()
-        state.of(Files).loader = Loader(paths, attempts, self.wake, opened=opened)
+        up = state.of(Preferences).up
+        settings = MotionSettings(up=up) if up else None
+        state.of(Files).loader = Loader(paths, attempts, self.wake, settings, opened)
 
     def _take_loaded(self) -> None:
         """Show the files that were read, or the error."""
@@ -344,7 +353,7 @@ class Frame:
         if "open body" in state.wants:
             self.open([bundled_body()])
         if "screenshot" in state.wants:
-            self._save_screenshot()
+            save_screenshot(state, self.scene_picture)
         self._start_recording()
         state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
 
@@ -360,21 +369,6 @@ class Frame:
         steps = recording_steps(state, self.context, replace(settings), path, ghost)
         state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
         state.clock.playing, recording.settings = False, None
-
-    def _save_screenshot(self) -> None:
-        """Save an image of the scene under an unused name in the current folder."""
-        try:
-            path = free_path(Path.cwd(), self.state.scene.title, ".png")
-            save_image(path, self.scene_picture())
-            self.state.say(f"Saved {printable(path, 200)}")
-            if "##legend" in self.state.item_rects:  # drawn over the image, not in it
-                self.state.say(
-                    'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
-                )
-        except ViewerError as problem:
-            self.state.error = str(problem)
-        except OSError as problem:
-            self.state.error = f"the current folder: {problem.strerror}"
 
     def scene_picture(self) -> Bytes:
         """Return the last image of the scene, without panels: (H, W, 4) uint8."""
@@ -393,5 +387,6 @@ class Frame:
                 work.cancel()
         if self.target is not None:
             self.target.release()
+        self._preview.release()
         self.outlines.release()
         self.renderer.release()

@@ -9,6 +9,7 @@ from imgui_bundle import imgui, implot
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.frame import Frame
+from viewer.app.preferences.state import Appearance
 from viewer.app.theme import apply_theme
 from viewer.rendering.gpu.context import headless_context
 from viewer.rendering.gpu.target import Target
@@ -56,6 +57,8 @@ class HeadlessApp:
         io.display_size = imgui.ImVec2(*size)
         io.display_framebuffer_scale = imgui.ImVec2(pixels_per_point, pixels_per_point)
         apply_theme(scale)
+        appearance = state.of(Appearance)
+        appearance.scale = appearance.screen_scale = scale
         imgui.backends.opengl3_init("#version 330")
         self.frame = Frame(state, self.context)
 

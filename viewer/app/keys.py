@@ -9,6 +9,8 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS
 from viewer.app.files.state import Files
+from viewer.app.preferences.key_map import chords_of
+from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
 
 __all__ = ["Keyboard", "handle_keys"]
 
@@ -45,12 +47,19 @@ def handle_keys(state: AppState) -> None:
         return
     if imgui.is_key_pressed(imgui.Key.escape, False) and _close_menus():
         return
+    appearance = state.of(Appearance)
+    if appearance.captured:
+        # The key is for the list of keys and must not run an action.
+        appearance.captured = "" if appearance.captured == CAPTURED else appearance.captured
+        return
     is_covered = bool(state.error) or state.of(Files).dialog is not None
+    chosen = state.of(Preferences).keys
     for shortcut in KEYS:
         if is_covered and shortcut.label not in _ALWAYS:
             continue
-        if any(_is_pressed(chord, held) for chord in shortcut.chords):
+        if any(_is_pressed(chord, held) for chord in chords_of(shortcut, chosen)):
             shortcut.run(state)
+            break
 
 
 def _close_menus() -> bool:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import overlay_rect
 from viewer.app.features import KEYS, MOUSE
@@ -31,7 +32,7 @@ def draw_keys(state: AppState) -> None:
     """Draw the list if it is open; the wheel scrolls it in a small window."""
     if not state.of(Keyboard).is_listed:
         return
-    lines = [*((key.label, key.text) for key in KEYS), *MOUSE]
+    lines = [*((state.key_labels.get(key.label, key.label), key.text) for key in KEYS), *MOUSE]
     style, viewport = imgui.get_style(), imgui.get_main_viewport()
     letter = imgui.get_font_size()
     first = max(imgui.calc_text_size(label).x for label, _ in lines) + _GAP * letter
@@ -85,6 +86,6 @@ def _draw_lines(
         at, row = divmod(index, columns.rows)
         place = left + at * column, top + row * step
         imgui.set_cursor_pos(place)
-        imgui.text_colored(_COLOR, label)
+        imgui.text_colored(ink(_COLOR), label)
         imgui.set_cursor_pos((place[0] + first, place[1]))
         imgui.text_unformatted(text)

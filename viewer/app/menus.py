@@ -20,7 +20,9 @@ from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.clip_actions import new_clip
 from viewer.app.features import PANELS
+from viewer.app.files.export_formats import draw_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.model_folder import set_model_folder
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
@@ -36,13 +38,13 @@ from viewer.app.posing.pose_actions import (
     save_export,
     save_pose,
 )
+from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.record_dialog import open_record_dialog
 from viewer.app.shown_panels import is_open, reset_layout, set_open
 from viewer.app.view.view_menu import draw_view_menu
-from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, files_written
 from viewer.formats import FORMATS, file_stem, opened_text
-from viewer.models import known_models, load_model_folder, save_model_folder
+from viewer.models import known_models, load_model_folder
 from viewer.phrases import printable
 
 __all__ = ["ask_for_export", "ask_for_pose", "draw_menus"]
@@ -137,18 +139,8 @@ def _draw_models(state: AppState) -> list[Path]:
     imgui.separator()
     if menu_item(state, "Choose model folder…"):
         start = load_model_folder() or folder_of(state.paths)
-        files.dialog = FileDialog(start, _set_model_folder, "folder", "Folder of body models")
+        files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
     return chosen
-
-
-def _set_model_folder(state: AppState, paths: list[Path]) -> None:
-    try:
-        folder = save_model_folder(paths[0])
-    except ViewerError as problem:
-        state.error = str(problem)
-        return
-    count = len(known_models(folder))
-    state.say(f"{count} body models in {printable(folder, 200)}")
 
 
 def ask_for_pose(state: AppState) -> None:
@@ -173,9 +165,10 @@ def ask_for_export(state: AppState) -> None:
         folder_of(state.paths),
         lambda state, paths: save_export(state, paths[0]),
         "save",
-        f"Export: {', '.join(suffixes)}",
+        "Export",
         suffixes,
         f"{file_stem(state.actor.name)}.obj",
+        more=draw_formats,
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 
@@ -204,3 +197,6 @@ def _draw_edit_menu(state: AppState) -> None:
         toggle_palette(state)
     if menu_item(state, "Check the rig", why=no_job_room(state)):
         check_rig(state)
+    imgui.separator()
+    if menu_item(state, "Preferences…", "Ctrl+,"):
+        open_preferences(state)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import ERROR, ink
 from viewer.app.core.messages import Message, message_line
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -20,7 +21,6 @@ __all__ = ["draw_error", "draw_message_window"]
 _ERROR_TITLE = "Error"
 _TITLE = "Messages"
 _SIZE = (42.0, 22.0)  # in font sizes
-_ERROR_COLOR = (1.0, 0.5, 0.42, 1.0)
 _LONGEST = 1000  # longest message shown, characters
 
 
@@ -58,7 +58,7 @@ def _draw_content(state: AppState) -> None:
 def _draw_message(message: Message) -> None:
     is_error = message.kind == "error"
     if is_error:
-        imgui.push_style_color(imgui.Col_.text, _ERROR_COLOR)
+        imgui.push_style_color(imgui.Col_.text, ink(ERROR))
     imgui.text_wrapped(printable(message_line(message), _LONGEST))
     if is_error:
         imgui.pop_style_color()

@@ -7,25 +7,61 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
-__all__ = ["apply_theme", "change_scale"]
+__all__ = ["apply_theme", "change_scale", "set_theme"]
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
-_GRAB = (0.93, 0.55, 0.20, 0.55)  # translucent: the number stays readable
+# Colours by their use: dark and light.
+_COLORS = {
+    "panel": ((0.125, 0.135, 0.15, 1.0), (0.945, 0.95, 0.955, 1.0)),
+    "popup": ((0.11, 0.12, 0.135, 0.98), (0.985, 0.985, 0.99, 0.98)),
+    "title": ((0.09, 0.10, 0.11, 1.0), (0.87, 0.88, 0.895, 1.0)),
+    "tab": ((0.11, 0.12, 0.135, 1.0), (0.88, 0.89, 0.905, 1.0)),
+    "frame": ((0.20, 0.22, 0.25, 1.0), (0.855, 0.865, 0.88, 1.0)),
+    "button": ((0.24, 0.27, 0.31, 1.0), (0.80, 0.815, 0.84, 1.0)),
+    "button hovered": ((0.32, 0.36, 0.41, 1.0), (0.73, 0.755, 0.79, 1.0)),
+    "hovered": ((0.27, 0.30, 0.34, 1.0), (0.80, 0.82, 0.85, 1.0)),
+    "active": ((0.33, 0.36, 0.41, 1.0), (0.70, 0.73, 0.775, 1.0)),
+    "line": ((0.24, 0.26, 0.29, 1.0), (0.76, 0.775, 0.80, 1.0)),
+    "text": ((0.96, 0.965, 0.97, 1.0), (0.09, 0.10, 0.115, 1.0)),
+    "quiet text": ((0.56, 0.57, 0.59, 1.0), (0.37, 0.385, 0.41, 1.0)),
+    "track": ((0.80, 0.47, 0.17, 1.0), (0.84, 0.47, 0.12, 1.0)),
+    "track active": ((1.0, 0.66, 0.30, 1.0), (0.72, 0.37, 0.04, 1.0)),
+    "mark": (_ACCENT, (0.80, 0.42, 0.06, 1.0)),
+}
+_USES = {
+    "panel": ("window_bg", "tab_selected", "tab_dimmed_selected"),
+    "popup": ("popup_bg",),
+    "title": ("title_bg", "title_bg_active", "menu_bar_bg"),
+    "tab": ("tab", "tab_dimmed"),
+    "frame": ("frame_bg",),
+    "button": ("button", "header"),
+    "button hovered": ("button_hovered",),
+    "hovered": ("frame_bg_hovered", "header_hovered", "tab_hovered"),
+    "active": ("frame_bg_active", "button_active", "header_active"),
+    "line": ("separator",),
+    "text": ("text",),
+    "quiet text": ("text_disabled",),
+    "track": ("slider_grab",),
+    "track active": ("slider_grab_active",),
+    "mark": ("check_mark", "tab_selected_overline"),
+}
 
 
-def apply_theme(scale: float) -> None:
+def apply_theme(scale: float, theme: str = "dark") -> None:
     """Set up font and style of the current ImGui context.
 
     Parameters
     ----------
     scale : float
         Scale of fonts and sizes; 1 for a standard screen.
+    theme : str
+        ``"dark"`` or ``"light"``.
     """
     font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
     if font.is_file():
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
-    imgui.style_colors_dark()
+    set_theme(theme)
     style = imgui.get_style()
     style.window_rounding = style.child_rounding = 3.0
     style.frame_rounding = style.grab_rounding = style.popup_rounding = 3.0
@@ -33,7 +69,6 @@ def apply_theme(scale: float) -> None:
     style.item_spacing = imgui.ImVec2(7.0, 4.0)
     style.scrollbar_size = 12.0
     style.grab_min_size = 8.0
-    _set_colors(style)
     style.scale_all_sizes(scale)
     style.font_scale_dpi = scale
 
@@ -45,37 +80,10 @@ def change_scale(old: float, new: float) -> None:
     style.font_scale_dpi = new
 
 
-def _set_colors(style: imgui.Style) -> None:
-    names = imgui.Col_
-    quiet, hovered, active = (
-        (0.20, 0.22, 0.25, 1.0),
-        (0.27, 0.30, 0.34, 1.0),
-        (0.33, 0.36, 0.41, 1.0),
-    )
-    for name, color in (
-        (names.window_bg, (0.125, 0.135, 0.15, 1.0)),
-        (names.popup_bg, (0.11, 0.12, 0.135, 0.98)),
-        (names.title_bg, (0.09, 0.10, 0.11, 1.0)),
-        (names.title_bg_active, (0.09, 0.10, 0.11, 1.0)),
-        (names.menu_bar_bg, (0.09, 0.10, 0.11, 1.0)),
-        (names.frame_bg, quiet),
-        (names.frame_bg_hovered, hovered),
-        (names.frame_bg_active, active),
-        (names.button, (0.24, 0.27, 0.31, 1.0)),
-        (names.button_hovered, (0.32, 0.36, 0.41, 1.0)),
-        (names.button_active, active),
-        (names.header, (0.24, 0.27, 0.31, 1.0)),
-        (names.header_hovered, hovered),
-        (names.header_active, active),
-        (names.slider_grab, _GRAB),
-        (names.slider_grab_active, (1.0, 0.70, 0.35, 0.75)),
-        (names.check_mark, _ACCENT),
-        (names.tab, (0.11, 0.12, 0.135, 1.0)),
-        (names.tab_hovered, hovered),
-        (names.tab_selected, (0.125, 0.135, 0.15, 1.0)),
-        (names.tab_dimmed, (0.11, 0.12, 0.135, 1.0)),
-        (names.tab_dimmed_selected, (0.125, 0.135, 0.15, 1.0)),
-        (names.tab_selected_overline, _ACCENT),
-        (names.separator, (0.24, 0.26, 0.29, 1.0)),
-    ):
-        style.set_color_(name, color)
+def set_theme(theme: str) -> None:
+    """Set the colours of a theme, ``"dark"`` or ``"light"``."""
+    style, row = imgui.get_style(), int(theme == "light")
+    imgui.style_colors_light() if row else imgui.style_colors_dark()
+    for use, names in _USES.items():
+        for name in names:
+            style.set_color_(getattr(imgui.Col_, name), _COLORS[use][row])

@@ -21,14 +21,21 @@ from viewer.app.core.jobs import FrameJob  # noqa: E402
 from viewer.app.core.state import AppState  # noqa: E402
 from viewer.app.display_loss import stop_watching  # noqa: E402
 from viewer.app.files.recent import (  # noqa: E402
+    load_arranged,
     load_closed_panels,
     load_recent,
     remember,
+    save_arranged,
     save_closed_panels,
     state_folder,
 )
 from viewer.app.frame import Frame  # noqa: E402
-from viewer.app.theme import apply_theme, change_scale  # noqa: E402
+from viewer.app.layout import Layout  # noqa: E402
+from viewer.app.preferences.applying import scale_of, start_with  # noqa: E402
+from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
+from viewer.app.preferences.storage import load_preferences  # noqa: E402
+from viewer.app.preferences.system_theme import system_theme  # noqa: E402
+from viewer.app.theme import apply_theme  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
@@ -96,7 +103,8 @@ def show(
         If there is no usable OpenGL.
     """
     find_display()
-    options = options or DisplayOptions()
+    preferences = load_preferences()
+    options = options or DisplayOptions(samples=preferences.samples, quality=preferences.quality)
     points = scene_points(scene, options.show)
     camera = camera or facing_camera(guess_front(scene), scene.up)
     files = tuple(map(Path, paths))
@@ -109,6 +117,8 @@ def show(
     opened = state.of(Files)
     opened.recent = load_recent()
     state.of(ShownPanels).closed = load_closed_panels()
+    start_with(state, preferences)
+    state.of(Layout).is_arranged = load_arranged()
     state.say(*filter(None, [remember(opened.recent, files)]))
     state.clock.playing = plays and state.clock.has_motion
     window = _Window(state, scale)
@@ -139,7 +149,7 @@ class _Window:
 
     def __init__(self, state: AppState, scale: float | None) -> None:
         self.state = state
-        self.handle = _create_window(_title(state))
+        self.handle = _create_window(_title(state), scale=scale or state.of(Preferences).scale)
         try:
             glfw.make_context_current(self.handle)
             glfw.swap_interval(1)
@@ -185,9 +195,12 @@ class _Window:
         except OSError as problem:
             io.set_ini_filename(None)
             self.state.say(f"the layout cannot be saved: {problem.strerror}")
-        self._given_scale = scale
-        self._scale = scale or self._screen_scale()
-        apply_theme(self._scale)
+        appearance, preferences = self.state.of(Appearance), self.state.of(Preferences)
+        appearance.given_scale, appearance.screen_scale = scale, self._screen_scale()
+        if preferences.theme == "system":
+            appearance.system_theme = system_theme()
+        appearance.scale = scale_of(self.state)
+        apply_theme(appearance.scale)
         self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
         imgui.backends.glfw_init_for_opengl(self._address, True)
         glfw.set_key_callback(self.handle, self._on_key)  # replaces the callback of ImGui
@@ -255,20 +268,13 @@ class _Window:
         if min(size) < 1:
             return False
         self._set_title()
-        self._follow_scale()
+        self.state.of(Appearance).screen_scale = self._screen_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
         imgui.new_frame()
         self.frame.draw(self.context.screen, size, self._pixels_per_point())
         glfw.swap_buffers(self.handle)
         return True
-
-    def _follow_scale(self) -> None:
-        """Keep the interface's size on a screen with another scale."""
-        scale = self._given_scale or self._screen_scale()
-        if scale != self._scale:
-            change_scale(self._scale, scale)
-            self._scale = scale
 
     def _set_title(self) -> None:
         title = _title(self.state)
@@ -279,6 +285,7 @@ class _Window:
     def release(self) -> None:
         """Save the layout, close the window, and release everything."""
         save_closed_panels(self.state.of(ShownPanels).closed)
+        save_arranged(self.state.of(Layout).is_arranged)
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
         implot.destroy_context(self._implot)
@@ -325,7 +332,8 @@ def _title(state: AppState) -> str:
     return f"{printable(' + '.join(names), 100)} - viewer"
 
 
-def _create_window(title: str, is_visible: bool = True) -> Any:
+def _create_window(title: str, is_visible: bool = True, scale: float = 0.0) -> Any:
+    """Create a window, larger for a larger scale of the interface; 0 for the monitor's."""
     glfw.default_window_hints()
     glfw.window_hint(glfw.VISIBLE, is_visible)
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
@@ -333,15 +341,25 @@ def _create_window(title: str, is_visible: bool = True) -> Any:
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
     glfw.window_hint(glfw.SAMPLES, 0)  # the scene has its own multisampled framebuffer
-    glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+    glfw.window_hint(glfw.SCALE_TO_MONITOR, not scale)
     glfw.window_hint_string(glfw.X11_CLASS_NAME, "viewer")
-    handle = glfw.create_window(*_SIZE, title, None, None)
+    handle = glfw.create_window(*_window_size(scale or 1.0), title, None, None)
     if not handle:
         code, text = glfw.get_error()
         message = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
         raise window_error(message)
     glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
     return handle
+
+
+def _window_size(scale: float) -> tuple[int, int]:
+    """Return the size of a new window, in window coordinates, limited to the monitor."""
+    width, height = (round(side * scale) for side in _SIZE)
+    monitor = glfw.get_primary_monitor()
+    if not monitor or scale == 1.0:
+        return width, height
+    _, _, widest, highest = glfw.get_monitor_workarea(monitor)
+    return min(width, max(widest, _SIZE[0])), min(height, max(highest, _SIZE[1]))
 
 
 def _context() -> moderngl.Context:

@@ -85,7 +85,7 @@ def with_fields(rigged: Rigged) -> Rigged:
     fields = (
         VertexField("confidence", "Origin of weights", confidence, names=CONFIDENCE),
         VertexField("distance", "Distance to the template", rigged.weights.distances, "length"),
-        VertexField("guarded", "Rest position", guarded, names=("exact", "guarded")),
+        VertexField("guarded", "Rest position", guarded, names=("exact", "estimated")),
     )
     return replace(rigged, figure=replace(rigged.figure, fields=fields))
 

@@ -135,8 +135,12 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("alignment")
-    group.add_argument("--up", choices=AXES, help="up axis of the target (default: searched)")
-    group.add_argument("--facing", choices=AXES, help="front of the target (default: searched)")
+    group.add_argument(
+        "--up", choices=AXES, help="up axis of the target (default: found automatically)"
+    )
+    group.add_argument(
+        "--facing", choices=AXES, help="front of the target (default: found automatically)"
+    )
     group.add_argument(
         "--scale",
         choices=SCALES,

@@ -54,6 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_camera_arguments(parser)
     add_display_arguments(parser)
     add_skinning_arguments(parser)
+    # Options that are not given have the user's preferred values.
+    parser.set_defaults(samples=None, quality=None, up=None)
 
 
 def _scale(text: str) -> float:
@@ -65,6 +67,7 @@ def _scale(text: str) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the image that it would show."""
+    _fill_in(arguments)
     options = display_of(arguments)
     scene, builders = begin_scene(arguments)
     if arguments.time is not None or arguments.frame is not None:
@@ -97,6 +100,17 @@ def run(arguments: argparse.Namespace) -> int:
         motion=motion_settings(arguments),
     )
     return 0
+
+
+def _fill_in(arguments: argparse.Namespace) -> None:
+    """Give options that were omitted their values from the user's preferences."""
+    from viewer.app.preferences.storage import load_preferences
+
+    preferences = load_preferences()
+    if arguments.samples is None:
+        arguments.samples = preferences.samples
+    arguments.quality = arguments.quality or preferences.quality
+    arguments.up = arguments.up or preferences.up or None
 
 
 def _draw_instead(

@@ -27,7 +27,7 @@ def _picture(folder):
 @pytest.fixture
 def textured(drive_body, tmp_path):
     """A driver on a body with texture coordinates, the camera moved, with one undo step."""
-    hand = drive_body("smplx", size=(900, 640))
+    hand = drive_body("smplx", size=(1000, 640))
     hand.state.camera.azimuth, hand.state.camera.distance = 77.0, 9.0
     hand.drag("pelvis.y", 0.6)
     (tmp_path / "bend.json").write_text('{"dofs": {"left_knee.x": 0.5}, "betas": [1, 2]}')

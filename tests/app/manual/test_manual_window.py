@@ -14,7 +14,7 @@ def shown(hand) -> str:
 
 
 def test_pages_open_from_the_menu_and_the_list(drive, rig, texts) -> None:
-    hand = drive(*rig, size=(900, 640), samples=1)
+    hand = drive(*rig, size=(1000, 640), samples=1)
     hand.menu("menu Help", "menu Manual", "Captures##page captures")
     assert shown(hand) == "captures"
     assert any(text.startswith("A person is identified by id.") for text in texts)
@@ -36,7 +36,7 @@ def test_every_page_is_drawn_inside_the_window(drive, rig, size) -> None:
 
 
 def test_escape_closes_it_and_nothing_else(drive, rig) -> None:
-    hand = drive(*rig, size=(900, 640), samples=1)
+    hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.selected_joint = 1
     hand.state.of(Manual).topic = "motion"
     hand.step(2)
@@ -46,7 +46,7 @@ def test_escape_closes_it_and_nothing_else(drive, rig) -> None:
 
 def test_a_missing_page_shows_a_message(drive, rig, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr("viewer.resources._PACKAGE", tmp_path / "viewer")
-    hand = drive(*rig, size=(900, 640), samples=1)
+    hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.of(Manual).topic = "motion"
     hand.step(2)
     assert "lacks manual/motion.md" in hand.state.error and shown(hand) == ""

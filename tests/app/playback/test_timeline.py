@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
-from viewer.app.shown_panels import ShownPanels
 from viewer.diagnostics import Diagnostic
 from viewer.loading.capturing import Builder
 from viewer.rig.captures.capture import Capture, CapturePart
@@ -279,8 +278,7 @@ def test_error_while_loading_is_shown_and_the_scene_stays(streaming):
 
 def test_actors_are_hidden_and_chosen_by_clicks(streaming):
     streaming.start(capture(60, 60, 2))
-    streaming.state.of(ShownPanels).closed.add("stats")
-    streaming.step(4)
+    streaming.show_panel("Actors")
     streaming.click("actor 1")
     assert streaming.state.chosen_actor == 1
     streaming.click("visible 0")
@@ -294,8 +292,7 @@ def test_actors_are_hidden_and_chosen_by_clicks(streaming):
 
 def test_camera_follows_an_actor_until_following_ends(streaming):
     streaming.start(capture(60, 60, 1))
-    streaming.state.of(ShownPanels).closed.add("stats")
-    streaming.step(4)
+    streaming.show_panel("Actors")
     streaming.click("Actor##follow")
     before = streaming.state.camera.target.copy()
     streaming.state.clock.seek(3.0)

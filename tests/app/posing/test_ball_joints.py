@@ -150,7 +150,7 @@ def test_raw_pose_values_are_rotation_vectors(box, texts):
 
 
 def test_raw_pose_values_of_an_euler_root_are_z_y_x_angles(drive, tmp_path, texts):
-    hand = drive(write_pig(tmp_path / "pig"), size=(900, 1000), samples=1)
+    hand = drive(write_pig(tmp_path / "pig"), size=(1000, 1000), samples=1)
     root, other = hand.state.actor.figure.skeleton.names[:2]
     for joint in (root, other):
         for axis, degrees in zip("xyz", ("10", "20", "30"), strict=True):

@@ -39,7 +39,7 @@ def test_mean_hand_comes_from_the_file_and_flat_hand_is_zero(hand):
 def test_component_adds_its_row_to_the_rotation_vectors(hand):
     right = hand.state.actor.figure.hands[1]
     hand.click("right mean")
-    hand.drag("right component 2", 0.6, "right 2")
+    hand.drag("right component 2", 0.6)
     change = vectors(hand, 1) - right.mean
     row = right.components[2]
     share = change @ row / (row @ row)
@@ -58,6 +58,6 @@ def test_number_of_components_is_the_number_of_sliders(hand):
 
 
 def test_figures_without_hands_have_no_hands_panel(drive):
-    driver = drive(size=(900, 640))
+    driver = drive(size=(1000, 640))
     assert not any("component" in label for label in driver.state.item_rects)
     assert np.size(driver.state.actor.figure.hands) == 0

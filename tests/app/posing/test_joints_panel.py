@@ -230,7 +230,7 @@ def test_figure_without_skeleton_says_so(drive, rig):
 def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
     path = tmp_path / "many.skel"
     path.write_text(text)
-    hand = drive(path, size=(640, 480))
+    hand = drive(path)
     joint_tree(hand.state).opened = set(range(hand.state.actor.figure.skeleton.n_joints))
     hand.step(2)
     assert len(hand.state.item_rects) < 150  # rows out of sight are not drawn

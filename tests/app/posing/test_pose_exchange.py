@@ -21,7 +21,7 @@ from viewer.rig.scene import Actor, Scene
 @pytest.fixture
 def posed(drive_body):
     """A test driver with a body whose pose, shape and placement have full-precision values."""
-    hand = drive_body("smpl", size=(900, 640))
+    hand = drive_body("smpl", size=(1000, 640))
     pose = hand.state.actor.pose
     pose.dofs[:] = 0.9 * np.sin(1.7 * np.arange(len(pose.dofs)))
     pose.shape_weights[:3] = 0.1, -1 / 3, 2.5

@@ -124,7 +124,7 @@ def test_figure_without_joints_has_no_tools(drive, rig):
 
 
 def test_small_views_hide_the_toolbar(drive):
-    hand = drive(scene=arm_scene(), size=(520, 300), samples=1)
+    hand = drive(scene=arm_scene(), size=(400, 300), samples=1)
     assert "##tools" not in hand.state.item_rects
     hand.key("e")
     hand.step(3)

@@ -127,7 +127,8 @@ def test_annotations_follow_the_pose_of_each_frame(moving):
 def test_dialog_offers_the_legend_where_there_is_one(moving):
     moving.state.of(Recording).settings = RecordSettings()
     moving.step(2)
-    assert "Legend in pictures" not in moving.state.item_rects
+    moving.click("Legend in pictures")
+    assert not moving.state.options.legend
     moving.state.options.shading = "scalar"
     moving.step(2)
     moving.click("Legend in pictures")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from viewer.app.rigging.results import plays_motion, plays_trial
+from viewer.app.rigging.state import Rigging
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.skinning import deform
 
-SIZE = (900, 1250)
+SIZE = (1000, 1250)
 
 
 def names(hand):
@@ -15,3 +17,13 @@ def names(hand):
 def seen(hand, row):
     actor = hand.state.scene.actors[row]
     return apply_transform(actor.placement, deform(actor.figure, actor.pose)[0])
+
+
+def stop(hand):
+    """End the motion that plays after Run: the result stands as the target."""
+    hand.state.clock.playing = False
+    for label in ("Trial motion", "Move like the template"):
+        result = next(iter(hand.state.of(Rigging).results.values()))
+        if (plays_trial if label == "Trial motion" else plays_motion)(result):
+            hand.click(label)
+    hand.step(2)

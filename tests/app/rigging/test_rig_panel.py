@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from app import rig_scene
 from app.rig_scene import TRUE
-from app.rigging.rig_panel import SIZE, names, seen
+from app.rigging.rig_panel import SIZE, names, seen, stop
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 
@@ -86,7 +86,10 @@ def test_align_button_describes_what_it_does(rigging, monkeypatch, fits):
     hand.state.of(Rigging).choices.fits = fits
     also = "; joints are rotated and limbs resized{} where that fits much better" if fits else ""
     for label, words in (
-        ("Align", "found by matching closest points" + also.format(", or all of it stretched,")),
+        (
+            "Align",
+            "finds the best placement by closest points" + also.format(", or all of it stretched,"),
+        ),
         ("Refine", "from its current placement, by closest points" + also.format("")),
     ):
         hand.move(label)
@@ -175,8 +178,14 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     assert names(hand) == ["scan rigged", "arm", "scan"]
     assert visible(hand) == ["scan rigged", "arm"]
     assert hand.state.actor.figure.is_attached and hand.state.chosen_actor == 0
-    assert_allclose(seen(hand, 0), wanted, atol=1e-8)
     assert hand.undo_steps == steps + 1
+    assert hand.state.clock.playing and hand.state.options.xray
+    hand.state.clock.playing = False
+    first = hand.state.actor.clip.start
+    hand.state.clock.seek(first)
+    hand.step(2)
+    # The trial motion begins as the target stands.
+    assert_allclose(seen(hand, 0), wanted, atol=1e-8)
     hand.key("z", "ctrl")
     hand.step(2)
     assert names(hand) == visible(hand) == ["scan", "arm"]
@@ -291,7 +300,8 @@ def test_result_plays_the_template_motion_at_the_target_position(rigging):
     hand.step(2)
     hand.click("Run")
     hand.finish_job()
-    assert hand.state.error == ""
+    assert hand.state.error == "" and hand.state.clock.playing
+    stop(hand)
     still = seen(hand, 0)
     hand.click("Move like the template")
     hand.step(2)
@@ -313,6 +323,7 @@ def test_template_without_motion_says_why_nothing_moves(rigging):
     hand = rigging()
     hand.click("Run")
     hand.finish_job()
+    stop(hand)
     hand.click("Move like the template")
     assert hand.state.actor.clip is None
 

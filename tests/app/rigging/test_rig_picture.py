@@ -23,6 +23,8 @@ def _aligned(hand):
 def _result(hand):
     hand.click("Run")
     hand.finish_job()
+    hand.state.clock.playing = False
+    hand.state.clock.seek(0.0)
     hand.click("color class:confidence")
     hand.move((5, 5))
 

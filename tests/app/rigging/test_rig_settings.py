@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from app import rig_scene
 from app.rig_scene import TRUE
-from app.rigging.rig_panel import SIZE, names, seen
+from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.tiny import write_rig
 from imgui_bundle import imgui
 from numpy.testing import assert_allclose
@@ -139,6 +139,7 @@ def test_template_is_posed_to_fit_and_shown_in_that_pose(rigging, texts):
     assert actor.pose.dofs[8] == 0.2  # the actor is unchanged
     hand.click("Run")
     hand.finish_job()
+    stop(hand)
     assert_allclose(seen(hand, 0), wanted, atol=1e-6)
     assert state.error == ""
 

@@ -12,7 +12,7 @@ from viewer.rig.skinning import Skinning
 @pytest.fixture
 def skinning(drive, rig):
     """A test driver on the Skinning panel of the tiny rig, which is bent and rotated."""
-    hand = drive(*rig, size=(900, 1000), samples=1)
+    hand = drive(*rig, size=(1000, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
     return _posed(hand, dofs)
@@ -51,7 +51,7 @@ def test_radio_buttons_choose_the_method(skinning):
 def test_blend_slider_mixes_from_either_method(skinning):
     for label in ("LBS", "DQS"):
         skinning.click(label)
-        skinning.drag("DQS fraction", 0.25, "DQS fraction")
+        skinning.drag("DQS fraction", 0.25)
         assert _chosen(skinning).method == "mix"
         assert _chosen(skinning).blend_factor == pytest.approx(0.25, abs=0.02)
 
@@ -88,10 +88,10 @@ def test_influences_slider_acts_only_with_the_box_checked(wide):
     whole = wide.scene_picture()
     wide.click("engine")
     steps = wide.undo_steps
-    wide.drag("Influences", 0.0, "Influences")
+    wide.drag("Influences", 0.0)
     assert _chosen(wide).max_influences == 1 and wide.undo_steps == steps + 1
     assert (wide.scene_picture() != whole).any()
-    wide.drag("Influences", 1.0, "Influences")
+    wide.drag("Influences", 1.0)
     assert _chosen(wide).max_influences == 4  # no vertex of this model has more
 
 
@@ -108,7 +108,7 @@ def test_normalise_box_is_one_undo_step_and_is_greyed_while_influences_are_limit
 def test_normalising_scales_the_drawn_weights(drive, rig):
     text = rig[1].read_text().replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.25")
     rig[1].write_text(text)
-    hand = drive(*rig, size=(900, 1000), samples=1)
+    hand = drive(*rig, size=(1000, 1000), samples=1)
     hand.show_panel("Skinning")
     stored = hand.scene_picture()
     hand.click("Normalise weights")

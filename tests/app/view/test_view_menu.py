@@ -27,7 +27,7 @@ def test_menu_and_key_toggle_joint_display(hand, name):
 
 
 def test_display_panel_check_boxes(drive, rig):
-    hand = drive(*rig, size=(900, 1000), samples=1)
+    hand = drive(*rig, size=(1000, 1000), samples=1)
     for short, name in (("X-ray", "xray"), ("Names", "joint_names"), ("Axes", "joint_axes")):
         hand.click(f"{short}###{name}")
         assert getattr(hand.state.options, name)

@@ -22,7 +22,7 @@ def tipped(drive, tmp_path):
     skel, skin = tmp_path / "tipped.skel", tmp_path / "tipped.skin"
     skel.write_text(SKEL.replace("balljoint arm {", TIP))
     skin.write_text(skin_text(3).replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.75"))
-    return drive(skel, skin, size=(900, 1000), samples=1)
+    return drive(skel, skin, size=(1000, 1000), samples=1)
 
 
 def shown(hand):

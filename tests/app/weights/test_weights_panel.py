@@ -19,7 +19,7 @@ from viewer.rig.skinning import Skinning
 @pytest.fixture
 def bent(drive, rig):
     """A test driver on the Weights panel of the tiny rig, which is bent and rotated."""
-    hand = drive(*rig, size=(900, 1000), samples=1)
+    hand = drive(*rig, size=(1000, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
     return _posed(hand, dofs)

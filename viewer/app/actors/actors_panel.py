@@ -6,6 +6,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
+from viewer.app.core.fields import begin_field
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -82,14 +83,18 @@ def _draw_place(state: AppState, actor: Actor) -> None:
     """Draw the start time and position of the chosen actor."""
     if actor.clip is not None:
         shown = plain_zero(actor.offset, "%.3f s")
-        changed, value = imgui.drag_float("Start time", shown, 0.01, 0.0, 0.0, "%.3f s")
+        changed, value = imgui.drag_float(
+            begin_field("Start time"), shown, 0.01, 0.0, 0.0, "%.3f s"
+        )
         note_item(state, "Start time")
         if changed and abs(value) < 1e6:
             actor.offset = value
         explain("time of the scene at which the actor's motion starts, seconds")
     size = box_size(state.box) or 1.0
     place = [plain_zero(part, "%.3f") for part in actor.placement[:3, 3].tolist()]
-    changed, moved = imgui.drag_float3("Position", place, 0.002 * size, 0.0, 0.0, "%.3f")
+    changed, moved = imgui.drag_float3(
+        begin_field("Position"), place, 0.002 * size, 0.0, 0.0, "%.3f"
+    )
     note_item(state, "Position")
     if changed and all(abs(value) < 1e6 * size for value in moved):
         placement = actor.placement.copy()
@@ -130,7 +135,7 @@ def _draw_motion_paths(state: AppState, actor: Actor) -> None:
         if button(state, "Clear motion paths"):
             options.path_joints = ()
         changed, value = imgui.drag_float(
-            "Time window", options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
+            begin_field("Time window"), options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
         )
         note_item(state, "Time window")
         explain("seconds of the path before and after the current time; 0 shows all of the motion")

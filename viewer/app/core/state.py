@@ -61,6 +61,8 @@ class AppState:
         Whether rotations are shown in degrees instead of radians.
     panels_visible : bool
         Whether panels and menus are drawn.
+    key_labels : dict
+        Keys changed by the user: default label to current label.
     view_rect : (x, y, width, height)
         The part of the window that panels leave free, in window coordinates.
     item_rects : dict
@@ -96,6 +98,7 @@ class AppState:
     selected_joint: int = -1
     in_degrees: bool = True
     panels_visible: bool = True
+    key_labels: dict[str, str] = field(default_factory=dict)
     view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     wants: set[str] = field(default_factory=set)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
 from viewer.rig.number_text import number_text
 
@@ -20,6 +21,7 @@ __all__ = [
     "button",
     "checkbox",
     "choice",
+    "count_slider",
     "disabled",
     "explain",
     "menu_item",
@@ -132,13 +134,31 @@ def slider(
     high: float,
     unit: str = "%.2f",
     flags: int = 0,
+    width: float = 0.0,
 ) -> float:
-    """Draw a slider and return its value, which keeps its full precision unless it was moved."""
+    """Draw a slider and return its value, which keeps its full precision unless it was moved.
+
+    ``width`` is that of ``begin_field``.
+    """
     shown = plain_zero(value, unit)
-    changed, moved = imgui.slider_float(label, shown, low, high, unit, flags)
+    changed, moved = slider_float(begin_field(label, width), shown, low, high, unit, flags)
     note_item(state, label)
     # "nan" and "1e99" can be typed into a slider.
     return moved if changed and math.isfinite(moved) else value
+
+
+def count_slider(
+    state: AppState,
+    label: str,
+    value: int,
+    limits: tuple[int, int],
+    text: str = "%d",
+    flags: int = 0,
+) -> int:
+    """Draw a slider of whole numbers and return its number."""
+    changed, moved = slider_int(begin_field(label), value, *limits, text, flags)
+    note_item(state, label)
+    return moved if changed else value
 
 
 def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
@@ -171,7 +191,8 @@ def menu_item(
     state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
 ) -> bool:
     """Draw a menu item and return whether it was chosen; disabled if there is a reason."""
-    chosen = imgui.menu_item(text, key, checked, not why)[0]
+    shown = state.key_labels.get(key, key)
+    chosen = imgui.menu_item(text, shown, checked, not why)[0]
     note_item(state, text)
     explain("", why)
     return chosen
@@ -186,13 +207,22 @@ def same_line_if_room(text: str) -> None:
         imgui.same_line()
 
 
-def choice(state: AppState, label: str, value: str, texts: dict[str, str]) -> str:
-    """Draw a drop-down list and return the chosen key."""
+def choice(
+    state: AppState, label: str, value: str, texts: dict[str, str], width: float = 0.0
+) -> str:
+    """Draw a drop-down list and return the chosen key; ``width`` is that of ``begin_field``."""
     keys = list(texts)
     index = keys.index(value) if value in keys else 0
-    changed, chosen = imgui.combo(label, index, list(texts.values()), len(keys))
+    hidden = begin_field(label, width, needs=_combo_width(texts.values()))
+    changed, chosen = imgui.combo(hidden, index, list(texts.values()), len(keys))
     note_item(state, label)
     return keys[chosen] if changed else value
+
+
+def _combo_width(texts: Iterable[str]) -> float:
+    """Return the width of a drop-down list that clips none of its texts."""
+    widest = max((imgui.calc_text_size(text).x for text in texts), default=0.0)
+    return widest + imgui.get_frame_height() + 2.0 * imgui.get_style().frame_padding.x
 
 
 def plain_zero(value: float, text: str) -> float:

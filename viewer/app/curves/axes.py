@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import implot
 
+from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import Curve
 from viewer.app.curves.state import Curves
@@ -80,4 +81,4 @@ def curve_color(view: Curves, curves: tuple[Curve, ...], row: int) -> Color:
     number = curves[row].number
     shade = _SHADES[groups.index(number) % len(_SHADES)] if number in groups else 1.0
     red, green, blue = (min(part * shade, 1.0) for part in _COLORS[curves[row].axis])
-    return red, green, blue, 1.0
+    return ink((red, green, blue, 1.0))

@@ -6,6 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -34,12 +35,11 @@ from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip,
 
 __all__ = ["draw"]
 
-_LIST_WIDTH, _SIDE_WIDTH, _FIELD = 10.0, 20.0, 5.8  # widths, in font sizes
+_LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
 _TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}
 _SIDES = ("In", "Out")
 _FARTHEST = 1e9  # largest number that can be typed
-_WIDE = "M" * 8  # text about as wide as a field with its label
 _HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift selects more."
 
 
@@ -59,7 +59,7 @@ def draw(state: AppState) -> None:
     # Beside the plot, not above it: widgets that appear must not move a key away from the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
     if clip_of(state) is not None:
-        side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.45 * room)
+        side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.35 * room)
     if imgui.begin_child("##plot", (-side, 0.0)):
         _draw_tools(state)
         draw_plot(state, curves)
@@ -67,10 +67,8 @@ def draw(state: AppState) -> None:
     if side:
         imgui.same_line()
         if imgui.begin_child("##keys"):
-            imgui.push_item_width(_FIELD * imgui.get_font_size())
             _draw_key_fields(state, curves)
             _draw_modes(state)
-            imgui.pop_item_width()
         imgui.end_child()
 
 
@@ -217,8 +215,6 @@ def _draw_modes(state: AppState) -> None:
     if channel is None:
         return
     for side, text in enumerate(("Before", "After")):
-        if side:
-            same_line_if_room(_WIDE)
         now = channel.extrapolation[side]
         new = choice(state, text, now, _MODES)
         explain("extrapolation of the curves with selected keys, otherwise of all shown curves")
@@ -247,8 +243,6 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
     if len(view.keys) == 1:
         _draw_numbers(state, channel, place, factor)
     for side, text in enumerate(_SIDES):
-        if side:
-            same_line_if_room(_WIDE)
         _draw_rule(state, channel, place, side, text)
     if len(view.keys) == 1:
         _draw_slopes(state, channel, place, factor)
@@ -257,7 +251,9 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
 def _field(state: AppState, label: str, value: float) -> float | None:
     """Draw a number field; return the number that was entered."""
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-    entered, typed = imgui.input_double(label, plain_zero(value, "%.5g"), 0.0, 0.0, "%.5g", flags)
+    entered, typed = imgui.input_double(
+        begin_field(label), plain_zero(value, "%.5g"), 0.0, 0.0, "%.5g", flags
+    )
     note_item(state, label)
     # "nan" and "1e999" can be typed.
     return typed if entered and math.isfinite(typed) and abs(typed) < _FARTHEST else None
@@ -268,7 +264,6 @@ def _draw_numbers(state: AppState, channel: Channel, place: KeyPlace, factor: fl
     time = _field(state, "Time", float(channel.times[key]))
     if time is not None:
         place_key(state, place, time=time)
-    same_line_if_room(_WIDE)
     value = _field(state, "Value", factor * float(channel.values[key]))
     if value is not None:
         place_key(state, place, value=value / factor)
@@ -291,9 +286,7 @@ def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: flo
     """Draw the slopes of explicit tangents, per second."""
     pair = channel.tangents[place[1]]
     given = [(side, slope) for side, slope in enumerate(pair) if not isinstance(slope, str)]
-    for number, (side, slope) in enumerate(given):
-        if number:
-            same_line_if_room(_WIDE)
+    for side, slope in given:
         typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
         if typed is not None:
             change_tangent(state, [place], side, typed / factor)

@@ -10,6 +10,7 @@ import math
 import numpy as np
 from imgui_bundle import imgui, implot
 
+from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.curves.axes import Color, Plot, factor_of, measured
 from viewer.app.curves.data import Curve, channel_of, keyed_values, sampled_points
@@ -23,8 +24,8 @@ from viewer.rig.motion.sampled_clip import SampledClip
 
 __all__ = ["draw_plot"]
 
-_TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), (0.75, 0.75, 0.8, 0.55)
-_OUTSIDE = (0.0, 0.0, 0.0, 0.28)
+_TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), 0.55
+_OUTSIDE = (0.0, 0.0, 0.0, 0.2)
 _MOST_SAMPLES = 900
 _DASHES = 90  # samples across the plot
 _MARGIN = 0.08  # margin around fitted curves, relative to their size
@@ -76,7 +77,7 @@ def _draw_units(plot: Plot) -> None:
     text = ", ".join(["units"] * (False in kinds) + [angle] * (True in kinds))
     place, size = implot.get_plot_pos(), implot.get_plot_size()
     corner = (place.x + 6.0, place.y + size.y - imgui.get_text_line_height() - 3.0)
-    implot.get_plot_draw_list().add_text(corner, imgui.get_color_u32(_RANGE), text)
+    implot.get_plot_draw_list().add_text(corner, imgui.get_color_u32(faint(_RANGE)), text)
 
 
 def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, float, float]:
@@ -180,10 +181,10 @@ def _draw_range(plot: Plot) -> None:
     flags = implot.DragToolFlags_.no_fit
     if not isinstance(clip, Clip):
         flags |= implot.DragToolFlags_.no_inputs
-    moved, start, *_ = implot.drag_line_x(_START_ID, clip.start, _RANGE, 1.0, flags)
+    moved, start, *_ = implot.drag_line_x(_START_ID, clip.start, faint(_RANGE), 1.0, flags)
     if moved:
         set_clip_range(plot.state, min(start, clip.end), clip.end)
-    moved, end, *_ = implot.drag_line_x(_END_ID, clip.end, _RANGE, 1.0, flags)
+    moved, end, *_ = implot.drag_line_x(_END_ID, clip.end, faint(_RANGE), 1.0, flags)
     if moved:
         set_clip_range(plot.state, clip.start, max(end, clip.start))
     middle = 0.5 * (plot.limits[2] + plot.limits[3])

@@ -55,23 +55,21 @@ def ask_for_motion(state: AppState) -> None:
 def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> None:
     """Draw the choice of actors and format."""
     moving = moving_actors(state)
-    imgui.set_next_item_width(16.0 * imgui.get_font_size())
     if len(moving) > 1 or state.actor not in moving:
         whose = {"all": f"all {len(moving)} actors"}
         if state.actor in moving:
             whose["one"] = f"only {printable(state.actor.name, 60)}"
         selection.everyone = (
-            choice(state, "Actors##exported", "all" if selection.everyone else "one", whose)
+            choice(state, "Actors##exported", "all" if selection.everyone else "one", whose, 12.0)
             == "all"
         )
         explain("" if dialog.suffix == "" else "one file per actor, numbered by actor")
         imgui.same_line()
-        imgui.set_next_item_width(16.0 * imgui.get_font_size())
     kinds = {suffix: _title(suffix) for suffix in motion_suffixes()}
     kinds[FOLDER] = _title(FOLDER)
     typed = Path(dialog.name.strip()).suffix.lower()
     now = typed if typed in kinds else dialog.suffix or FOLDER
-    kind = choice(state, "Format", now, kinds)
+    kind = choice(state, "Format", now, kinds, 16.0)
     if kind != now:
         stem = dialog.name.strip()[: -len(typed)] if typed in kinds else dialog.name.strip()
         dialog.suffix = "" if kind == FOLDER else kind

@@ -1,4 +1,4 @@
-"""Recent files and closed panels, stored between runs."""
+"""Recent files, closed panels and their arrangement, stored between runs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from viewer.errors import OutputError
 from viewer.formats import save_bytes
 
 __all__ = [
+    "load_arranged",
     "load_closed_panels",
     "load_recent",
     "remember",
+    "save_arranged",
     "save_closed_panels",
     "state_folder",
 ]
@@ -75,3 +77,18 @@ def save_closed_panels(names: set[str]) -> None:
     with contextlib.suppress(OSError, OutputError):
         state_folder().mkdir(parents=True, exist_ok=True)
         save_bytes(state_folder() / "closed.json", json.dumps(sorted(names)).encode())
+
+
+def load_arranged() -> bool:
+    """Return whether the stored layout is the user's own; a stored default is made anew."""
+    try:
+        return json.loads((state_folder() / "arranged.json").read_text("utf-8")) is True
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def save_arranged(is_arranged: bool) -> None:
+    """Store whether the user has arranged the panels; an unwritable folder is ignored."""
+    with contextlib.suppress(OSError, OutputError):
+        state_folder().mkdir(parents=True, exist_ok=True)
+        save_bytes(state_folder() / "arranged.json", json.dumps(is_arranged).encode())

@@ -59,7 +59,12 @@ def entries(state: AppState) -> list[Entry]:
 def _actions(state: AppState) -> Iterator[Entry]:
     for key in KEYS:
         if key.label not in _LEFT_OUT:
-            yield Entry(key.text[0].upper() + key.text[1:], "action", key.run, key.label)
+            yield Entry(
+                key.text[0].upper() + key.text[1:],
+                "action",
+                key.run,
+                state.key_labels.get(key.label, key.label),
+            )
     for action in ACTIONS:
         yield Entry(action.text, "action", action.run, why=action.reason(state))
 

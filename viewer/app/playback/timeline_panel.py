@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.clock import FASTEST, MODES
+from viewer.app.core.fields import begin_field
 from viewer.app.core.reasons import no_motion
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -71,9 +72,8 @@ def _draw_transport(state: AppState) -> None:
 
 def _draw_place(state: AppState) -> None:
     clock = state.clock
-    imgui.set_next_item_width(4.5 * imgui.get_font_size())
     shown = clock.frame + clock.first_frame
-    changed, frame = imgui.input_int("##frame", shown, 0, 0)
+    changed, frame = imgui.input_int(begin_field("Frame##frame", 4.5), shown, 0, 0)
     note_item(state, "Frame")
     explain("current frame")
     if changed and frame != shown:
@@ -89,9 +89,8 @@ def _draw_rate(state: AppState) -> None:
     """Draw the field of the frame rate, which Enter applies."""
     foreign = foreign_rate(state)
     with disabled(foreign):
-        imgui.set_next_item_width(4.0 * imgui.get_font_size())
         entered, typed = imgui.input_double(
-            "Frames per second##rate", rate_of(state), 0.0, 0.0, "%.6g", _TYPED
+            begin_field("Frames per second##rate", 4.0), rate_of(state), 0.0, 0.0, "%.6g", _TYPED
         )
         note_item(state, "Frame rate")
         explain("press Enter to play the same frames faster or slower", foreign)
@@ -101,15 +100,14 @@ def _draw_rate(state: AppState) -> None:
 
 def _draw_settings(state: AppState) -> None:
     clock = state.clock
-    size = imgui.get_font_size()
-    imgui.set_next_item_width(8 * size)
-    clock.mode = choice(state, "Mode", clock.mode, MODES)
+    clock.mode = choice(state, "Mode", clock.mode, MODES, width=7.0)
     explain("what happens at the end of the range")
     if clock.mode != "run on":
         clock.time = min(max(clock.time, clock.whole[0]), clock.whole[1])
     same_line_if_room("M" * 12)
-    imgui.set_next_item_width(8 * size)
-    clock.speed = slider(state, "Speed", clock.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP)
+    clock.speed = slider(
+        state, "Speed", clock.speed, -FASTEST, FASTEST, "%.2f x", _CLAMP, width=8.0
+    )
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.speed = 1.0
     explain("seconds of motion per second; right-click resets it to 1")
@@ -129,8 +127,9 @@ def _draw_range(state: AppState) -> None:
     first = round((clock.start - origin) * rate) + clock.first_frame
     last = round((clock.end - origin) * rate) + clock.first_frame
     lowest, highest = (clock.first_frame + number for number in clock.frame_range)
-    imgui.set_next_item_width(9 * imgui.get_font_size())
-    changed, low, high = imgui.drag_int_range2("Range", first, last, 0.3, lowest, highest)
+    changed, low, high = imgui.drag_int_range2(
+        begin_field("Range", 9.0), first, last, 0.3, lowest, highest
+    )
     note_item(state, "Range")
     text = "frames to play; I and O set them to the current frame, right-click resets them to all"
     explain(text)

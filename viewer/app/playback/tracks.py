@@ -9,6 +9,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.clock import Clock
+from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
 from viewer.phrases import printable
@@ -24,12 +25,11 @@ _TICK_ASIDE = 3.0  # points between a tick of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
 _PLAIN = (0.44, 0.62, 0.80)  # colour of actors without a colour, sRGB
 _QUIET = 0.6  # opacity of the tracks of unchosen actors
-_CHOSEN_EDGE = (1.0, 1.0, 1.0, 0.85)
+_CHOSEN_EDGE = 0.85  # opacities
 _NARROWEST = 0.35  # smallest width of a bar, in font sizes: single frames must be visible
 _NARROWEST_GAP = 1.0  # points between two bars of that width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
-_LINE, _TEXT = (1.0, 1.0, 1.0, 0.13), (1.0, 1.0, 1.0, 0.6)
-_BACK = (1.0, 1.0, 1.0, 0.03)
+_LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
 
 
 def draw_tracks(state: AppState) -> None:
@@ -74,7 +74,7 @@ def _draw_names(state: AppState, moving: list[int], height: float) -> None:
         imgui.push_id(index)
         text = printable(actor.name, 40)
         if not actor.is_drawn:
-            imgui.push_style_color(imgui.Col_.text, _TEXT)
+            imgui.push_style_color(imgui.Col_.text, faint(_TEXT))
         if imgui.selectable(text, index == state.chosen_actor, 0, (width, 0.0))[0]:
             state.select_actor(index)
         if not actor.is_drawn:
@@ -96,11 +96,11 @@ def _draw_track(
     low, high = clock.whole
     scale = width / max(high - low, 1e-9)
     gap = 0.16 * height
-    back = imgui.get_color_u32(_BACK)
+    back = imgui.get_color_u32(faint(_BACK))
     draw_list.add_rect_filled((left, top + gap), (left + width, top + height - gap), back)
     red, green, blue = encode_color(actor.color) if actor.color is not None else _PLAIN
     color = imgui.get_color_u32((red, green, blue, 1.0 if chosen else _QUIET))
-    edge = imgui.get_color_u32(_CHOSEN_EDGE)
+    edge = imgui.get_color_u32(faint(_CHOSEN_EDGE))
     assert actor.clip is not None  # only moving actors have tracks
     spans = present_spans(actor.clip, 1.0 / scale)
     places = [left + (time + actor.offset - low) * scale for span in spans for time in span]
@@ -169,7 +169,7 @@ def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: f
     left, top, width, total = area
     low, high = clock.whole
     scale = width / max(high - low, 1e-9)
-    line, color = imgui.get_color_u32(_LINE), imgui.get_color_u32(_TEXT)
+    line, color = imgui.get_color_u32(faint(_LINE)), imgui.get_color_u32(faint(_TEXT))
     first, last = (clock.first_frame + frame for frame in clock.frame_range)
     # Room for two numbers: the last number may be to the left of its tick.
     room = 2.0 * imgui.calc_text_size(str(last)).x + 3.0 * _TICK_ASIDE

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import slider_float
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, plain_zero
 from viewer.app.posing.state import HeldVector, Posing
@@ -41,7 +42,7 @@ def draw_vector_component(
     factor = math.degrees(1.0) if state.in_degrees else 1.0
     text = "%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad"
     reach = math.pi * factor
-    changed, moved = imgui.slider_float(
+    changed, moved = slider_float(
         f"##vector{joint}.{axis}",
         plain_zero(float(vector[axis]) * factor, text),
         -reach,

@@ -6,6 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import slider_float
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, plain_zero
 from viewer.rig.mesh import box_size
@@ -35,9 +36,7 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
     imgui.text_disabled(name)
     imgui.same_line(4.2 * imgui.get_font_size())
     imgui.set_next_item_width(-1.0)
-    changed, moved = imgui.slider_float(
-        f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f"
-    )
+    changed, moved = slider_float(f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f")
     note_item(state, f"figure.{name}")
     if imgui.is_item_hovered():
         imgui.set_tooltip(f"figure.{name}\nCtrl+click to type a value, double-click to reset")

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, note_item, plain_zero, same_line_if_room
 from viewer.app.posing.state import Posing
@@ -33,9 +34,13 @@ def draw(state: AppState) -> None:
         imgui.text_wrapped("This figure has no hand components.")
         return
     most = min(len(hand.components) for hand in figure.hands)
-    imgui.set_next_item_width(8.0 * imgui.get_font_size())
-    changed, count = imgui.slider_int(
-        "components", min(posing.n_hand_components, most), 1, most, "%d", _CLAMP
+    changed, count = slider_int(
+        begin_field("Components##components"),
+        min(posing.n_hand_components, most),
+        1,
+        most,
+        "%d",
+        _CLAMP,
     )
     note_item(state, "components")
     if changed:
@@ -55,19 +60,17 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
         note_item(state, f"{side} {name}")
         if flat:
             same_line_if_room("Mean")
-    imgui.push_item_width(-6.0 * imgui.get_font_size())
     vectors = _vectors(figure, pose, hand)
     values = _values(hand, vectors)
     for index in range(min(state.of(Posing).n_hand_components, len(hand.components))):
-        changed, value = imgui.slider_float(
-            f"{side} {index}", plain_zero(float(values[index]), "%.2f"), -_REACH, _REACH, "%.2f"
-        )
+        field = begin_field(f"{side.capitalize()} {index}##{side} {index}")
+        shown = plain_zero(float(values[index]), "%.2f")
+        changed, value = slider_float(field, shown, -_REACH, _REACH)
         note_item(state, f"{side} component {index}")
         if changed and math.isfinite(value) and abs(value) < 1e3:
             # The other components, and the residual outside their span, stay unchanged.
             step = (value - values[index]) * hand.components[index].reshape(-1, 3)
             _rotate(figure, pose, hand, vectors + step)
-    imgui.pop_item_width()
 
 
 def _vectors(figure: Figure, pose: Pose, hand: Hand) -> Floats:

@@ -8,10 +8,13 @@ from typing import TypeAlias
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import slider_float
+from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
     checkbox,
+    explain,
     menu_item,
     note_item,
     plain_zero,
@@ -69,6 +72,8 @@ def draw(state: AppState) -> None:
             "This figure has no skeleton: open it together with its .skel, or create one with "
             "Window > Rig."
         )
+        if button(state, "Open files…##joints"):
+            state.wants.add("open dialog")
         return
     _draw_head(state)
     skeleton = actor.figure.skeleton
@@ -132,14 +137,16 @@ def _draw_head(state: AppState) -> None:
     if button(state, "Pose…"):
         imgui.open_popup("pose menu")
     _draw_pose_menu(state)
-    same_line_if_room("degrees")
-    if imgui.radio_button("degrees", state.in_degrees):
+    same_line_if_room("deg")
+    if imgui.radio_button("deg###degrees", state.in_degrees):
         _show_angles(state, in_degrees=True)
     note_item(state, "degrees")
-    same_line_if_room("radians")
-    if imgui.radio_button("radians", not state.in_degrees):
+    explain("show angles in degrees")
+    same_line_if_room("rad")
+    if imgui.radio_button("rad###radians", not state.in_degrees):
         _show_angles(state, in_degrees=False)
     note_item(state, "radians")
+    explain("show angles in radians")
     if state.actor.figure.pose_layout is not None:
         posing.as_vectors = checkbox(state, "Rotation vectors", posing.as_vectors)
 
@@ -245,7 +252,7 @@ def _draw_dof(
     name = DOF_KINDS[kind]
     _indent(depth)
     imgui.align_text_to_frame_padding()
-    imgui.text_colored(_AXIS_COLORS[kind % 3], f"{name:>2}")
+    imgui.text_colored(ink(_AXIS_COLORS[kind % 3]), f"{name:>2}")
     imgui.same_line()
     imgui.set_next_item_width(-1.0)
     low, high = skeleton.dof_limits[dof]
@@ -289,7 +296,7 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
     if low == high:
         text += "  locked"
     bounded = math.isfinite(low) and math.isfinite(high)
-    changed, moved = imgui.slider_float(
+    changed, moved = slider_float(
         f"##dof{dof}",
         plain_zero(float(pose.dofs[dof]) * factor, text),
         (low if math.isfinite(low) else min(-unlimited, high - unlimited)) * factor,

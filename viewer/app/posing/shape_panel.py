@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field, slider_float
+from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
 from viewer.app.posing.pose_actions import random_shape, reset_shape
@@ -20,7 +22,7 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
-_WIDEST = 20.0  # width of a slider, in font sizes
+_LABELS = 0.55  # largest width of the names, relative to that of the panel
 _HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
@@ -47,27 +49,16 @@ def draw(state: AppState) -> None:
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
     imgui.separator()
     if imgui.begin_child("coefficients", (0.0, 0.0)):
-        longest = max(figure.blend_shapes.names, key=len)
-        imgui.push_item_width(_width_beside(printable(longest, 40), _WIDEST))
         _draw_coefficients(state, figure, pose)
-        imgui.pop_item_width()
     imgui.end_child()
 
 
 def _draw_seed(state: AppState) -> None:
-    imgui.set_next_item_width(_width_beside("seed", 8.0))
-    changed, seed = imgui.input_int("seed", state.of(Posing).shape_seed)
+    changed, seed = imgui.input_int(begin_field("Seed##seed"), state.of(Posing).shape_seed)
     note_item(state, "seed")
     if changed and seed != state.of(Posing).shape_seed:
         state.of(Posing).shape_seed = max(seed, 0)
         random_shape(state)
-
-
-def _width_beside(label: str, most: float) -> float:
-    """Return a width for a widget that leaves room for its label, if there is room for both."""
-    room = imgui.get_content_region_avail().x
-    taken = imgui.calc_text_size(label).x + imgui.get_style().item_inner_spacing.x
-    return min(max(room - taken, 0.35 * room), most * imgui.get_font_size())
 
 
 def _draw_measures(figure: Figure, pose: Pose) -> None:
@@ -102,6 +93,8 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
         if index == 0 or shapes.groups[index - 1] != group:
             rows.append(_HEADINGS.get(group, group))
         rows.append(index)
+    longest = imgui.calc_text_size(printable(max(shapes.names, key=len), 40)).x
+    column = min(longest, _LABELS * imgui.get_content_region_avail().x)
     clipper = imgui.ListClipper()
     clipper.begin(len(rows), imgui.get_frame_height_with_spacing())
     while clipper.step():
@@ -110,16 +103,20 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
                 imgui.align_text_to_frame_padding()
                 imgui.text_disabled(row)
             else:
-                is_morph = shapes.groups[row] == MORPH_GROUP
-                _draw_slider(state, shapes.names[row], row, pose, is_morph)
+                _draw_slider(state, shapes.names[row], row, pose, column)
     clipper.end()
 
 
-def _draw_slider(state: AppState, name: str, index: int, pose: Pose, is_morph: bool) -> None:
-    shown = printable(name, 40)
+def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: float) -> None:
+    shapes, shown = state.actor.figure.blend_shapes, printable(name, 40)
+    is_morph = shapes is not None and shapes.groups[index] == MORPH_GROUP
     low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
-    changed, value = imgui.slider_float(
-        f"{shown}##{index}", plain_zero(float(pose.shape_weights[index]), "%.2f"), low, high, "%.2f"
+    changed, value = slider_float(
+        begin_field(f"{shown}##{index}", column=column),
+        plain_zero(float(pose.shape_weights[index]), "%.2f"),
+        low,
+        high,
+        "%.2f",
     )
     note_item(state, f"coefficient {index}")
     if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
@@ -136,12 +133,12 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, is_morph: b
 def _draw_marks() -> None:
     """Mark whole standard deviations under the slider drawn last, the mean more strongly."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    width = imgui.calc_item_width()
+    width = high.x - low.x
     grab = imgui.get_style().grab_min_size * 0.5
     draw_list = imgui.get_window_draw_list()
     for sigma in range(-int(_REACH), int(_REACH) + 1):
         fraction = 0.5 + sigma / (2.0 * _REACH)
         x = low.x + grab + fraction * (width - 2.0 * grab)
         height = 7.0 if sigma == 0 else 4.0
-        color = imgui.get_color_u32((1.0, 1.0, 1.0, 0.8 if sigma == 0 else 0.5))
+        color = imgui.get_color_u32(faint(0.8 if sigma == 0 else 0.5))
         draw_list.add_line((x, high.y - height), (x, high.y - 1.0), color)

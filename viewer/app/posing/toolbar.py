@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import slider_int
+from viewer.app.core.ink import accent
 from viewer.app.core.reasons import no_pose
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, choice, disabled, explain, note_item, overlay_rect
@@ -25,7 +27,6 @@ __all__ = ["draw_toolbar"]
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
 _WIDTH = 14.5  # of each row, in font sizes: buttons must not move when rows appear
-_ACCENT = (0.62, 0.36, 0.12, 1.0)
 
 
 def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
@@ -71,7 +72,7 @@ def _draw_tools(state: AppState) -> None:
             imgui.same_line()
         is_on = state.of(Posing).tool == tool
         if is_on:
-            imgui.push_style_color(imgui.Col_.button, _ACCENT)
+            imgui.push_style_color(imgui.Col_.button, accent())
         pressed = _button(state, name, width, f"{text} ({key})", why)
         if is_on:
             imgui.pop_style_color()
@@ -98,8 +99,8 @@ def _draw_settings(state: AppState) -> None:
     posing, has_chain = state.of(Posing), state.of(Posing).tool == "move"
     why = no_orientation(state)
     with disabled(why):
-        imgui.set_next_item_width(_item_width(2 if has_chain else 1))
-        posing.orientation = choice(state, "##axes", posing.orientation, ORIENTATIONS)
+        width = _item_width(2 if has_chain else 1) / imgui.get_font_size()
+        posing.orientation = choice(state, "##axes", posing.orientation, ORIENTATIONS, width)
         explain("orientation of the rings and arrows (X)", why)
     if has_chain:
         imgui.same_line()
@@ -111,7 +112,7 @@ def _draw_chain(state: AppState) -> None:
     why, longest = no_chain(state), max(chain_limit(state), 1)
     with disabled(why):
         imgui.set_next_item_width(_item_width(2))
-        changed, length = imgui.slider_int(
+        changed, length = slider_int(
             "##chain", chain_length(state), 1, longest, "chain %d", imgui.SliderFlags_.always_clamp
         )
         note_item(state, "Chain")

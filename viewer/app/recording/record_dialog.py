@@ -6,26 +6,51 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from viewer.app.actors.following import Following
+from viewer.app.core.fields import begin_field
+from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, choice, note_item
+from viewer.app.core.widgets import (
+    begin_window,
+    button,
+    checkbox,
+    choice,
+    count_slider,
+    explain,
+    note_item,
+)
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.state import Files
+from viewer.app.recording.preview import preview_size
 from viewer.app.recording.state import KINDS, LEAST_PIXELS, Recording, RecordSettings
 from viewer.formats import file_stem
+from viewer.rendering.options import QUALITIES
 from viewer.rig.number_text import number_text
 
 __all__ = ["draw_record_dialog", "open_record_dialog"]
 
 _SIZES = {
-    "view": "view size",
-    "1280x720": "1280 x 720",
-    "1920x1080": "1920 x 1080",
-    "1080x1080": "1080 x 1080",
-    "3840x2160": "3840 x 2160",
-    "own": "custom size",
+    "view": "size of the view",
+    "1280x720": "720p: 1280 x 720",
+    "1920x1080": "1080p: 1920 x 1080",
+    "2560x1440": "1440p: 2560 x 1440",
+    "3840x2160": "4K: 3840 x 2160",
+    "1080x1080": "square: 1080 x 1080",
+    "1080x1920": "upright: 1080 x 1920",
+    "own": "custom",
+}
+_SAMPLES = {"0": "as the view", "1": "1", "4": "4", "8": "8", "16": "16"}
+_BACKGROUNDS = {
+    "": "as the view",
+    "gradient": "gradient",
+    "white": "white",
+    "environment": "studio",
+    "transparent": "transparent",
 }
 _TITLE = "Record"
+_WINDOW = (30.0, 40.0)  # in font sizes
 _MOST_PIXELS = 16384
+_MOST_CELLS = 400
 
 
 def open_record_dialog(state: AppState) -> None:
@@ -39,16 +64,18 @@ def draw_record_dialog(state: AppState) -> None:
     settings = recording.settings
     if settings is None:
         return
-    center = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
-    flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_docking
-    flags |= imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
-    shown, stays = imgui.begin(_TITLE, True, flags)
+    shown, stays = begin_window(_TITLE, _WINDOW)
     if shown:
-        imgui.push_item_width(14 * imgui.get_font_size())
-        _draw_settings(state, settings)
-        imgui.pop_item_width()
-        if button(state, "Save as…"):
+        # The buttons stay in reach where the settings need a scroll bar.
+        if imgui.begin_child("##settings", (0.0, -1.2 * imgui.get_frame_height_with_spacing())):
+            _draw_preview(state, settings)
+            _draw_file(state, settings)
+            imgui.separator_text("Picture")
+            _draw_picture(state, settings)
+            imgui.separator_text("Frames")
+            _draw_frames(state, settings)
+        imgui.end_child()
+        if button(state, "Save as…", no_job_room(state)):
             _ask_where(state, settings)
         imgui.same_line()
         if button(state, "Close##record"):
@@ -58,42 +85,107 @@ def draw_record_dialog(state: AppState) -> None:
         recording.settings = None
 
 
-def _draw_settings(state: AppState, settings: RecordSettings) -> None:
+def _draw_preview(state: AppState, settings: RecordSettings) -> None:
+    """Draw the present view as a frame of the recording, in the middle."""
+    texture = state.of(Recording).preview
+    width, height = preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
+    scale = imgui.get_font_size() / 15.0
+    size = (scale * width, scale * height)
+    room = imgui.get_content_region_avail().x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(0.5 * (room - size[0]), 0.0))
+    if not texture:
+        imgui.dummy(size)
+        return
+    # Textures have their first row at the bottom.
+    imgui.image(imgui.ImTextureRef(texture), size, (0.0, 1.0), (1.0, 0.0))
+    note_item(state, "preview")
+
+
+def _draw_file(state: AppState, settings: RecordSettings) -> None:
+    """Draw the choice of the format, and of what belongs to it."""
     settings.kind = choice(state, "Kind", settings.kind, KINDS)
+    if settings.kind in (".mp4", ".webm"):
+        settings.quality = count_slider(
+            state, "Compression quality###Quality", settings.quality, (0, 100)
+        )
+        settings.quality = min(max(settings.quality, 0), 100)
+        explain("higher is better and larger")
+
+
+def _draw_picture(state: AppState, settings: RecordSettings) -> None:
     settings.size = choice(state, "Size", settings.size, _SIZES)
     if settings.size == "own":
-        changed, size = imgui.input_int2("Pixels", list(settings.own_size))
+        changed, size = imgui.input_int2(begin_field("Pixels"), list(settings.own_size))
         note_item(state, "Pixels")
         if changed:
             width, height = (min(max(side, LEAST_PIXELS), _MOST_PIXELS) for side in size)
             settings.own_size = width, height
+    looks = {"": "as the view, at most Normal for motions", **QUALITIES}
+    settings.look = choice(state, "Quality##look", settings.look, looks)
+    chosen = choice(state, "Samples##recorded", str(settings.samples), _SAMPLES)
+    settings.samples = int(chosen)
+    backgrounds = dict(_BACKGROUNDS)
+    if settings.kind == ".mp4":
+        del backgrounds["transparent"]
+        if settings.background == "transparent":
+            settings.background = ""
+    settings.background = choice(state, "Background##recorded", settings.background, backgrounds)
+    if settings.kind == ".mp4":
+        explain("MP4 has no transparency: choose WebM or pictures for that")
+    why = "" if state.options.shading == "scalar" else "no numbers are shown as colours"
+    state.options.legend = checkbox(state, "Legend in pictures", state.options.legend, why)
+
+
+def _draw_frames(state: AppState, settings: RecordSettings) -> None:
+    clock = state.clock
     if settings.kind == "sheet":
-        changed, count = imgui.slider_int("Frames##sheet", settings.n_cells, 2, 60)
-        note_item(state, "Frames##sheet")
-        settings.n_cells = min(max(count, 1), 400) if changed else settings.n_cells
+        settings.n_cells = count_slider(state, "Frames##sheet", settings.n_cells, (2, 60))
+        settings.n_cells = min(max(settings.n_cells, 1), _MOST_CELLS)
     else:
-        shown = settings.rate or state.clock.frame_rate
-        changed, rate = imgui.input_float("Frames per second", shown, 0.0, 0.0, "%.3f")
+        shown = settings.rate or clock.frame_rate
+        field = begin_field("Frames per second")
+        changed, rate = imgui.input_float(field, shown, 0.0, 0.0, "%.3f")
         note_item(state, "Frames per second")
         if changed and 0.01 <= rate <= 1000.0:
             settings.rate = rate
-    if settings.kind in (".mp4", ".webm"):
-        changed, quality = imgui.slider_int("Quality", settings.quality, 0, 100)
-        note_item(state, "Quality")
-        settings.quality = min(max(quality, 0), 100) if changed else settings.quality
+    if clock.has_motion:
+        _draw_range(state, settings)
     settings.turntable = checkbox(state, "Turntable", settings.turntable)
-    if settings.turntable and not state.clock.has_motion:
-        changed, seconds = imgui.input_float("Seconds", settings.seconds, 0.0, 0.0, "%.2f s")
+    explain("orbit once around the scene")
+    if settings.turntable and not clock.has_motion:
+        field = begin_field("Seconds")
+        changed, seconds = imgui.input_float(field, settings.seconds, 0.0, 0.0, "%.2f s")
         note_item(state, "Seconds")
         if changed and 0.05 <= seconds <= 3600.0:
             settings.seconds = seconds
-    if settings.kind != ".mp4":
-        settings.transparent = checkbox(state, "Transparent background", settings.transparent)
-    if state.selected_joint >= 0 or len(state.scene.actors) > 1:
-        state.options.outline = checkbox(state, "Selection outline", state.options.outline)
-    if state.options.shading == "scalar":
-        state.options.legend = checkbox(state, "Legend in pictures", state.options.legend)
+    why = "" if state.of(Following).target is not None else "start it in the Actors panel"
+    follows = settings.follows and not why
+    chosen = checkbox(state, "Follow the followed actor###follow", follows, why)
+    if not why:
+        settings.follows = chosen
     imgui.text_disabled(_span_text(state, settings))
+
+
+def _draw_range(state: AppState, settings: RecordSettings) -> None:
+    """Draw the first and last frame; the playback range unless others are entered."""
+    clock = state.clock
+    lowest, highest = (clock.first_frame + frame for frame in clock.frame_range)
+    shown = settings.frames or _playback_frames(state)
+    changed, found = imgui.input_int2(begin_field("First and last frame"), list(shown))
+    note_item(state, "First and last frame")
+    explain("the playback range, unless other frames are entered")
+    if changed:
+        first, last = sorted(min(max(frame, lowest), highest) for frame in found)
+        settings.frames = first, last
+
+
+def _playback_frames(state: AppState) -> tuple[int, int]:
+    clock = state.clock
+    first, last = (
+        round((time - clock.origin) * clock.frame_rate) + clock.first_frame
+        for time in (clock.start, clock.end)
+    )
+    return first, last
 
 
 def _span_text(state: AppState, settings: RecordSettings) -> str:
@@ -101,7 +193,9 @@ def _span_text(state: AppState, settings: RecordSettings) -> str:
     if not clock.has_motion:
         return "one revolution" if settings.turntable else "no motion: one frame"
     low, high = clock.start, clock.end
-    return f"the playback range: {number_text(low, '.3f')} to {number_text(high, '.3f')} s"
+    if settings.frames is not None:
+        low, high = (clock.frame_time(frame - clock.first_frame) for frame in settings.frames)
+    return f"{number_text(low, '.3f')} to {number_text(high, '.3f')} s"
 
 
 def _ask_where(state: AppState, settings: RecordSettings) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import math
 from collections.abc import Generator
 from dataclasses import replace
@@ -12,16 +11,16 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-from viewer.app.actors.following import Following
 from viewer.app.core.state import AppState
 from viewer.app.recording.recorded_marks import RecordedMarks
+from viewer.app.recording.recorded_options import recorded_follow, recorded_options
 from viewer.app.recording.state import RecordSettings
 from viewer.errors import OutputError
 from viewer.formats import check_targets
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
 from viewer.rendering.passes.ghost_pass import Ghost
-from viewer.rendering.recorder import Follow, Recording, Sink, record
+from viewer.rendering.recorder import Recording, Sink, record
 from viewer.rendering.renderer import Renderer
 from viewer.rig.arrays import Floats
 
@@ -95,26 +94,17 @@ def _recording(
     state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
 ) -> Recording:
     """Return the description of a recording of the view, without tools and panels."""
-    following = state.of(Following)
-    options = copy.deepcopy(state.options)
-    if options.quality == "final" and len(times) > 1:
-        options.quality = "normal"
-    if settings.transparent and settings.kind != ".mp4":
-        options.background = "transparent"
-    follow = None
-    if following.target is not None and following.place is not None:
-        follow = Follow(*following.target, following.place)
     return Recording(
         replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
         times,
         state.camera.copy(),
         size,
-        options,
+        recorded_options(state, settings, len(times)),
         box=state.box.copy(),
         moves=state.clock.has_motion,
         interpolate=state.clock.interpolate_gaps,
         turntable=_FULL if settings.turntable else 0.0,
-        follow=follow,
+        follow=recorded_follow(state, settings),
         selected=(state.chosen_actor, state.selected_joint),
         annotations=RecordedMarks(state).at,
     )
@@ -131,10 +121,13 @@ def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int]
         if settings.kind == "sheet":
             count = settings.n_cells if settings.turntable else 1
         return np.zeros(count), list(range(count)), rate
-    count = math.floor((clock.end - clock.start) * rate + 1e-6) + 1
-    times = clock.start + np.arange(count) / rate
+    start, end = clock.start, clock.end
+    if settings.frames is not None:
+        start, end = (clock.frame_time(n - clock.first_frame) for n in settings.frames)
+    count = math.floor((end - start) * rate + 1e-6) + 1
+    times = start + np.arange(count) / rate
     first = clock.first_frame if rate == clock.frame_rate else 0
-    first += math.floor((clock.start - clock.origin) * rate + 1e-6)
+    first += math.floor((start - clock.origin) * rate + 1e-6)
     if settings.kind == "sheet":
         chosen = np.unique(np.rint(np.linspace(0, count - 1, settings.n_cells)).astype(int))
         return times[chosen], (first + chosen).tolist(), rate
@@ -173,4 +166,4 @@ def _sink(
         return sheet, sheet.cell
     from viewer.media.video import VideoSink
 
-    return VideoSink(files[0], size, rate, settings.quality, settings.transparent), size
+    return VideoSink(files[0], size, rate, settings.quality, settings.is_transparent), size

@@ -38,12 +38,21 @@ class RecordSettings:
         Whether the camera orbits once around the scene.
     seconds : float
         Duration of the orbit if there is no motion.
-    transparent : bool
-        Whether the background is transparent.
     n_cells : int
         Frames of a contact sheet.
     quality : int
-        Quality of videos, 0 to 100.
+        Quality of the compression of videos, 0 to 100.
+    look : str
+        Quality of the pictures, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
+        the view, or normal if the view is final and there are several frames.
+    samples : int
+        Samples per pixel; 0 for those of the view.
+    background : str
+        As in ``DisplayOptions``; empty for that of the view.
+    follows : bool
+        Whether the camera follows the actor or joint that it follows in the view.
+    frames : (int, int) or None
+        First and last frame, numbered as in the timeline; None for the playback range.
     """
 
     kind: str = ".mp4"
@@ -52,9 +61,18 @@ class RecordSettings:
     rate: float = 0.0
     turntable: bool = False
     seconds: float = 6.0
-    transparent: bool = False
     n_cells: int = 12
     quality: int = 75
+    look: str = ""
+    samples: int = 0
+    background: str = ""
+    follows: bool = True
+    frames: tuple[int, int] | None = None
+
+    @property
+    def is_transparent(self) -> bool:
+        """Whether the background is transparent, as far as the kind of file can hold it."""
+        return self.background == "transparent" and self.kind != ".mp4"
 
     def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
         """Return the width and height of the recording for a given size of the view."""
@@ -78,7 +96,10 @@ class Recording:
         Settings shown in the window; None while it is closed.
     wanted : Path or None
         Target file of a recording that starts after the frame.
+    preview : int
+        Number of the preview's texture; 0 if there is none.
     """
 
     settings: RecordSettings | None = None
     wanted: Path | None = None
+    preview: int = 0

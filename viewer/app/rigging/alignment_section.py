@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field
+from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -44,7 +46,6 @@ __all__ = ["draw_alignment"]
 
 _FEWEST = 3  # smallest number of landmarks
 _DOUBTFUL = 0.03  # error relative to the target's size, as in the report
-_WARNING = (1.0, 0.77, 0.30, 1.0)
 _STRETCHED = "stretched, pose kept"
 _METHODS = {
     "in place": "about the shared origin",
@@ -65,7 +66,7 @@ def draw_alignment(state: AppState) -> None:
     """Draw the settings of the alignment, its error, and the tools to move the template by hand."""
     rigging, why = state.of(Rigging), no_job_room(state)
     choices = rigging.choices
-    axes = {"": "searched", **{axis: axis for axis in AXES}}
+    axes = {"": "automatic", **{axis: axis for axis in AXES}}
     choices.up = choice(state, "Up", choices.up, axes)
     explain("the target's axis that points up")
     choices.facing = choice(state, "Facing", choices.facing, axes)
@@ -76,7 +77,7 @@ def draw_alignment(state: AppState) -> None:
     if button(state, "Align", why):
         start_align(state)
     if not why:
-        explain(f"found by matching closest points{_FITS if choices.fits else ''}")
+        explain(f"finds the best placement by closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):
@@ -114,7 +115,7 @@ def _draw_error(found: Alignment | None) -> None:
         return
     text = f"error {100.0 * found.error:.2f} % ({_method_text(found)})"
     if found.error > _DOUBTFUL:
-        imgui.push_style_color(imgui.Col_.text, _WARNING)
+        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
         imgui.text_wrapped(f"{text}: doubtful")
         imgui.pop_style_color()
     else:
@@ -191,12 +192,15 @@ def _inputs(
         ("Rotation (degrees)", angles, "%.2f"),
     ):
         changed, new = imgui.input_float3(
-            label, [plain_zero(value, digits) for value in values.tolist()], digits, flags
+            begin_field(label),
+            [plain_zero(value, digits) for value in values.tolist()],
+            digits,
+            flags,
         )
         note_item(state, label)
         is_valid = changed and bool(np.isfinite(new).all())
         typed.append(np.array(new, dtype=np.float64) if is_valid else None)
-    changed, size = imgui.input_float("Scale factor", scale, 0.0, 0.0, "%.6g", flags)
+    changed, size = imgui.input_float(begin_field("Scale factor"), scale, 0.0, 0.0, "%.6g", flags)
     note_item(state, "Scale factor")
     is_valid = changed and math.isfinite(size) and size > 0.0
     return typed[0], typed[1], size if is_valid else None

@@ -11,6 +11,7 @@ from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.state import Comparison, Result, Rigging
+from viewer.app.rigging.trial_motion import TRIAL, trial_clip
 from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
@@ -32,10 +33,13 @@ __all__ = [
     "compare",
     "no_motion_of",
     "no_other_version",
+    "no_trial_of",
     "plays_motion",
+    "plays_trial",
     "put_results",
     "save_rigged",
     "set_motion",
+    "set_trial",
     "show_colors",
     "show_match",
     "show_version",
@@ -55,7 +59,7 @@ MATCH_COLORS = {
 RESULT_COLORS = {
     "class:confidence": "confidence",
     "field:distance": "distance",
-    "class:guarded": "guarded",
+    "class:guarded": "rest position",
 }
 """Scalar quantities that show how the weights of a result were found, with their labels."""
 
@@ -114,7 +118,20 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
         state.choose_actor(_row(actors, results[0].actor))
     if state.options.scalar in MATCH_COLORS:
         show_colors(state, "")  # only the target has these quantities
+    _play(state, results[0])
     state.say_status(f"Rigged: {printable(target.name, 60)}; A shows the original mesh")
+
+
+def _play(state: AppState, result: Result) -> None:
+    """Show the joints of a result, and play the template's motion, or else a trial motion."""
+    state.options.xray = True
+    set_motion(state, result, plays=not no_motion_of(result))
+    if result.actor.clip is None:
+        set_trial(state, result, plays=True)
+    if result.actor.clip is not None:
+        state.clock.follow(state.actor)
+        state.clock.seek(state.clock.start)
+        state.clock.playing = True
 
 
 def _row(actors: list[Actor], actor: Actor) -> int:
@@ -204,7 +221,29 @@ def show_colors(state: AppState, view: str) -> None:
 
 def plays_motion(result: Result) -> bool:
     """Return whether a result plays the motion of its template."""
-    return result.actor.clip is not None
+    return result.actor.clip is not None and not plays_trial(result)
+
+
+def plays_trial(result: Result) -> bool:
+    """Return whether a result plays the trial motion."""
+    clip = result.actor.clip
+    return isinstance(clip, Clip) and clip.name == TRIAL
+
+
+def no_trial_of(result: Result) -> str:
+    """Return why a result cannot play the trial motion."""
+    skeleton = result.rigged.figure.skeleton
+    found = None if skeleton is None else trial_clip(skeleton, result.rigged.pose)
+    return "" if found is not None else "no joint of the template can rotate"
+
+
+def set_trial(state: AppState, result: Result, plays: bool) -> None:
+    """Play the trial motion in the pose of the target, or stop it."""
+    set_motion(state, result, plays=False)
+    skeleton = result.rigged.figure.skeleton
+    if plays and skeleton is not None:
+        result.actor.clip = trial_clip(skeleton, result.rigged.pose)
+        result.actor.offset = 0.0
 
 
 def no_motion_of(result: Result | None) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
@@ -15,9 +16,12 @@ from viewer.app.rigging.results import (
     RESULT_COLORS,
     TARGET,
     no_motion_of,
+    no_trial_of,
     plays_motion,
+    plays_trial,
     save_rigged,
     set_motion,
+    set_trial,
     show_colors,
     show_version,
     shown_result,
@@ -32,7 +36,6 @@ from viewer.phrases import printable
 
 __all__ = ["draw_results"]
 
-_WARNING = (1.0, 0.77, 0.30, 1.0)
 _LINES_HEIGHT = 9.0  # visible lines of the report
 
 
@@ -51,6 +54,12 @@ def draw_results(state: AppState) -> None:
         explain("play the template's motion at the target's position")
     if plays != moves:
         set_motion(state, result, plays)
+    tries, still = plays_trial(result), no_trial_of(result)
+    chosen = checkbox(state, "Trial motion", tries, still)
+    if not still:
+        explain("bend each joint to both sides, to see how the weights deform the mesh")
+    if chosen != tries:
+        set_trial(state, result, chosen)
     _draw_table(state)
     if button(state, "Save rigged…", no_job_room(state)):
         _ask_where(state, result)
@@ -100,12 +109,12 @@ def _draw_table(state: AppState) -> None:
         [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
     )
     _row(
-        "residual",
+        "largest error",
         "largest distance of the posed result from the target, relative to its size",
         [f"{one.residual:.1e}" for one in rigged],
     )
     _row(
-        "guarded",
+        "estimated",
         "vertices with a pose too extreme to invert exactly: their rest position is an estimate",
         [f"{int(one.guarded.sum()):,}" for one in rigged],
     )
@@ -138,7 +147,7 @@ def _draw_lines(state: AppState, result: Result) -> None:
         for line in result.rigged.lines:
             warns = line.severity == "warning"
             if warns:
-                imgui.push_style_color(imgui.Col_.text, _WARNING)
+                imgui.push_style_color(imgui.Col_.text, ink(WARNING))
             imgui.text_wrapped(printable(line.labelled, 400))
             if warns:
                 imgui.pop_style_color()

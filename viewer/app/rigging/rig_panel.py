@@ -13,6 +13,7 @@ from viewer.app.core.widgets import (
     button,
     checkbox,
     choice,
+    count_slider,
     disabled,
     explain,
     note_item,
@@ -234,16 +235,14 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         explain(
             "surface: joints follow the surface around them; alignment: only the alignment", why
         )
-        changed, count = imgui.slider_int("Smoothing", choices.smoothing, 0, _MOST_ITERATIONS)
-        note_item(state, "Smoothing")
+        limits = (0, _MOST_ITERATIONS)
+        count = count_slider(state, "Smoothing", choices.smoothing, limits)
         explain("smoothing iterations for inpainted weights", why)
-        choices.smoothing = min(max(count, 0), 1000) if changed else choices.smoothing
+        choices.smoothing = min(max(count, 0), 1000)
         text = "%d" if choices.max_influences else "all"
-        changed, most = imgui.slider_int(
-            "Max. influences", choices.max_influences, 0, _MOST_INFLUENCES, text
-        )
-        note_item(state, "Max. influences")
+        limits = (0, _MOST_INFLUENCES)
+        most = count_slider(state, "Max. influences", choices.max_influences, limits, text)
         explain("largest influences to keep per vertex; 0 keeps all", why)
-        choices.max_influences = max(most, 0) if changed else choices.max_influences
+        choices.max_influences = max(most, 0)
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
         explain("transfer the template's pose correctives, if any", why)

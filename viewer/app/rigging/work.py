@@ -309,6 +309,7 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
     place, own = target_place(target), current_template(state)
 
     def act(report: Report) -> _Finish:
+        report(0, 100, f"Preparing {printable(name, 40)}")
         template, found, start = take(report), placing, 0.0
         aligned = template
         if found is None and "robust" in methods:

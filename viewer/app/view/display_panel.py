@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field
 from viewer.app.core.reasons import no_mesh, no_skeleton, no_skin, no_texture
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -180,7 +181,7 @@ def _draw_background(state: AppState) -> None:
         options.background = chosen
         return
     color = parse_color(options.background) if is_color else (1.0, 1.0, 1.0)
-    changed, picked = imgui.color_edit3("Colour", list(color))
+    changed, picked = imgui.color_edit3(begin_field("Colour"), list(color))
     note_item(state, "Colour")
     if changed or not is_color:
         digits = "".join(f"{round(255 * min(max(c, 0.0), 1.0)):02x}" for c in picked[:3])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field, slider_float
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -52,9 +53,8 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
         ("azimuth", "Azimuth", -180.0, 180.0, "%.0f\N{DEGREE SIGN}"),
         ("inclination", "Elevation", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
     ):
-        changed, value = imgui.slider_float(
-            text, plain_zero(getattr(light, attribute), unit), low, high, unit, _CLAMP
-        )
+        shown = plain_zero(getattr(light, attribute), unit)
+        changed, value = slider_float(begin_field(text), shown, low, high, unit, _CLAMP)
         note_item(state, f"{name} {text}")
         if changed:
             setattr(light, attribute, value)

@@ -5,7 +5,15 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import checkbox, explain, note_item, slider
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    count_slider,
+    disabled,
+    explain,
+    note_item,
+    slider,
+)
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import strongest
 from viewer.rig.skinning import METHODS, Skinning
@@ -21,6 +29,8 @@ def draw(state: AppState) -> None:
     figure, skinning = state.actor.figure, state.options.skinning
     if not figure.is_attached:
         imgui.text_wrapped("This figure has no skin attached to a skeleton.")
+        if button(state, "Open files…##skinning"):
+            state.wants.add("open dialog")
         return
     _draw_method(state, skinning)
     imgui.separator()
@@ -62,14 +72,13 @@ def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> Non
         skinning.max_influences = 0 if is_limited else _ENGINE
     note_item(state, "engine")
     explain("preview of an engine that supports this many influences per vertex")
-    imgui.begin_disabled(skinning.max_influences == 0)
-    changed, chosen = imgui.slider_int("Influences", count, 1, max(most, _ENGINE), "%d", _CLAMP)
-    note_item(state, "Influences")
-    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        imgui.set_tooltip(f"the file has up to {most} per vertex")
-    if changed and skinning.max_influences:
+    why = "" if skinning.max_influences else "the number of influences is not limited"
+    with disabled(why):
+        limits = (1, max(most, _ENGINE))
+        chosen = count_slider(state, "Influences", count, limits, flags=_CLAMP)
+        explain(f"the file has up to {most} per vertex", why)
+    if skinning.max_influences:
         skinning.max_influences = chosen
-    imgui.end_disabled()
-    imgui.begin_disabled(skinning.max_influences > 0)
-    skinning.normalize = checkbox(state, "Normalise weights", skinning.normalize)
-    imgui.end_disabled()
+    why = "the weights of limited influences are always normalised"
+    why = why if skinning.max_influences else ""
+    skinning.normalize = checkbox(state, "Normalise weights", skinning.normalize, why)

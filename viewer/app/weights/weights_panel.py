@@ -6,6 +6,7 @@ import math
 
 from imgui_bundle import imgui
 
+from viewer.app.core.fields import begin_field
 from viewer.app.core.reasons import no_mesh
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -29,6 +30,7 @@ from viewer.rig.scalars import SCALARS, length_unit, menu_title, shown_unit, spl
 __all__ = ["draw"]
 
 _LONGEST = 40  # characters of a name
+_FIELD = 7.0  # width of a field, in font sizes
 _WHOLE = ("discrete", "categorical")
 
 
@@ -148,8 +150,8 @@ def _end_field(
     state: AppState, label: str, value: float, unit: str, above: float, below: float
 ) -> float:
     """Draw a field for one end of the range; the ends keep their order."""
-    imgui.set_next_item_width(7.0 * imgui.get_font_size())
-    changed, typed = imgui.input_double(label, plain_zero(value, "%.6g"), 0.0, 0.0, "%.6g")
+    hidden = begin_field(label, _FIELD)
+    changed, typed = imgui.input_double(hidden, plain_zero(value, "%.6g"), 0.0, 0.0, "%.6g")
     note_item(state, label)
     if unit:
         imgui.same_line()

@@ -1,0 +1,152 @@
+"""Preferences: applied while the window runs, stored, read with care, and reset."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+from imgui_bundle import imgui
+
+from viewer.app.features import KEYS
+from viewer.app.preferences.key_map import chord_name, conflicts, parse_chord
+from viewer.app.preferences.state import Appearance, Preferences
+from viewer.app.preferences.storage import load_preferences, preferences_file, save_preferences
+
+WIREFRAME = next(key.name for key in KEYS if key.label == "W")
+CHANGED = Preferences("light", 1.5, 18.0, False, "draft", 8, "z", {WIREFRAME: "Shift+P"})
+
+
+@pytest.fixture
+def shown(drive, rig):
+    """A hand on an app with the window open."""
+    hand = drive(*rig, size=(1280, 1000), samples=1)
+    hand.key("comma", "ctrl")
+    hand.step(3)
+    return hand
+
+
+def height(hand):
+    """Return the height of a menu's title, which scales with the font."""
+    _, y0, _, y1 = hand.state.item_rects["menu File"]
+    return y1 - y0
+
+
+def luminance():
+    return sum(list(imgui.get_style().color_(imgui.Col_.window_bg))[:3]) / 3.0
+
+
+def test_stored_preferences_come_back():
+    assert load_preferences() == Preferences()
+    assert save_preferences(CHANGED) == ""
+    assert load_preferences() == CHANGED
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"theme": "pink"},
+        {"scale": 77},
+        {"scale": True},
+        {"font_size": "big"},
+        {"font_size": 1e9},
+        {"in_degrees": 1},
+        {"samples": 3},
+        {"up": ["y"]},
+        {"keys": ["W"]},
+        {"quality": None},
+    ],
+)
+def test_invalid_entry_gets_its_default_and_the_others_stay(wrong):
+    save_preferences(CHANGED)
+    preferences_file().write_text(json.dumps(asdict(CHANGED) | wrong))
+    (name,) = wrong
+    assert load_preferences() == replace(CHANGED, **{name: getattr(Preferences(), name)})
+
+
+@pytest.mark.parametrize("text", ["", "null", "[]", "{", '"text"'])
+def test_unreadable_file_gives_the_defaults(text):
+    save_preferences(CHANGED)
+    preferences_file().write_text(text)
+    assert load_preferences() == Preferences()
+
+
+def test_theme_is_applied_at_once_and_stored(shown):
+    assert luminance() < 0.3
+    shown.pick("Theme", 1)
+    assert luminance() > 0.8
+    assert load_preferences().theme == "light"
+    shown.click("Reset all###reset preferences")
+    assert luminance() < 0.3
+    assert load_preferences() == Preferences()
+
+
+def test_scale_is_applied_at_once_unless_one_was_given(shown):
+    before = height(shown)
+    shown.pick("Interface scale", 2)  # 100 % as the monitor's
+    shown.pick("Interface scale", 4)
+    shown.step(2)
+    assert height(shown) == pytest.approx(1.5 * before, rel=0.1)
+    shown.state.of(Appearance).given_scale = 1.0
+    shown.step(3)
+    assert height(shown) == pytest.approx(before, rel=0.1)
+
+
+def test_monitor_scale_is_followed(hand):
+    before = height(hand)
+    hand.state.of(Appearance).screen_scale = 2.0
+    hand.step(3)
+    assert height(hand) == pytest.approx(2.0 * before, rel=0.1)
+
+
+def test_font_size_and_unit_are_applied(shown):
+    before = imgui.get_font_size()
+    shown.enter_value("Font size", "20")
+    assert imgui.get_font_size() == pytest.approx(before * 20 / 15)
+    shown.pick("Angles", 1)
+    assert not shown.state.in_degrees
+
+
+def test_key_is_chosen_by_pressing_it(shown):
+    shown.click(f"key {WIREFRAME}")
+    shown.key("p", "shift")
+    shown.step(2)
+    assert load_preferences().keys == {WIREFRAME: "Shift+P"}
+    assert not shown.state.options.wireframe
+    shown.key("w")
+    assert not shown.state.options.wireframe
+    shown.key("p", "shift")
+    assert shown.state.options.wireframe
+    assert shown.state.key_labels["W"] == "Shift+P"
+    shown.click(f"Reset###reset key {WIREFRAME}")
+    shown.key("w")
+    assert not shown.state.options.wireframe
+
+
+def test_key_that_is_taken_is_reported_and_does_not_act_while_it_is_chosen(shown):
+    shown.click(f"key {WIREFRAME}")
+    shown.key("n")
+    shown.step(2)
+    assert not shown.state.options.normals
+    found = conflicts(load_preferences().keys)
+    assert set(found) == {WIREFRAME, next(key.name for key in KEYS if key.label == "N")}
+    shown.key("n")  # the first one listed runs
+    assert shown.state.options.wireframe and not shown.state.options.normals
+
+
+def test_escape_ends_the_choice_of_a_key_and_then_closes_the_window(shown):
+    shown.click(f"key {WIREFRAME}")
+    shown.key("escape")
+    shown.step(2)
+    assert not shown.state.of(Appearance).captured and shown.state.of(Appearance).is_open
+    shown.key("escape")
+    assert not shown.state.of(Appearance).is_open
+
+
+def test_table_of_keys_has_no_conflicts_and_every_name_is_read_back():
+    assert conflicts({}) == {}
+    for key in KEYS:
+        for chord in key.chords:
+            name = chord_name(chord)
+            assert not name or parse_chord(name) == chord, key.label
+    assert parse_chord("Ctrl+Nothing") == parse_chord("Hyper+A") == parse_chord("") == 0

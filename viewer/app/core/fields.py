@@ -1,0 +1,148 @@
+"""Labelled fields: a label on the left of its widget, and sliders with their number in the clear.
+
+The position of a slider is shown by a track along its lower edge, so that no handle covers the
+number.
+"""
+
+from __future__ import annotations
+
+import math
+
+from imgui_bundle import imgui
+
+__all__ = ["begin_field", "field_width", "slider_float", "slider_int"]
+
+_COLUMN, _WIDEST = 0.4, 8.5
+"""Width of the labels: fraction of the panel's width, and the most in font sizes."""
+_TRACK, _KNOB = 0.14, (0.4, 0.3)
+"""Height of the track, width and height of the knob, in font sizes."""
+_CLEAR = (0.0, 0.0, 0.0, 0.0)
+
+
+def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: float = 0.0) -> str:
+    """Draw the label of the next widget, and return the widget's own label, which is hidden.
+
+    Parameters
+    ----------
+    label : str
+        Text, and what follows ``##`` or ``###`` to tell it from others, as for ImGui.
+    width : float
+        Width of the widget in font sizes; it then follows its label directly. 0 aligns it with
+        the widgets above and below and lets it fill the line.
+    column : float
+        Width for the label in window coordinates, for rows of one line. By default it depends on
+        the panel's width, and a longer label stands above its widget.
+    needs : float
+        Smallest width of the widget in window coordinates; the label makes way for it.
+    """
+    text = label.partition("##")[0]
+    hidden = label[label.index("###") :] if "###" in label else f"##{label}"
+    letter = imgui.get_font_size()
+    if not text:
+        imgui.set_next_item_width(width * letter or -1.0)
+        return hidden
+    imgui.align_text_to_frame_padding()
+    if width:
+        imgui.text_unformatted(text)
+        imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
+        imgui.set_next_item_width(width * letter)
+        return hidden
+    left, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
+    reserved = column or min(_COLUMN * room, _WIDEST * letter)
+    length, gap = imgui.calc_text_size(text).x, imgui.get_style().item_inner_spacing.x
+    if not column:
+        reserved = max(min(reserved, room - gap - needs), min(length, room - gap - needs))
+    imgui.text_unformatted(text)
+    if column or length <= reserved:
+        imgui.same_line()
+        imgui.set_cursor_pos_x(left + reserved + gap)
+    imgui.set_next_item_width(-1.0)
+    return hidden
+
+
+def field_width(label: str, width: float) -> float:
+    """Return the width of a label with a widget of some font sizes, in window coordinates."""
+    text = label.partition("##")[0]
+    gap = imgui.get_style().item_inner_spacing.x
+    return imgui.calc_text_size(text).x + gap + width * imgui.get_font_size()
+
+
+def slider_float(
+    label: str, value: float, low: float, high: float, text: str = "%.2f", flags: int = 0
+) -> tuple[bool, float]:
+    """Draw a slider without a visible label; return whether it was moved, and its value.
+
+    Parameters
+    ----------
+    label : str
+        Hidden label, as from ``begin_field``.
+    value, low, high : float
+        Number shown, and the ends of the track.
+    text : str
+        Format of the number.
+    flags : int
+        ImGui's ``SliderFlags_``.
+    """
+    with _Track(bool(flags & imgui.SliderFlags_.logarithmic)) as track:
+        changed, moved = imgui.slider_float(label, value, low, high, text, flags)
+        track.draw(moved, low, high)
+    return changed, moved
+
+
+def slider_int(
+    label: str, value: int, low: int, high: int, text: str = "%d", flags: int = 0
+) -> tuple[bool, int]:
+    """Draw a slider of whole numbers; as ``slider_float``."""
+    with _Track(False) as track:
+        changed, moved = imgui.slider_int(label, value, low, high, text, flags)
+        track.draw(moved, low, high)
+    return changed, moved
+
+
+class _Track:
+    """Hides ImGui's handle, and draws a track at the lower edge of the slider."""
+
+    def __init__(self, is_logarithmic: bool) -> None:
+        self._is_logarithmic = is_logarithmic
+
+    def __enter__(self) -> _Track:
+        style = imgui.get_style()
+        colors = imgui.Col_.slider_grab, imgui.Col_.slider_grab_active
+        # Copies: the style's colours are about to change.
+        self._quiet, self._strong = (list(style.color_(color)) for color in colors)
+        for color in colors:
+            imgui.push_style_color(color, _CLEAR)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        imgui.pop_style_color(2)
+
+    def draw(self, value: float, low: float, high: float) -> None:
+        """Draw the track of the slider drawn last: filled from 0, or else from its left end."""
+        if imgui.internal.temp_input_is_active(imgui.get_item_id()) or low == high:
+            return
+        start, end = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        letter, grab = imgui.get_font_size(), imgui.get_style().grab_min_size
+        # ImGui moves the middle of its handle between these places.
+        left, right = start.x + 2.0 + 0.5 * grab, end.x - 2.0 - 0.5 * grab
+        at, origin = (
+            left + _fraction(number, low, high, self._is_logarithmic) * (right - left)
+            for number in (value, min(max(0.0, low), high))
+        )
+        is_active = imgui.is_item_active() or imgui.is_item_hovered()
+        color = imgui.get_color_u32(self._strong if is_active else self._quiet)
+        ink = imgui.get_window_draw_list()
+        top = end.y - max(_TRACK * letter, 2.0)
+        ink.add_rect_filled((min(at, origin), top), (max(at, origin), end.y), color)
+        half = 0.5 * _KNOB[0] * letter
+        high_end = end.y - _KNOB[1] * letter
+        ink.add_rect_filled((at - half, high_end), (at + half, end.y), color, 2.0)
+
+
+def _fraction(value: float, low: float, high: float, is_logarithmic: bool) -> float:
+    """Return the place of a value between the ends of a slider, 0 to 1."""
+    if is_logarithmic and 0.0 < low < high:
+        part = math.log(max(value, low) / low) / math.log(high / low)
+    else:
+        part = (value - low) / (high - low)
+    return min(max(part, 0.0), 1.0)

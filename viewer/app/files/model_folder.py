@@ -1,0 +1,23 @@
+"""Choice of the folder that holds body models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viewer.app.core.state import AppState
+from viewer.errors import ViewerError
+from viewer.models import known_models, save_model_folder
+from viewer.phrases import printable
+
+__all__ = ["set_model_folder"]
+
+
+def set_model_folder(state: AppState, paths: list[Path]) -> None:
+    """Remember the first path as the folder of body models, and show how many it holds."""
+    try:
+        folder = save_model_folder(paths[0])
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    count = len(known_models(folder))
+    state.say(f"{count} body models in {printable(folder, 200)}")

@@ -1,0 +1,239 @@
+"""Default arrangement of the panels: proportions of the dock, which follow the window's size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.features import PANELS
+from viewer.app.shown_panels import ShownPanels
+
+__all__ = ["Layout", "Sizes", "default_sizes", "draw_dock", "keep_fronts"]
+
+_DOCK = "viewer dock"
+# Widths in font sizes: smallest and largest of each side.
+_LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
+# The same relative to the window's width.
+_LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
+_MOST = 0.5
+"""Largest fraction of the window's width that panels may take."""
+_THREE_ROWS = 60.0  # font sizes: a lower window has two rows of panels on the right
+_TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
+"""Smallest height of bottom panels in font sizes, and its largest fraction of the window."""
+
+
+class Sizes(NamedTuple):
+    """Sizes of the default arrangement in window coordinates.
+
+    Attributes
+    ----------
+    left, right : float
+        Widths of the sides; a narrow window has all panels on the right, and ``left`` is 0.
+    bottom : float
+        Height of the bottom panels.
+    rows : int
+        Number of rows of panels on the right.
+    """
+
+    left: float
+    right: float
+    bottom: float
+    rows: int
+
+
+@dataclass(slots=True)
+class Layout:
+    """State of the arrangement.
+
+    Attributes
+    ----------
+    is_arranged : bool
+        Whether the user has moved or resized panels; the arrangement is then left alone.
+    sizes : Sizes or None
+        Sizes for which the panels were arranged last.
+    nodes : dict
+        Dock nodes of the left side, the right side and the bottom.
+    fronts : list of str
+        Titles of panels to bring to the front once they are drawn.
+    found : tuple
+        Places of panels and sizes of nodes in the previous frame.
+    """
+
+    is_arranged: bool = False
+    sizes: Sizes | None = None
+    nodes: dict[str, int] = field(default_factory=dict)
+    fronts: list[str] = field(default_factory=list)
+    found: tuple[object, ...] = ()
+
+
+def default_sizes(window: tuple[float, float], letter: float, lines: float, plots: bool) -> Sizes:
+    """Return the sizes of panels for a window; the view keeps at least half of its width.
+
+    Parameters
+    ----------
+    window : (float, float)
+        Width and height in window coordinates.
+    letter : float
+        Font size in the same unit.
+    lines : float
+        Height of the Timeline's content in font sizes.
+    plots : bool
+        Whether the Curves panel is in front of the Timeline.
+
+    >>> default_sizes((1280, 800), 15.0, 8.0, False)
+    Sizes(left=281.6, right=320.0, bottom=120.0, rows=2)
+    >>> default_sizes((900, 600), 15.0, 8.0, False)
+    Sizes(left=0.0, right=270.0, bottom=120.0, rows=2)
+    >>> default_sizes((1280, 800), 30.0, 8.0, True)
+    Sizes(left=0.0, right=510.0, bottom=368.0, rows=2)
+    """
+    width, height = window
+    least, most = _CURVES if plots else (max(lines, _TIMELINE[0]), _TIMELINE[1])
+    bottom = most * height if plots else min(least * letter, most * height)
+    rows = 3 if height >= _THREE_ROWS * letter else 2
+    if (_LEFT[0] + _RIGHT[0]) * letter > _MOST * width:
+        column = _between(_COLUMN_PART * width, _COLUMN, letter)
+        return Sizes(0.0, min(column, _MOST * width), bottom, 2)
+    left = _between(_LEFT_PART * width, _LEFT, letter)
+    right = _between(_RIGHT_PART * width, _RIGHT, letter)
+    return Sizes(left, min(right, _MOST * width - left), bottom, rows)
+
+
+def _between(width: float, limits: tuple[float, float], letter: float) -> float:
+    return min(max(width, limits[0] * letter), limits[1] * letter)
+
+
+def draw_dock(state: AppState) -> int:
+    """Draw the dock space and return it; arrange the panels unless the user has done so."""
+    shown, layout = state.of(ShownPanels), state.of(Layout)
+    dock = imgui.get_id(_DOCK)
+    sizes = _wanted(state)
+    if imgui.internal.dock_builder_get_node(dock) is None or shown.wants_reset:
+        if shown.wants_reset:
+            shown.closed.clear()
+            shown.opened.clear()
+        shown.wants_reset = layout.is_arranged = False
+        _build(layout, dock, sizes)
+    elif not layout.is_arranged and layout.sizes != sizes:
+        is_same = layout.sizes is not None and _shape(layout.sizes) == _shape(sizes)
+        _resize(layout, sizes) if is_same else _rebuild(layout, dock, sizes)
+    else:
+        _notice(layout)
+    flags = imgui.DockNodeFlags_.passthru_central_node
+    flags |= imgui.DockNodeFlags_.no_docking_over_central_node
+    imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)
+    return dock
+
+
+def _wanted(state: AppState) -> Sizes:
+    size, style = imgui.get_main_viewport().size, imgui.get_style()
+    letter = imgui.get_font_size()
+    tracks = sum(actor.clip is not None for actor in state.scene.actors)
+    # Tab bar, two rows of controls, ruler and tracks.
+    rows = 3.0 * imgui.get_frame_height_with_spacing() + 2.0 * style.window_padding.y
+    rows += (tracks + 1.5) * imgui.get_text_line_height_with_spacing()
+    plots = _is_in_front(PANELS["curves"].title)
+    return default_sizes((size.x, size.y), letter, rows / letter, plots)
+
+
+def _shape(sizes: Sizes) -> tuple[bool, int]:
+    """Return what differs between arrangements with different nodes."""
+    return sizes.left > 0.0, sizes.rows
+
+
+def _build(layout: Layout, dock: int, sizes: Sizes) -> None:
+    """Arrange all panels anew."""
+    builder, viewport = imgui.internal, imgui.get_main_viewport()
+    width, height = max(viewport.size.x, 1.0), max(viewport.size.y, 1.0)
+    builder.dock_builder_remove_node(dock)
+    builder.dock_builder_add_node(dock, imgui.internal.DockNodeFlagsPrivate_.dock_space)
+    builder.dock_builder_set_node_size(dock, viewport.size)
+    whole = builder.dock_builder_split_node(dock, imgui.Dir.down, sizes.bottom / height)
+    rest = whole.id_at_opposite_dir
+    nodes = {"bottom": whole.id_at_dir}
+    if sizes.left:
+        split = builder.dock_builder_split_node(rest, imgui.Dir.left, sizes.left / width)
+        nodes["left"], rest = split.id_at_dir, split.id_at_opposite_dir
+    fraction = sizes.right / (width - sizes.left)
+    nodes["right"] = builder.dock_builder_split_node(rest, imgui.Dir.right, fraction).id_at_dir
+    places = nodes | _rows(nodes["right"], sizes)
+    for panel in PANELS.values():
+        builder.dock_builder_dock_window(panel.title, places[panel.place])
+    builder.dock_builder_finish(dock)
+    layout.nodes, layout.sizes, layout.found = nodes, sizes, ()
+    # Otherwise the panel that is drawn last would be in front of its neighbours.
+    firsts = {places[panel.place]: panel.title for panel in reversed(PANELS.values())}
+    layout.fronts = list(firsts.values())
+
+
+def _rows(right: int, sizes: Sizes) -> dict[str, int]:
+    """Split the right side into rows; return the node of each place."""
+    builder = imgui.internal
+    fraction = 0.5 if not sizes.left else 0.42 if sizes.rows == 2 else 0.6
+    split = builder.dock_builder_split_node(right, imgui.Dir.down, fraction)
+    upper, lower = split.id_at_opposite_dir, split.id_at_dir
+    if not sizes.left:
+        return {"left": upper, "right 1": lower, "right 2": lower, "right 3": lower}
+    if sizes.rows == 2:
+        return {"right 1": upper, "right 2": lower, "right 3": lower}
+    split = builder.dock_builder_split_node(lower, imgui.Dir.down, 0.4)
+    return {"right 1": upper, "right 2": split.id_at_opposite_dir, "right 3": split.id_at_dir}
+
+
+def _rebuild(layout: Layout, dock: int, sizes: Sizes) -> None:
+    """Arrange all panels anew, and keep the tabs that are in front."""
+    front = _in_front()
+    _build(layout, dock, sizes)
+    layout.fronts += front
+
+
+def keep_fronts(layout: Layout) -> None:
+    """Remember the tabs in front while the panels are hidden."""
+    layout.fronts = layout.fronts or _in_front()
+
+
+def _in_front() -> list[str]:
+    return [title for title in _docked() if _is_in_front(title)]
+
+
+def _is_in_front(title: str) -> bool:
+    """Return whether a panel's tab was selected in the previous frame."""
+    window = imgui.internal.find_window_by_name(title)
+    if window is None or not window.was_active or window.dock_node is None:
+        return False
+    return bool(window.dock_node.selected_tab_id == window.tab_id)
+
+
+def _resize(layout: Layout, sizes: Sizes) -> None:
+    """Give the sides and the bottom other sizes."""
+    for name, node in layout.nodes.items():
+        found = imgui.internal.dock_builder_get_node(node)
+        if found is None:
+            continue
+        wide = {"left": sizes.left, "right": sizes.right}.get(name, found.size.x)
+        high = sizes.bottom if name == "bottom" else found.size.y
+        imgui.internal.dock_builder_set_node_size(node, (wide, high))
+    layout.sizes, layout.found = sizes, ()
+
+
+def _notice(layout: Layout) -> None:
+    """Notice that the user drags a panel or an edge."""
+    nodes = map(imgui.internal.dock_builder_get_node, layout.nodes.values())
+    found = (
+        *((title, imgui.internal.find_window_by_name(title).dock_id) for title in _docked()),
+        *((round(node.size_ref.x), round(node.size_ref.y)) for node in nodes if node is not None),
+    )
+    left = imgui.MouseButton_.left
+    drags = imgui.is_mouse_dragging(left) or imgui.is_mouse_released(left)
+    if layout.found and drags and found != layout.found:
+        layout.is_arranged = True
+    layout.found = found
+
+
+def _docked() -> list[str]:
+    """Return the titles of panels that have been drawn."""
+    titles = [panel.title for panel in PANELS.values()]
+    return [title for title in titles if imgui.internal.find_window_by_name(title) is not None]

@@ -1,0 +1,1 @@
+"""Preferences of the user: looks, units, quality, keys; remembered between runs."""

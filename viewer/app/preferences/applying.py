@@ -1,0 +1,73 @@
+"""Application of the preferences to the window: theme, scale, font and keys, while it runs."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.features import KEYS
+from viewer.app.preferences.key_map import label_of
+from viewer.app.preferences.state import Appearance, Preferences
+from viewer.app.preferences.storage import save_preferences
+from viewer.app.theme import change_scale, set_theme
+
+__all__ = ["change", "follow_preferences", "scale_of", "start_with"]
+
+
+def start_with(state: AppState, preferences: Preferences) -> None:
+    """Use stored preferences for a window that opens.
+
+    Parameters
+    ----------
+    state : AppState
+        Its angle unit, quality and samples are set.
+    preferences : Preferences
+        As loaded.
+    """
+    state.put(preferences)
+    state.in_degrees = preferences.in_degrees
+
+
+def change(state: AppState, preferences: Preferences) -> None:
+    """Replace the preferences, apply what they change of the view, and store them."""
+    before = state.of(Preferences)
+    if preferences == before:
+        return
+    state.put(preferences)
+    if preferences.in_degrees != before.in_degrees:
+        state.in_degrees = preferences.in_degrees
+    if preferences.quality != before.quality:
+        state.options.quality = preferences.quality
+    if preferences.samples != before.samples:
+        state.options.samples = preferences.samples
+    problem = save_preferences(preferences)
+    if problem:
+        state.say_status(problem)
+
+
+def scale_of(state: AppState) -> float:
+    """Return the scale of the interface: as given, as preferred, or as the monitor's."""
+    appearance = state.of(Appearance)
+    return appearance.given_scale or state.of(Preferences).scale or appearance.screen_scale
+
+
+def follow_preferences(state: AppState) -> None:
+    """Apply the preferences that differ from what is shown; called in every frame."""
+    preferences, applied = state.of(Preferences), state.of(Appearance)
+    theme = preferences.theme
+    if theme == "system":
+        theme = applied.system_theme or "dark"
+    if theme != applied.theme:
+        set_theme(theme)
+        applied.theme = theme
+    scale = scale_of(state)
+    if scale != applied.scale:
+        change_scale(applied.scale, scale)
+        applied.scale = scale
+    if preferences.font_size != applied.font_size:
+        # A size set now would be replaced at the end of the frame.
+        imgui.get_style()._next_frame_font_size_base = preferences.font_size
+        applied.font_size = preferences.font_size
+    if preferences.keys != applied.keys:
+        applied.keys = dict(preferences.keys)
+        state.key_labels = {key.label: label_of(key, preferences.keys) for key in KEYS}

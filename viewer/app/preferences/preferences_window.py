@@ -1,0 +1,194 @@
+"""The window "Preferences": appearance, view, files and keys."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from viewer.app.core.fields import begin_field, slider_float
+from viewer.app.core.ink import WARNING, ink
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import (
+    begin_window,
+    button,
+    choice,
+    disabled,
+    explain,
+    note_item,
+    same_line_if_room,
+)
+from viewer.app.features import KEYS, Shortcut
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.model_folder import set_model_folder
+from viewer.app.files.state import Files
+from viewer.app.preferences.applying import change
+from viewer.app.preferences.key_map import FIXED, chord_name, conflicts, label_of, pressed
+from viewer.app.preferences.state import (
+    CAPTURED,
+    FONT_SIZES,
+    SAMPLES,
+    SCALES,
+    THEMES,
+    UPS,
+    Appearance,
+    Preferences,
+)
+from viewer.app.preferences.system_theme import system_theme
+from viewer.models import load_model_folder
+from viewer.phrases import printable
+from viewer.rendering.options import QUALITIES
+
+__all__ = ["close_preferences", "draw_preferences", "open_preferences"]
+
+_TITLE = "Preferences"
+_SIZE = (36.0, 42.0)  # in font sizes
+_ALWAYS_CLAMP = imgui.SliderFlags_.always_clamp
+_LISTED = 20.0  # rows of the list of keys
+
+
+def open_preferences(state: AppState) -> None:
+    """Open the window."""
+    state.of(Appearance).is_open = True
+
+
+def draw_preferences(state: AppState) -> None:
+    """Draw the window if it is open."""
+    appearance = state.of(Appearance)
+    if not appearance.is_open:
+        return
+    shown, stays = begin_window(_TITLE, _SIZE)
+    if shown:
+        preferences = replace(state.of(Preferences))
+        imgui.separator_text("Appearance")
+        _draw_appearance(state, preferences)
+        imgui.separator_text("View")
+        _draw_view(state, preferences)
+        imgui.separator_text("Files")
+        _draw_files(state, preferences)
+        imgui.separator_text("Keys")
+        _draw_keys(state, preferences)
+        why = "" if preferences != Preferences() else "all preferences have their defaults"
+        if button(state, "Reset all###reset preferences", why):
+            preferences = Preferences()
+        change(state, preferences)
+    imgui.end()
+    if not stays:
+        close_preferences(state)
+
+
+def close_preferences(state: AppState) -> None:
+    """Close the window, and stop waiting for a key."""
+    appearance = state.of(Appearance)
+    appearance.is_open, appearance.captured = False, ""
+
+
+def _draw_appearance(state: AppState, preferences: Preferences) -> None:
+    appearance = state.of(Appearance)
+    before = preferences.theme
+    preferences.theme = choice(state, "Theme", before, THEMES)
+    if preferences.theme == "system" != before:
+        appearance.system_theme = system_theme()
+    if preferences.theme == "system" and not appearance.system_theme:
+        imgui.text_disabled("this system does not tell its theme: dark is used")
+    why = "--scale was given on the command line" if appearance.given_scale else ""
+    scales = {"0": f"automatic ({100.0 * appearance.screen_scale:.0f} %)"}
+    scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
+    with disabled(why):
+        chosen = choice(state, "Interface scale", f"{preferences.scale:g}", scales)
+        explain("automatic follows the scale of the monitor", why)
+    preferences.scale = float(chosen)
+    changed, size = slider_float(
+        begin_field("Font size"), preferences.font_size, *FONT_SIZES, "%.0f", _ALWAYS_CLAMP
+    )
+    note_item(state, "Font size")
+    if changed:
+        preferences.font_size = float(round(size))
+
+
+def _draw_view(state: AppState, preferences: Preferences) -> None:
+    units = {"degrees": "degrees", "radians": "radians"}
+    unit = "degrees" if preferences.in_degrees else "radians"
+    preferences.in_degrees = choice(state, "Angles", unit, units) == "degrees"
+    preferences.quality = choice(state, "Quality##preferred", preferences.quality, QUALITIES)
+    explain("quality of the view when the program starts; the Display panel changes it")
+    samples = {str(count): f"{count} per pixel" for count in SAMPLES}
+    chosen = choice(state, "Samples##preferred", str(preferences.samples), samples)
+    explain("anti-aliasing; the driver may provide fewer")
+    preferences.samples = int(chosen)
+
+
+def _draw_files(state: AppState, preferences: Preferences) -> None:
+    preferences.up = choice(state, "Up axis", preferences.up, UPS)
+    explain("up axis of captures and BVH files that are opened from now on")
+    folder = load_model_folder()
+    begin_field("Model folder")
+    if button(state, "Choose…##model folder"):
+        state.of(Files).dialog = FileDialog(
+            folder or folder_of(state.paths), set_model_folder, "folder", "Folder of body models"
+        )
+    explain("folder of body models, which the File menu lists")
+    imgui.same_line()
+    imgui.text_disabled("none" if folder is None else printable(folder, 60))
+
+
+def _draw_keys(state: AppState, preferences: Preferences) -> None:
+    """Draw the list of keys; a click on a key waits for its replacement."""
+    height = _LISTED * imgui.get_text_line_height_with_spacing()
+    found = conflicts(preferences.keys)
+    # The button below, and a line about conflicts.
+    below = (1 + bool(found)) * imgui.get_frame_height_with_spacing()
+    room = imgui.get_content_region_avail().y - below
+    if imgui.begin_child("##key map", (0.0, max(min(height, room), 0.2 * height))):
+        for shortcut in KEYS:
+            _draw_key(state, preferences, shortcut, found.get(shortcut.name, ""))
+    imgui.end_child()
+    if found:
+        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
+        count = len(found)
+        imgui.text_unformatted(f"{count} actions share a key: only the first one listed runs")
+        imgui.pop_style_color()
+
+
+def _draw_key(state: AppState, preferences: Preferences, shortcut: Shortcut, conflict: str) -> None:
+    appearance, name = state.of(Appearance), shortcut.name
+    waits = appearance.captured == name
+    label = "press a key…" if waits else label_of(shortcut, preferences.keys)
+    width = 10.0 * imgui.get_font_size()
+    why = "this key cannot be changed" if shortcut.label in FIXED else ""
+    with disabled(why):
+        if conflict:
+            imgui.push_style_color(imgui.Col_.text, ink(WARNING))
+        pressed_button = imgui.button(f"{label}###key {name}", (width, 0.0))
+        note_item(state, f"key {name}")
+        if conflict:
+            imgui.pop_style_color()
+        explain(f"also: {conflict}" if conflict else "click, then press another key", why)
+    if pressed_button and not why:
+        appearance.captured = "" if waits else name
+    elif waits:
+        _capture(state, preferences, shortcut)
+    if name in preferences.keys:
+        same_line_if_room("Reset")
+        if button(state, f"Reset###reset key {name}"):
+            preferences.keys = _without(preferences.keys, name)
+    imgui.same_line()
+    imgui.align_text_to_frame_padding()
+    imgui.text_unformatted(shortcut.text)
+
+
+def _capture(state: AppState, preferences: Preferences, shortcut: Shortcut) -> None:
+    """Use the key that is pressed for an action."""
+    chord = pressed()
+    if imgui.is_key_pressed(imgui.Key.escape, False):
+        state.of(Appearance).captured = CAPTURED
+    if not chord:
+        return
+    state.of(Appearance).captured = CAPTURED
+    preferences.keys = _without(preferences.keys, shortcut.name)
+    if chord not in shortcut.chords:
+        preferences.keys |= {shortcut.name: chord_name(chord)}
+
+
+def _without(keys: dict[str, str], name: str) -> dict[str, str]:
+    return {key: text for key, text in keys.items() if key != name}

@@ -1,0 +1,92 @@
+"""Preview of a recording: the present view, as one of its frames would show it."""
+
+from __future__ import annotations
+
+import moderngl
+
+from viewer.app.core.state import AppState
+from viewer.app.recording.recorded_options import recorded_options
+from viewer.app.recording.state import Recording, RecordSettings
+from viewer.rendering.gpu.target import Target
+from viewer.rendering.renderer import Renderer
+
+__all__ = ["Preview", "preview_size"]
+
+_WIDEST, _HIGHEST = 320, 200  # pixels
+
+
+class Preview:
+    """Draws the preview into a texture whenever something about it changes.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        Context that is current in every call.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.context = context
+        self.target: Target | None = None
+        self._renderer: Renderer | None = None
+        self._drawn: object = None
+
+    def draw(self, state: AppState, key: object) -> None:
+        """Draw the preview if the Record window is open and the picture has changed.
+
+        Parameters
+        ----------
+        state : AppState
+            With the settings; receives the texture.
+        key : object
+            Identifies the picture of the view.
+        """
+        recording = state.of(Recording)
+        settings = recording.settings
+        if settings is None:
+            self.release()
+            recording.preview = 0
+            return
+        size = preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
+        wanted = (key, size, settings.look, settings.background, settings.kind, settings.samples)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        recording.preview = self._draw(state, settings, size)
+
+    def _draw(self, state: AppState, settings: RecordSettings, size: tuple[int, int]) -> int:
+        """Draw the preview and return the number of its texture."""
+        options = recorded_options(state, settings, 2)
+        target = self.target
+        if target is None or (target.size, target.asked_samples) != (size, options.samples):
+            self._release_target()
+            self.target = target = Target(self.context, size, options.samples)
+        camera = state.camera.copy()
+        selected = (state.chosen_actor, state.selected_joint)
+        # The renderer of the view is in the middle of averaging its own picture.
+        renderer = self._renderer = self._renderer or Renderer(self.context)
+        renderer.draw(state.scene, camera, options, target, state.box, selected)
+        target.resolve()
+        return int(target.texture.glo)
+
+    def release(self) -> None:
+        """Release everything, as when the window is closed."""
+        self._drawn = None
+        self._release_target()
+        if self._renderer is not None:
+            self._renderer.release()
+            self._renderer = None
+
+    def _release_target(self) -> None:
+        if self.target is not None:
+            self.target.release()
+            self.target = None
+
+
+def preview_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the size of the preview of a picture, pixels.
+
+    >>> preview_size((1920, 1080)), preview_size((1000, 2000)), preview_size((16, 4000))
+    ((320, 180), (100, 200), (1, 200))
+    """
+    factor = min(_WIDEST / size[0], _HIGHEST / size[1], 1.0)
+    return max(round(factor * size[0]), 1), max(round(factor * size[1]), 1)
