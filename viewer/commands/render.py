@@ -15,6 +15,7 @@ from viewer.commands._scene import (
     print_warnings,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._sequence.onion_picture import draw_onion
 from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
 from viewer.commands._view import (
     add_camera_arguments,
@@ -91,7 +92,10 @@ def run(arguments: argparse.Namespace) -> int:
     hide_parts(arguments, scene, options)
     print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
-    if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
+    if request is not None and request.kind == "onion":
+        line = draw_onion(request, arguments, scene, options, size)
+        print(line, file=summary_stream(output))
+    elif request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
         line = draw_sequence(request, arguments, scene, options, size)
         print(line, file=summary_stream(output))
     else:

@@ -96,6 +96,7 @@ class Lighting:
             0 to 1: how much of shadows and occlusion counts.
         """
         options, shadow = casters.options, None
+        casters = replace(casters, threshold=sample.threshold)
         if self._spheres is not None and options.lights.key.strength > 0.0:
             direction = tilted(key_direction(view, options.lights), sample.light)
             shadow = self._shadow_pass.draw(

@@ -36,6 +36,7 @@ from viewer.rendering.shown import (
     update_meshes,
     update_skeletons,
 )
+from viewer.rendering.translucent import draw_translucent
 from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
@@ -184,18 +185,19 @@ class Renderer:
         ]
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, joint, 1.0)
+                self._draw_skeleton(actor, view, options, joint)
         if options.has_shadows:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+        draw_translucent(self.mesh_pass, meshes, view, options)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self._draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, joint, options.skeleton_opacity)
+                self._draw_skeleton(actor, view, options, joint, overlays=True)
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
@@ -272,13 +274,13 @@ class Renderer:
         """Draw background and surfaces."""
         self.ground_pass.draw_background(options.background)
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
-        for actor, mesh in meshes.singles:
+        for actor, mesh in meshes.opaque:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         if options.cull:
             self.context.enable(moderngl.CULL_FACE)
-        for actor, mesh in meshes.singles:
+        for actor, mesh in meshes.opaque:
             self.mesh_pass.draw(mesh, placement_of(actor, options), view, options, actor.color)
         for actors, instances in meshes.instanced:
             draw_instances(self.programs, instances, actors, view, options)
@@ -310,16 +312,20 @@ class Renderer:
         view: View,
         options: DisplayOptions,
         selected: int,
-        opacity: float,
+        overlays: bool = False,
     ) -> None:
         skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
-        self.joint_pass.draw(skeleton, placement, view, options, selected, opacity, actor.color)
+        opacity = actor.opacity * (options.skeleton_opacity if overlays else 1.0)
+        self.joint_pass.draw(
+            skeleton, placement, view, options, selected, opacity, actor.color, overlays
+        )
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self.buffers.keypoints_of(actor)
         markers.update(actor.require_pose(), options.skinning)
         # Marker positions already include the placement of the pose.
-        self.late.keypoint_pass.draw(markers, actor.placement, view, options)
+        at = actor.placement
+        self.late.keypoint_pass.draw(markers, at, view, options, actor.opacity)
 
     def _draw_marks(
         self,

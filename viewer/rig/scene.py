@@ -69,6 +69,8 @@ class Actor:
         Track number in a capture of several people; negative without a track.
     color : (r, g, b) or None
         Linear, 0 to 1; None for the default colour.
+    opacity : float
+        Below 1 it is drawn translucently, as one layer: nothing inside it shows.
     points : (K, 4) or None
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
@@ -85,6 +87,7 @@ class Actor:
     offset: float = 0.0
     person: int | None = None
     color: tuple[float, float, float] | None = None
+    opacity: float = 1.0
     points: Floats | None = None
     is_present: bool = True
     called: str = ""

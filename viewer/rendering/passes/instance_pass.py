@@ -26,7 +26,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
     Posed buffers are used instead for small groups, since a moving camera needs no skinning then,
-    and if meshes are drawn several times, in binding space or with a scalar quantity.
+    for translucent actors, and if meshes are drawn several times, in binding space or with a
+    scalar quantity.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         return []
     groups: dict[tuple[int, bytes], list[Actor]] = {}
     for actor in actors:
-        if actor.pose is not None and actor.figure.is_attached:
+        if actor.pose is not None and actor.figure.is_attached and actor.opacity == 1.0:
             key = id(actor.figure), actor.pose.shape_weights.tobytes()
             groups.setdefault(key, []).append(actor)
     return [group for group in groups.values() if len(group) >= FEWEST]

@@ -88,6 +88,7 @@ class JointPass:
         selected: int = -1,
         opacity: float = 1.0,
         color: Color | None = None,
+        overlays: bool = False,
     ) -> None:
         """Draw one box per joint.
 
@@ -104,19 +105,20 @@ class JointPass:
         selected : int
             The joint to highlight, -1 for none.
         opacity : float
-            Below 1 the boxes are drawn as one translucent layer over everything else: they often
-            enclose the skin and would hide it.
+            Below 1 the boxes are drawn as one translucent layer.
         color : (r, g, b), optional
             Colour of all boxes, linear; by default each joint has its own colour.
+        overlays : bool
+            Draw over everything else: boxes often enclose the skin, which would hide them.
         """
-        overlays = opacity < 1.0
+        overlays = overlays and opacity < 1.0
         view = in_front(view) if overlays else view
         program = self.programs.drawing(
             "joint", "phong", fragment="mesh", effects=view.effects.defines
         )
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_boxes, program, skeleton.boxes, *how)
-        if overlays:
+        if opacity < 1.0:
             # Draw only the nearest surface, so that other boxes do not show through.
             draw_nearest(self.context, draw)
         else:
