@@ -8,7 +8,6 @@ from formats.capture_files import body, write_frames
 from viewer.app.curves.clip_actions import ask_for_clip, new_clip
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
-from viewer.app.menus import _ask_for_export, _ask_for_pose
 from viewer.app.recording.record_dialog import _ask_where
 from viewer.app.recording.state import KINDS, RecordSettings
 
@@ -33,9 +32,10 @@ def test_recordings_are_called_after_the_sequence(recorded):
 def test_what_one_person_gives_is_called_after_that_person(recorded):
     state = recorded.state
     state.choose_actor(1)
-    _ask_for_pose(state)
+    recorded.menu("menu File", "Save pose…")
     assert state.of(Files).dialog.name == "seq_smpl_7_pose.json"
-    _ask_for_export(state)
+    recorded.key("escape")
+    recorded.menu("menu File", "Export…")
     assert state.of(Files).dialog.name == "seq_smpl_7.obj"
 
 
@@ -64,5 +64,5 @@ def test_figure_and_its_clip_are_called_after_the_figure(hand):
 
 def test_name_with_a_slash_offers_no_folder(hand):
     hand.state.actor.called = "../a b"
-    _ask_for_export(hand.state)
+    hand.menu("menu File", "Export…")
     assert hand.state.of(Files).dialog.name == ".._a_b.obj"

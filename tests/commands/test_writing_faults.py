@@ -11,7 +11,7 @@ import pytest
 from commands.writing_runs import Inputs, contents, converting, drawing, into, write_inputs
 
 from viewer.cli import run
-from viewer.media import saving as _save
+from viewer.media import saving
 
 pytestmark = pytest.mark.slow
 
@@ -37,7 +37,7 @@ class FullDisk:
     def __init__(self, monkeypatch, number: int) -> None:
         self.calls, self.number = 0, number
         opened, write_text = os.fdopen, Path.write_text
-        monkeypatch.setattr(_save.os, "fdopen", lambda *a: _Stream(opened(*a), self))
+        monkeypatch.setattr(saving.os, "fdopen", lambda *a: _Stream(opened(*a), self))
 
         def written(path, text, **settings):  # frames of a folder are written without a rename
             self.meet(lambda half: write_text(path, half, **settings), text)

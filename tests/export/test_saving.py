@@ -17,7 +17,7 @@ from viewer.cli import run
 from viewer.errors import OutputError
 from viewer.export import EXPORTERS, export
 from viewer.formats import all_or_none, save_text
-from viewer.media import saving as _save
+from viewer.media import saving
 
 SUFFIXES = [kind.suffixes[0] for kind in EXPORTERS.values() if kind.writes_pose]
 # Files that each one writes for the figure below, which has two pictures.
@@ -48,13 +48,13 @@ class Fault:
         self.calls, self.number, self.step = 0, number, step
         self.stays = step in ("open", "write", "flush")
         wrapped = {
-            "open": (_save.tempfile, "mkstemp"),
-            "flush": (_save.os, "fsync"),
+            "open": (saving.tempfile, "mkstemp"),
+            "flush": (saving.os, "fsync"),
             "rights": (Path, "chmod"),
             "rename": (Path, "replace"),
         }
         if step == "write":
-            monkeypatch.setattr(_save.os, "fdopen", self._stream(os.fdopen))
+            monkeypatch.setattr(saving.os, "fdopen", self._stream(os.fdopen))
         else:
             owner, name = wrapped[step]
             original = getattr(owner, name)
@@ -138,7 +138,7 @@ def test_interrupt_leaves_what_was_there(rig, tmp_path, monkeypatch, capsys, suf
         if len(calls) == SAVES[suffix]:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(_save.os, "fsync", interrupt)
+    monkeypatch.setattr(saving.os, "fsync", interrupt)
     assert run(["convert", *rig, "-o", str(folder / f"person{suffix}"), "--force"]) == 130
     assert capsys.readouterr().err == "viewer: interrupted\n"
     assert contents(folder) == before
@@ -264,7 +264,7 @@ def test_all_or_none_refuses_before_anything_changes(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(_save.shutil, "copy2", full)
+    monkeypatch.setattr(saving.shutil, "copy2", full)
     with pytest.raises(OutputError) as caught, all_or_none([tmp_path / "new", old]):
         pytest.fail("the block must not run")
     assert str(caught.value) == f"{old}: No space left on device"

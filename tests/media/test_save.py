@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from viewer.errors import OutputError
-from viewer.media import saving as _save
+from viewer.media import saving
 from viewer.media.saving import as_words, save_bytes, save_text
 
 
@@ -159,7 +159,7 @@ def test_failure_before_the_rename_keeps_the_old_file(tmp_path, monkeypatch, ste
     def fail(*args):
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr(_save.os, step, fail)
+    monkeypatch.setattr(saving.os, step, fail)
     assert refused(tmp_path / "a.skel") == f"{tmp_path / 'a.skel'}: Input/output error"
     assert (tmp_path / "a.skel").read_bytes() == b"old"
     assert names(tmp_path) == ["a.skel"]
@@ -184,7 +184,7 @@ def test_interrupt_leaves_no_temporary_file(tmp_path, monkeypatch):
     def interrupt(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(_save.os, "fsync", interrupt)
+    monkeypatch.setattr(saving.os, "fsync", interrupt)
     with pytest.raises(KeyboardInterrupt):
         save_bytes(tmp_path / "a.skel", b"new")
     assert (tmp_path / "a.skel").read_bytes() == b"old"

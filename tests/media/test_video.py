@@ -10,7 +10,7 @@ import pytest
 from media.small_videos import counting, decoded, write
 from PIL import Image
 
-from viewer.media import video_kinds as _video_kinds
+from viewer.media import video_kinds
 from viewer.media.video import VideoSink
 
 pytestmark = pytest.mark.slow
@@ -167,8 +167,8 @@ def delays(path: Path) -> list[int]:
     [
         (25.0, [4] * 6, ""),
         (50.0, [2] * 6, ""),
-        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames a second on average"),
-        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames a second on average"),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames per second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames per second on average"),
     ],
 )
 def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
@@ -237,8 +237,8 @@ def test_better_quality_is_larger_and_nearer(tmp_path):
 
 
 def test_encoder_that_stands_in_works(tmp_path, monkeypatch):
-    kind = _video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "mpeg4"), False, True)
-    monkeypatch.setitem(_video_kinds.VIDEOS, ".mp4", kind)
+    kind = video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "mpeg4"), False, True)
+    monkeypatch.setitem(video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"
     sink = VideoSink(path, (64, 48), 25.0)
     write(sink, [quarters(64, 48)] * 3)

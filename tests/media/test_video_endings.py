@@ -12,7 +12,7 @@ import pytest
 from media.small_videos import counting, decoded, write
 
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
-from viewer.media import video_kinds as _video_kinds
+from viewer.media import video_kinds
 from viewer.media.video import VideoSink
 from viewer.media.video_kinds import video_kind
 
@@ -29,8 +29,8 @@ def names(folder: Path) -> list[str]:
 
 
 def test_missing_encoder_is_one_line(tmp_path, monkeypatch):
-    kind = _video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
-    monkeypatch.setitem(_video_kinds.VIDEOS, ".mp4", kind)
+    kind = video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
+    monkeypatch.setitem(video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"
     with pytest.raises(ViewerError) as caught:
         VideoSink(path, (64, 48), 25.0)
@@ -50,8 +50,8 @@ def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
     ("name", "rate", "quality", "words"),
     [
         ("x.mp4", 25.0, 101.0, "video quality: expected 0 to 100, found 101"),
-        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames a second, found 0"),
-        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames a second, found 60"),
+        ("x.mp4", 0.0, 75.0, "x.mp4: expected 0.01 to 1000 frames per second, found 0"),
+        ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames per second, found 60"),
     ],
 )
 def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words):

@@ -21,6 +21,7 @@ _K = imgui.Key
 _OPTION = "view.display_actions.toggle_option"
 _LOOK = "view.camera_actions.look"
 _TOOL = "posing.tool_actions.choose_tool"
+_UNDO = "core.undo_actions"
 _STEP = "playback.actions.step"
 
 
@@ -135,8 +136,10 @@ KEYS = (
     Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", "window_actions.toggle_messages"),
     Shortcut((_K.f12,), "F12", "save a screenshot", "window_actions.want", ("screenshot",)),
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", "window_actions.want", ("open dialog",)),
-    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", "core.undo.undo"),
-    Shortcut((_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo.redo"),
+    Shortcut((_CTRL | _K.z,), "Ctrl+Z", "undo", f"{_UNDO}.undo"),
+    Shortcut(
+        (_CTRL | _SHIFT | _K.z, _CTRL | _K.y), "Ctrl+Shift+Z", "redo", "core.undo_actions.redo"
+    ),
     Shortcut((_K.q,), "Q", "Select tool: click selects", _TOOL, ("select",)),
     Shortcut((_K.e,), "E", "Rotate tool: rotate the selected joint", _TOOL, ("rotate",)),
     Shortcut((_K.d,), "D", "Move tool: drag a joint (IK)", _TOOL, ("move",)),

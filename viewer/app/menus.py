@@ -16,7 +16,7 @@ from viewer.app.core.reasons import (
     nothing_to_export,
 )
 from viewer.app.core.state import AppState
-from viewer.app.core.undo import redo, undo
+from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.clip_actions import new_clip
 from viewer.app.features import PANELS

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.app.actors.following import start_following
-from viewer.app.core.undo import undo
+from viewer.app.core.undo_actions import undo
 from viewer.app.curves.clip_actions import key_present_pose, new_clip
 from viewer.app.curves.editing import (
     add_key_at,

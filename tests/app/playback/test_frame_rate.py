@@ -8,7 +8,7 @@ from app.captured import dots, people, walk
 from numpy.testing import assert_array_equal
 
 import viewer
-from viewer.app.core.history import History
+from viewer.app.core.undo_history import History
 from viewer.app.files.stream import _keep_rate
 from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
 from viewer.rendering.options import DisplayOptions

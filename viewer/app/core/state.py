@@ -12,10 +12,10 @@ import numpy as np
 
 from viewer.app.core.clock import Clock
 from viewer.app.core.framing import Framing
-from viewer.app.core.history import History
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
 from viewer.app.core.stats import Stats
+from viewer.app.core.undo_history import History
 from viewer.diagnostics import Diagnostic
 from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit

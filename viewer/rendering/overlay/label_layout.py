@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.rendering.overlay.label_cells import Cells, Dots
-from viewer.rendering.overlay.label_places import (
+from viewer.rendering.overlay.label_candidates import (
     Places,
     clear_places,
     crowded,
@@ -17,6 +16,7 @@ from viewer.rendering.overlay.label_places import (
     line_pixels,
     places_of,
 )
+from viewer.rendering.overlay.label_cells import Cells, Dots
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Layout", "lay_out"]

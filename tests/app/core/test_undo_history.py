@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import viewer
-from viewer.app.core.history import History
+from viewer.app.core.undo_history import History
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.motion.clip import Clip
 
