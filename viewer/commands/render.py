@@ -20,10 +20,10 @@ from viewer.commands._sequence.recording import add_sequence_arguments, draw_seq
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
+    camera_notes,
     camera_of,
     display_of,
     hide_parts,
-    lens_notes,
     parse_size,
     warn_of_missing,
 )
@@ -33,6 +33,7 @@ from viewer.interrupts import deferred
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
+from viewer.rendering.camera_views import with_cameras
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
@@ -91,7 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
     print_warnings(choose_subject(scene, options))
-    print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
+    print_warnings(warn_of_missing(scene, options) + camera_notes(arguments, scene, options))
     if request is not None and request.kind == "onion":
         line = draw_onion(request, arguments, scene, options, size)
         print(line, file=summary_stream(output))
@@ -119,8 +120,8 @@ def _draw_still(
     output = Path(arguments.output)
     check_targets([output], inputs_of(arguments, scene), arguments.force)
     points = scene_points(scene, options.show)
-    camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
+    camera = camera_of(arguments, scene, with_cameras(scene, options, points), size)
     if arguments.panels:
         fits = arguments.distance is None and arguments.view is None
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)

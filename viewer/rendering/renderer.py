@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.camera_views import (
+    draw_image_behind,
+    draw_image_planes,
+    frusta_of,
+    reach_of,
+)
 from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.program import Programs
@@ -146,7 +152,7 @@ class Renderer:
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
-        view = view_of(camera, target.size, box)
+        view = view_of(camera, target.size, reach_of(scene, camera.fixed, options, box))
         meshes = self._update(scene, view, options, selected)
         casters = Casters(
             self.programs, self.mesh_pass, self.late, self.buffers, meshes, scene.actors, options
@@ -161,7 +167,8 @@ class Renderer:
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
-        self._draw_marks(scene, view, options, target.size, selected)
+        frusta = frusta_of(scene, camera.fixed, options, box, target.size)
+        self._draw_marks(scene, view, options, target.size, selected, frusta)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
 
@@ -177,7 +184,10 @@ class Renderer:
         strength: float,
     ) -> None:
         """Draw everything that is part of the scene, from the background on."""
+        self.ground_pass.draw_background(options.background)
+        draw_image_behind(self.late, scene, view, options, target.size)
         self._draw_meshes(meshes, view, options)
+        draw_image_planes(self.late, scene, view, options, box)
         skeletons = [
             (actor, selected[1] if index == selected[0] else -1)
             for index, actor in enumerate(scene.actors)
@@ -271,8 +281,7 @@ class Renderer:
         return meshes
 
     def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        """Draw background and surfaces."""
-        self.ground_pass.draw_background(options.background)
+        """Draw opaque surfaces, and the lines on them."""
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
         for actor, mesh in meshes.opaque:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
@@ -334,8 +343,9 @@ class Renderer:
         options: DisplayOptions,
         size: tuple[int, int],
         selected: tuple[int, int],
+        frusta: Sequence[Annotation],
     ) -> None:
-        """Draw joint marks, ghost, marks and annotations, then all labels."""
+        """Draw joint marks, ghost, frusta, marks and annotations, then all labels."""
         self.names_left_out, drawn = (0, 0), []
         if has_joint_marks(options):
             from viewer.rendering.overlay.joint_annotation import joint_annotation
@@ -346,7 +356,7 @@ class Renderer:
                 drawn.append(joints)
         if self.ghost is not None:
             self.late.ghost_pass.draw(self.ghost, view, options)
-        over = [*self._marked(), *self.annotations]
+        over = [*frusta, *self._marked(), *self.annotations]
         for annotation in over:
             self.late.annotation_pass.draw(annotation, view, size)
         if drawn or over:

@@ -33,6 +33,7 @@ __all__ = [
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from viewer.rig.captures.camera_images import CameraImages
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
@@ -177,6 +178,8 @@ class Scene:
         Up axis; None for that of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
+    images : CameraImages or None
+        Their images, if there are some.
     time : float or None
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
@@ -189,6 +192,7 @@ class Scene:
     views: tuple[CameraView, ...] = ()
     time: float | None = None
     files: tuple[Path, ...] = ()
+    images: CameraImages | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -34,6 +34,7 @@ def draw_onion(
     Raises ViewerError if nothing moves, OutputError if the file cannot be written.
     """
     from viewer.media.image import save_image
+    from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.offscreen import Offscreen
 
     shots = shots_of(request, arguments, scene)
@@ -41,7 +42,7 @@ def draw_onion(
     print_warnings(shots.notes)
     poses = onion(scene, shots.times.tolist(), interpolate=arguments.interpolate_gaps)
     points = scene_points(poses, options.show)
-    camera = camera_of(arguments, poses, points, size)
+    camera = camera_of(arguments, poses, with_cameras(poses, options, points), size)
     with deferred(), Offscreen(arguments.gpu) as offscreen:
         pixels = offscreen.render(poses, size, camera, options, bounding_box(points))
         print_warnings(offscreen.renderer.notes)

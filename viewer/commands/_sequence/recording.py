@@ -193,6 +193,7 @@ def draw_sequence(
     Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
     Raises OutputError if a file exists already, or cannot be written.
     """
+    from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import fit_turning, frame_motion, seen_aspect
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
@@ -203,6 +204,7 @@ def draw_sequence(
     check_targets(outputs, inputs_of(arguments, scene), arguments.force)
     recording = _recording(request, arguments, scene, shots, options)
     points, recording.box = frame_motion(recording)
+    points = with_cameras(scene, options, points)
     aspect = seen_aspect(camera_of(arguments, scene, points, size), points)
     sink = _sink(request, arguments, options, shots, outputs, size, aspect)
     print_warnings([*shots.notes, *_follow_notes(scene, arguments), *getattr(sink, "notes", [])])

@@ -15,6 +15,7 @@ from viewer.rendering.passes.mesh_pass import MeshPass
 if TYPE_CHECKING:
     from viewer.rendering.gpu.accumulation import Accumulation
     from viewer.rendering.passes.annotation_pass import AnnotationPass
+    from viewer.rendering.passes.camera_image_pass import CameraImagePass
     from viewer.rendering.passes.ghost_pass import GhostPass
     from viewer.rendering.passes.keypoint_pass import KeypointPass
     from viewer.rendering.passes.legend_pass import LegendPass
@@ -51,7 +52,9 @@ class LatePasses:
         self._context, self._programs, self._buffers = context, programs, buffers
         self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
         self._sum: Accumulation | None = None
-        self._made: list[PointPass | PickPass | LegendPass | AnnotationPass | GhostPass] = []
+        self._made: list[
+            PointPass | PickPass | LegendPass | AnnotationPass | GhostPass | CameraImagePass
+        ] = []
 
     @cached_property
     def keypoint_pass(self) -> KeypointPass:
@@ -112,6 +115,15 @@ class LatePasses:
         ghosts = GhostPass(self._context, self._programs, self._mesh_pass)
         self._made.append(ghosts)
         return ghosts
+
+    @cached_property
+    def camera_image_pass(self) -> CameraImagePass:
+        """Pass for the images of calibrated cameras."""
+        from viewer.rendering.passes.camera_image_pass import CameraImagePass
+
+        images = CameraImagePass(self._context, self._programs)
+        self._made.append(images)
+        return images
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
         """Return the sum of passes of a picture of this size."""
