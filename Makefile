@@ -54,11 +54,12 @@ golden: $(READY) system
 manual: $(READY)
 	@$(BIN)/python tests/manual/reference.py
 
-# Makes the bundled figures anew; they need scipy and scikit-image beside the rest.
+# Makes the bundled figures and the studio anew; they need scipy and scikit-image beside the rest.
 figure: $(READY)
 	@$(BIN)/pip install --quiet scipy scikit-image xatlas
 	@$(BIN)/python assets/make_fox.py
 	@$(BIN)/python assets/make_body.py
+	@$(BIN)/python assets/make_studio.py
 
 # The environment, made anew when the dependencies change.
 $(READY): pyproject.toml

@@ -10,9 +10,8 @@ uniform vec3 u_line_color;  // sRGB
 
 out vec4 f_color;           // sRGB, premultiplied by alpha
 
-// Coverage of lines at integers; 0 where the lines are less than a pixel apart.
-float lines(vec2 place) {
-    vec2 width = max(fwidth(place), vec2(1e-6));
+// Coverage of lines at integers, given the width of a pixel; 0 where the lines are less than a pixel apart.
+float lines(vec2 place, vec2 width) {
     vec2 distance = abs(fract(place - 0.5) - 0.5) / width;
     vec2 line = clamp(1.0 - distance, 0.0, 1.0) * clamp(1.0 - 2.0 * width, 0.0, 1.0);
     return max(line.x, line.y);
@@ -20,7 +19,8 @@ float lines(vec2 place) {
 
 void main() {
     vec2 place = v_ground / u_step - u_origin;
-    float strength = max(0.45 * lines(place), 0.9 * lines(place / 10.0));
+    vec2 width = max(fwidth(place), vec2(1e-5));
+    float strength = max(0.45 * lines(place, width), 0.9 * lines(0.1 * place, 0.1 * width));
     float away = clamp(length(v_ground) / u_fade, 0.0, 1.0);
     float alpha = strength * (1.0 - away) * (1.0 - away);
     f_color = vec4(u_line_color * alpha, alpha);

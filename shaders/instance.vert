@@ -27,6 +27,11 @@ out float v_scalar;
 flat out float v_opacity;
 flat out int v_instance;
 
+#ifdef MATERIALS
+in vec2 in_second_uv;
+out vec2 v_second_uv;
+#endif
+
 #pragma chunk
 
 void main() {
@@ -41,6 +46,9 @@ void main() {
     v_position = vec3(dot(in_model_x, point), dot(in_model_y, point), dot(in_model_z, point));
     v_normal = inverse_transposed(in_model_x.xyz, in_model_y.xyz, in_model_z.xyz, normal, 0.0);
     v_uv = in_uv;
+#ifdef MATERIALS
+    v_second_uv = in_second_uv;
+#endif
     v_color = u_has_colors ? in_color : in_actor_color;
     v_scalar = 0.0;
     v_opacity = 1.0;

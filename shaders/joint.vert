@@ -14,6 +14,7 @@ uniform mat3 u_normal_matrix;
 uniform mat4 u_projection;
 uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
 uniform int u_selected;        // joint to draw in u_highlight; -1 for none
+uniform int u_only;            // joint to draw alone; -1 for all
 uniform vec3 u_highlight;      // linear
 uniform bool u_has_color;      // use u_color instead of in_color
 uniform vec3 u_color;          // linear
@@ -33,6 +34,7 @@ vec4 world_row(int row) {
 
 void main() {
     vec4 corner = vec4(mix(in_low, in_high, in_corner), 1.0);
+    corner *= u_only < 0 || u_only == gl_InstanceID ? 1.0 : 0.0;
     vec4 x = world_row(0), y = world_row(1), z = world_row(2);
     vec3 normal = inverse_transposed(x.xyz, y.xyz, z.xyz, in_normal, 0.0);
     vec4 position = u_model_view * vec4(dot(x, corner), dot(y, corner), dot(z, corner), 1.0);

@@ -7,26 +7,18 @@
 #pragma include shadow
 #endif
 #pragma include lights
+#pragma include surface
 
 in vec3 v_position;
 in vec3 v_normal;
-in vec2 v_uv;
-in vec3 v_color;
 in float v_scalar;
 flat in float v_opacity;
 
 uniform bool u_flat;            // one normal per triangle
 uniform bool u_orthographic;
 uniform float u_opacity;
-uniform bool u_has_uv;
-uniform bool u_textured;
-uniform sampler2D u_texture;    // sRGB, decoded by the sampler
 
 out vec4 f_color;               // sRGB, premultiplied by alpha
-
-vec4 base_color() {
-    return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);
-}
 
 #pragma chunk
 
@@ -42,5 +34,9 @@ void main() {
     // rounding would flip pixels at random.
     normal = dot(normal, face) < -0.1 ? -normal : normal;
     float opacity = u_opacity * v_opacity;
+#ifdef MATERIALS
+    normal = mapped_normal(v_position, normal);
+    opacity *= surface_alpha();
+#endif
     f_color = vec4(encode(shade(v_position, normal, to_eye)) * opacity, opacity);
 }

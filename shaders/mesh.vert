@@ -21,11 +21,19 @@ out float v_scalar;
 flat out float v_opacity;
 flat out int v_instance;
 
+#ifdef MATERIALS
+in vec2 in_second_uv;
+out vec2 v_second_uv;
+#endif
+
 void main() {
     vec4 position = u_model_view * vec4(in_position, 1.0);
     v_position = position.xyz;
     v_normal = u_normal_matrix * in_normal;
     v_uv = in_uv;
+#ifdef MATERIALS
+    v_second_uv = in_second_uv;
+#endif
     v_color = u_has_colors ? in_color : u_color;
     v_scalar = in_scalar;
     v_opacity = 1.0;

@@ -64,6 +64,10 @@ ALLOWED_IN_APP = {
     "weights": {"core", "shown_panels", "files", "posing", "weights"},
     "view": {"core", "features", "posing", "weights", "view"},
     "manual": {"core", "manual"},
+    "palette": {"core", "features", "shown_panels", "posing", "view", "weights", "palette"},
+    "context": {
+        *("core", "features", "actors", "posing", "weights", "view", "palette", "context"),
+    },
     "linting": {"core", "shown_panels", "view", "linting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},

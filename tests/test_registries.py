@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import viewer
-from viewer.app.features import KEYS, PANELS, panel_module
+from viewer.app.features import ACTIONS, KEYS, PANELS, panel_module
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
@@ -68,14 +68,21 @@ def test_panels_can_draw() -> None:
         assert callable(panel_module(name).draw)
 
 
-def test_keys_run_functions_of_the_state() -> None:
-    labels = [key.label for key in KEYS]
-    assert len(labels) == len(set(labels))
-    for key in KEYS:
-        module, _, name = key.action.rpartition(".")
-        function = getattr(import_module(f"viewer.app.{module}"), name)
-        assert next(iter(signature(function).parameters)) == "state", key.label
-        signature(function).bind(None, *key.arguments)
+def function_of(path: str):
+    module, _, name = path.rpartition(".")
+    return getattr(import_module(f"viewer.app.{module}"), name)
+
+
+def test_keys_and_actions_run_functions_of_the_state() -> None:
+    for names in ([key.label for key in KEYS], [action.text for action in ACTIONS]):
+        assert len(names) == len(set(names))
+    for one in (*KEYS, *ACTIONS):
+        function = function_of(one.action)
+        assert next(iter(signature(function).parameters)) == "state", one
+        signature(function).bind(None, *one.arguments)
+    for action in ACTIONS:
+        if action.why:
+            signature(function_of(action.why)).bind(None)
 
 
 def test_commands_can_run() -> None:

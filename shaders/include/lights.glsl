@@ -3,12 +3,12 @@
 uniform vec3 u_light_directions[2];  // key and rim: towards each light, unit length, camera space
 uniform vec3 u_light_colors[2];      // linear, times strength
 uniform vec3 u_up;                   // the scene's up axis, unit length, camera space
-uniform vec3 u_sky;                  // ambient light on a surface that faces up, linear
-uniform vec3 u_ground;               // on one that faces down
+uniform vec3 u_ambient;              // ambient light on an upright surface, linear
+uniform vec3 u_ambient_growth;       // added on a surface that faces up, taken off one that faces down
 
 // Hemisphere lighting: what a surface receives from a sky above and a ground below it.
 vec3 ambient_light(vec3 normal) {
-    return mix(u_ground, u_sky, 0.5 + 0.5 * dot(normal, u_up));
+    return u_ambient + u_ambient_growth * dot(normal, u_up);
 }
 
 #ifdef SHADOWS
@@ -17,17 +17,19 @@ uniform float u_shadow_offset;   // along the normal of a surface that the light
 uniform float u_shadow_strength;
 #endif
 
-// Fraction of a light, key or rim, that reaches a surface; the cosine is that of its incidence.
-float visibility(int light, vec3 position, vec3 normal, float cosine) {
+// Fraction of a light, key or rim, that reaches a surface: from the cosine of its incidence, and the
+// fraction of the ambient light, which also stands for the rim light's shadow.
+float visibility(int light, vec3 position, vec3 normal, float cosine, float ambient) {
+    if (light == 1)
+        return mix(1.0, ambient, 0.7);
 #ifdef SHADOWS
-    if (light == 0) {
-        float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-        vec3 lifted = position + u_shadow_offset * (0.2 + sine) * normal;
-        vec4 place = u_shadow_matrix * vec4(lifted, 1.0);
-        return 1.0 - u_shadow_strength * (1.0 - unshadowed(place.xyz));
-    }
-#endif
+    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    vec3 lifted = position + u_shadow_offset * (0.2 + sine) * normal;
+    vec4 place = u_shadow_matrix * vec4(lifted, 1.0);
+    return 1.0 - u_shadow_strength * (1.0 - unshadowed(place.xyz));
+#else
     return 1.0;
+#endif
 }
 
 #ifdef OCCLUSION

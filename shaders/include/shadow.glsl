@@ -1,7 +1,7 @@
 // Filtered lookups in the key light's shadow map.
 
 uniform sampler2DShadow u_shadow_map;
-uniform float u_shadow_radius;      // of the filter, in widths of the map
+uniform vec2 u_shadow_filter;       // radius in widths of the map, turned by an angle
 
 // Evenly spread over the unit disc: a spiral of golden angles (Vogel 1979).
 const vec2 taps[12] = vec2[](
@@ -12,8 +12,9 @@ const vec2 taps[12] = vec2[](
 
 // Fraction of the filter around a place of the map, 0 to 1 on all axes, that the light reaches.
 float unshadowed(vec3 place) {
+    mat2 turn = mat2(u_shadow_filter, -u_shadow_filter.y, u_shadow_filter.x);
     float sum = 0.0;
     for (int i = 0; i < 12; ++i)
-        sum += texture(u_shadow_map, vec3(place.xy + u_shadow_radius * taps[i], place.z));
+        sum += texture(u_shadow_map, vec3(place.xy + turn * taps[i], place.z));
     return sum / 12.0;
 }

@@ -6,12 +6,11 @@
 // would blacken what reflects none.
 vec3 toned(vec3 color) {
     const float start = 0.8, desaturation = 0.15;
-    float peak = max(color.r, max(color.g, color.b));
-    if (peak <= start)
-        return color;
+    // At the start of the curve all of this is exactly the colour itself.
+    float peak = max(max(color.r, color.g), max(color.b, start));
     float lowered = 1.0 - (1.0 - start) * (1.0 - start) / (peak + 1.0 - 2.0 * start);
     float kept = 1.0 / (desaturation * (peak - lowered) + 1.0);
-    return mix(vec3(lowered), color * (lowered / peak), kept);
+    return kept * (lowered / peak) * color + lowered * (1.0 - kept);
 }
 
 // Linear to sRGB, IEC 61966-2-1. The power 1 / 2.4 is a polynomial of the fourth root, within

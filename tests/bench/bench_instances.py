@@ -8,6 +8,7 @@ actors are worth drawing as instances.
 
 from __future__ import annotations
 
+import re
 import statistics
 from collections.abc import Callable
 from typing import Any
@@ -125,6 +126,9 @@ def still_draw(
     """Return what draws as many copies of the mesh at rest."""
     fragment = resource("shaders", "mesh.frag").read_text()
     shade = resource("shaders", "shade", "phong.glsl").read_text()
+    for name in re.findall(r"#pragma include (\w+)", fragment):
+        text = resource("shaders", "include", f"{name}.glsl").read_text()
+        fragment = fragment.replace(f"#pragma include {name}\n", text)
     program = context.program(
         vertex_shader=_STILL, fragment_shader=fragment.replace("#pragma chunk", shade)
     )
@@ -145,7 +149,7 @@ def still_draw(
         set_uniforms(program, {"u_projection": as_uniform(view.projection)})
         set_lights(program, view, options.lights)
         set_surface(program, mesh, options)
-        draw_runs(array, indices, options.texture, instances=instances.count)
+        draw_runs(array, indices, options, instances=instances.count)
 
     return draw
 

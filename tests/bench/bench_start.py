@@ -32,7 +32,7 @@ def main(rounds: int = 11) -> None:
     baseline = str(Path(__file__).parent / "baseline.py")
     with tempfile.TemporaryDirectory() as folder:
         picture = str(Path(folder) / "picture.png")
-        command = ["render", "-o", picture, "--force", "--size", "1280x720"]
+        command = ["render", "-o", picture, "--force", "--size", "1280x720", "--quality", "draft"]
         work = {
             "viewer render": lambda: run_process(["-m", "viewer", *command]),
             "baseline": lambda: run_process([baseline, picture]),

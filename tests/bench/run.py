@@ -14,6 +14,7 @@ NAMES = [
     "bodies",
     "deform",
     "instances",
+    "structure",
     "motion",
     "read",
     "captures",
@@ -21,6 +22,7 @@ NAMES = [
     "lint",
     "transfer",
     "video",
+    "quality",
 ]
 
 ROOT = Path(__file__).resolve().parents[2]

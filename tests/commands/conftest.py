@@ -19,13 +19,16 @@ def walk(tmp_path) -> list[str]:
     return [str(path) for path in (*files, clip)]
 
 
+_DRAFT = ("--quality", "draft")  # the quickest
+
+
 @pytest.fixture
 def draw(tmp_path, capsys):
     """Return a function that renders files into a name with options, and returns what is said."""
 
     def command(files, name, *options, size="64x48", code=0):
         out = str(tmp_path / name)
-        found = run(["render", *files, "-o", out, "--size", size, *options])
+        found = run(["render", *files, "-o", out, "--size", size, *_DRAFT, *options])
         said = capsys.readouterr()
         assert found == code, said.err
         return said

@@ -1,4 +1,4 @@
-"""--xray, --joint-names, --joint-axes: what is drawn, what is said."""
+"""--xray, --joint-names, --joint-axes, --bones: what is drawn, what is said."""
 
 from __future__ import annotations
 
@@ -34,6 +34,13 @@ def test_option_changes_the_picture(render, rig, option):
     plain, _ = render(*rig)
     marked, said = render(*rig, option)
     assert (plain != marked).any() and said == ""
+
+
+@pytest.mark.parametrize("style", ["octahedra", "sticks", "axes"])
+def test_bones_are_drawn_in_the_given_style(render, rig, style):
+    plain, _ = render(*rig, "--show", "skeleton")
+    drawn, said = render(*rig, "--show", "skeleton", "--bones", style)
+    assert (plain != drawn).any() and said == ""
 
 
 def test_names_left_out_are_told(render, tmp_path):

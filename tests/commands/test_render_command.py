@@ -42,9 +42,8 @@ def draw(rig, tmp_path):
 
     def picture(*options, files=rig):
         out = tmp_path / "drawn.png"
-        code = run(
-            ["render", *map(str, files), "-o", str(out), "--force", "--size", "64x48", *options]
-        )
+        quick = ("--force", "--size", "64x48", "--quality", "draft")
+        code = run(["render", *map(str, files), "-o", str(out), *quick, *options])
         assert code == 0
         return np.array(Image.open(out).convert("RGBA"))
 
@@ -53,7 +52,7 @@ def draw(rig, tmp_path):
 
 def test_picture_is_that_of_the_library(draw, rig):
     scene = viewer.load(*rig)
-    assert (draw() == viewer.render(scene, size=(64, 48))).all()
+    assert (draw("--quality", "normal") == viewer.render(scene, size=(64, 48))).all()
 
 
 @pytest.mark.parametrize("size", ["64x48", "1x1", "33X17"])
@@ -90,7 +89,7 @@ def test_camera_options_aim_and_fit(draw, rig, options, change):
     for name, value in change.items():
         setattr(camera, name, value)
     fit(camera, scene_points(scene), 64 / 48)
-    assert (draw(*options) == viewer.render(scene, (64, 48), camera)).all()
+    assert (draw(*options) == viewer.render(scene, (64, 48), camera, DisplayOptions())).all()
 
 
 def test_distance_is_taken_as_given(draw, rig):
@@ -98,7 +97,9 @@ def test_distance_is_taken_as_given(draw, rig):
     camera = Camera()
     fit(camera, scene_points(scene), 64 / 48)
     camera.distance = 12.5
-    assert (draw("--distance", "12.5") == viewer.render(scene, (64, 48), camera)).all()
+    assert (
+        draw("--distance", "12.5") == viewer.render(scene, (64, 48), camera, DisplayOptions())
+    ).all()
 
 
 @pytest.mark.parametrize(

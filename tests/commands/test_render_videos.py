@@ -94,15 +94,15 @@ def test_video_that_skips_frames_keeps_the_motions_pace(draw, walk):
 
 
 def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
-    draw(walk, "there.mp4", "--frames", "0:20", "--quality", "95")
-    draw(walk, "back.mp4", "--frames", "0:20", "--quality", "95", "--speed", "-1")
+    draw(walk, "there.mp4", "--frames", "0:20", "--video-quality", "95")
+    draw(walk, "back.mp4", "--frames", "0:20", "--video-quality", "95", "--speed", "-1")
     there, back = frames(tmp_path / "there.mp4"), frames(tmp_path / "back.mp4")
     assert np.abs(there[0] - back[-1]).mean() < 2.0 and np.abs(there[-1] - back[0]).mean() < 2.0
     assert np.abs(there[0] - back[0]).mean() > 4.0
 
 
 def test_turntable_needs_no_motion_and_ends_where_it_begins(draw, tmp_path):
-    draw([], "x.mp4", "--turntable", "1", "--no-grid", "--quality", "95")
+    draw([], "x.mp4", "--turntable", "1", "--no-grid", "--video-quality", "95")
     shown = frames(tmp_path / "x.mp4")
     assert len(shown) == 30
     steps = [np.abs(a - b).mean() for a, b in zip(shown, [*shown[1:], shown[0]], strict=True)]

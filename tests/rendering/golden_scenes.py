@@ -183,6 +183,9 @@ SHOTS: dict[str, Callable[[], Shot]] = {
     "fox-binding": lambda: Shot(posed_fox(2), options(show="binding")),
     "fox-skeleton": lambda: Shot(posed_fox(), options(show="skeleton"), "left"),
     "fox-both": lambda: Shot(posed_fox(1), DisplayOptions(show="both"), selected_joint=3),
+    "fox-octahedra": lambda: Shot(
+        posed_fox(1), options(show="both", bones="octahedra"), selected_joint=3
+    ),
     "fox-xray": lambda: Shot(
         posed_fox(1), options(xray=True, joint_axes=True), selected_joint=3, ssim_limit=LINES
     ),
@@ -205,7 +208,7 @@ SHOTS: dict[str, Callable[[], Shot]] = {
     "arm-other-lights": lambda: Shot(_arm(*BEND), options(lights=_white_lights())),
     "arm-one-sample": lambda: Shot(_arm(*BEND), options(samples=1)),
     "boxes-odd": lambda: Shot(_odd_boxes(), options()),
-    "boxes-none": lambda: Shot(_no_boxes(), options()),
+    "boxes-none": lambda: Shot(_no_boxes(), options(bones="boxes")),
     "z-up": lambda: Shot(_z_up(), DisplayOptions()),
     "two-actors": lambda: Shot(_two_actors(), DisplayOptions()),
     "two-materials": lambda: Shot(_two_materials(), options(), (20.0, -10.0)),

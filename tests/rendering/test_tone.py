@@ -8,18 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rendering.drawn_figures import picture, scene_of, square
-from rendering.test_pixels import draw, lights, plain
+from rendering.plain_pictures import draw, lights, plain
 
-from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.srgb import encode_srgb
 
 WHITE = square(material=picture([[(255, 255, 255)]]))
-
-
-@pytest.fixture(scope="module")
-def offscreen():
-    with Offscreen() as result:
-        yield result
 
 
 def neutral(color) -> np.ndarray:

@@ -6,6 +6,7 @@ function of the state. Both are imported when they are first used.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
@@ -14,7 +15,17 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 
-__all__ = ["KEYS", "MOUSE", "PANELS", "Panel", "Shortcut", "panel_module"]
+__all__ = [
+    "ACTIONS",
+    "KEYS",
+    "MOUSE",
+    "PANELS",
+    "Action",
+    "Panel",
+    "Shortcut",
+    "key_of",
+    "panel_module",
+]
 
 _CTRL, _SHIFT = imgui.Key.mod_ctrl, imgui.Key.mod_shift
 _K = imgui.Key
@@ -80,8 +91,44 @@ class Shortcut:
 
     def run(self, state: AppState) -> None:
         """Run the action."""
-        module, _, name = self.action.rpartition(".")
-        getattr(import_module(f"viewer.app.{module}"), name)(state, *self.arguments)
+        _function(self.action)(state, *self.arguments)
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """An action without a key, for the command palette.
+
+    Attributes
+    ----------
+    text : str
+        Its name.
+    action : str
+        Module and function within ``viewer.app``; called with the state.
+    arguments : tuple
+        Further arguments of the action.
+    why : str
+        Function of the state that returns why it is disabled; empty if it never is.
+    """
+
+    text: str
+    action: str
+    arguments: tuple[object, ...] = ()
+    why: str = ""
+
+    def run(self, state: AppState) -> None:
+        """Run the action."""
+        _function(self.action)(state, *self.arguments)
+
+    def reason(self, state: AppState) -> str:
+        """Return why it is disabled; empty if it can be run."""
+        return str(_function(self.why)(state)) if self.why else ""
+
+
+def _function(path: str) -> Callable[..., object]:
+    """Return a function of ``viewer.app``, imported on first use."""
+    module, _, name = path.rpartition(".")
+    found: Callable[..., object] = getattr(import_module(f"viewer.app.{module}"), name)
+    return found
 
 
 PANELS = {
@@ -122,9 +169,18 @@ KEYS = (
     Shortcut((_SHIFT | _K.j,), "Shift+J", "joint axes", _OPTION, ("joint_axes", "Joint axes")),
     Shortcut((_K.v,), "V", "weights of the selected joint", "weights.actions.toggle_weights"),
     Shortcut((_K.f,), "F", "fit the view", "view.camera_actions.fit_view"),
+    Shortcut(
+        (_K.period, _K.keypad_decimal),
+        ".",
+        "fit the selected joint or actor",
+        "view.camera_actions.fit_selection",
+    ),
     Shortcut((_K._1, _K.keypad1), "1", "front view", _LOOK, ("front",)),
     Shortcut((_K._3, _K.keypad3), "3", "side view", _LOOK, ("left",)),
     Shortcut((_K._7, _K.keypad7), "7", "top view", _LOOK, ("top",)),
+    Shortcut((_CTRL | _K._1, _CTRL | _K.keypad1), "Ctrl+1", "back view", _LOOK, ("back",)),
+    Shortcut((_CTRL | _K._3, _CTRL | _K.keypad3), "Ctrl+3", "other side", _LOOK, ("right",)),
+    Shortcut((_CTRL | _K._7, _CTRL | _K.keypad7), "Ctrl+7", "view from below", _LOOK, ("bottom",)),
     Shortcut(
         (_K._5, _K.keypad5),
         "5",
@@ -133,6 +189,7 @@ KEYS = (
     ),
     Shortcut((_K.tab,), "Tab", "hide or show the panels", "window_actions.toggle_panels"),
     Shortcut((_K.h, _SHIFT | _K.slash, _K.f1), "H or ?", "this list", "window_actions.toggle_keys"),
+    Shortcut((_CTRL | _K.p,), "Ctrl+P", "find an action", "palette.palette_window.toggle_palette"),
     Shortcut((_CTRL | _K.m,), "Ctrl+M", "message log", "window_actions.toggle_messages"),
     Shortcut((_K.f12,), "F12", "save a screenshot", "window_actions.want", ("screenshot",)),
     Shortcut((_CTRL | _K.o,), "Ctrl+O", "open files", "window_actions.want", ("open dialog",)),
@@ -169,17 +226,58 @@ KEYS = (
 )
 """Keys in the order in which they are listed."""
 
+_WANT = "window_actions.want"
+_ROOM = "core.reasons.no_job_room"
+
+ACTIONS = (
+    Action("Open the bundled figure", _WANT, ("open bundled",)),
+    Action("Open the bundled body", _WANT, ("open body",)),
+    Action("Save pose…", "menus.ask_for_pose", why="core.reasons.no_pose"),
+    Action("Export…", "menus.ask_for_export"),
+    Action(
+        "Export motion…",
+        "files.motion_dialog.ask_for_motion",
+        why="core.reasons.nothing_to_export",
+    ),
+    Action("Record pictures or video…", "recording.record_dialog.open_record_dialog", why=_ROOM),
+    Action("Check the rig", "linting.actions.check_rig", why=_ROOM),
+    Action("New clip", "curves.clip_actions.new_clip", why="core.reasons.no_new_clip"),
+    Action(
+        "Key the pose at the current time",
+        "posing.tool_actions.key_pose_now",
+        why="posing.tool_actions.no_keys",
+    ),
+    Action("Reset the pose of this actor", "posing.pose_actions.reset_actor"),
+    Action("Reset shape", "posing.pose_actions.reset_shape"),
+    Action("Random shape", "posing.pose_actions.random_shape"),
+    Action("Reset lights", "view.display_actions.reset_lights"),
+    Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
+    Action("Selection outlines", "view.outlines.toggle_outlines"),
+    Action("Pick vertices", "weights.actions.toggle_picking", why="core.reasons.no_mesh"),
+    Action("Vertex under the mouse", "weights.actions.toggle_telling", why="core.reasons.no_mesh"),
+    Action("Reset layout", "shown_panels.reset_layout"),
+)
+"""Actions of menus and panels that have no key."""
+
 MOUSE = (
     ("Click", "select an actor or joint"),
     ("Double click", "aim the camera there"),
     ("Alt click", "explain this vertex"),
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
+    ("Right click", "menu of the joint, vertex, actor or background there"),
     ("Wheel", "zoom to the pointer"),
     ("Alt drag in the timeline", "seek between whole frames"),
+    ("Axis gizmo", "a click looks along an axis, a drag orbits"),
     ("Drop files", "open them"),
 )
 """Actions of the mouse, listed with the keys."""
+
+
+def key_of(action: str, *arguments: object) -> str:
+    """Return the name of the key that runs an action; empty if none does."""
+    found = (key.label for key in KEYS if (key.action, key.arguments) == (action, arguments))
+    return next(found, "")
 
 
 def panel_module(name: str) -> ModuleType:

@@ -11,6 +11,7 @@ import moderngl
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import follow_actor, stop_following
+from viewer.app.context.context_menu import answer_right_click, draw_context_menu
 from viewer.app.core.fitting import keep_fitting
 from viewer.app.core.jobs import FrameJob
 from viewer.app.core.state import AppState
@@ -26,12 +27,18 @@ from viewer.app.keys import handle_keys
 from viewer.app.linting.marks import show_finding
 from viewer.app.mouse import drop_motion_before_press, handle_mouse
 from viewer.app.overlays import draw_hints
+from viewer.app.pace import Pace, Step
+from viewer.app.palette.palette_window import draw_palette
 from viewer.app.picture_key import PictureKeys
 from viewer.app.posing.gizmo_drawing import draw_gizmo
 from viewer.app.posing.shape_guard import drop_unreadable_shapes
 from viewer.app.recording.record_dialog import draw_record_dialog
 from viewer.app.recording.state import Recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
+from viewer.app.view.axis_gizmo import draw_axis_gizmo
+from viewer.app.view.flight import advance_flight
+from viewer.app.view.hovering import draw_hovered_name, hover_joint
+from viewer.app.view.outlines import outlined_parts
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
@@ -39,8 +46,10 @@ from viewer.formats import FORMATS, free_path, save_image
 from viewer.loading import Contents, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
 from viewer.phrases import printable
+from viewer.rendering.gpu.context import is_software
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
+from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes
 from viewer.rig.scene import Actor, Scene
 
@@ -78,6 +87,8 @@ class Frame:
         self.target: Target | None = None
         self._drawn: object = None
         self._keys = PictureKeys()
+        self.pace = Pace()
+        self._is_software = is_software(context)
         state.stats.renderer = context.info["GL_RENDERER"]
         state.stats.version = context.info["GL_VERSION"]
 
@@ -107,12 +118,15 @@ class Frame:
         drop_unreadable_shapes(state)
         self.open(draw_interface(state))
         draw_record_dialog(state)
+        draw_context_menu(state)
+        draw_palette(state)
         draw_file_dialog(state)
         files = state.of(Files)
         self.open(files.wants_open)
         files.wants_open = []
         handle_keys(state)
         handle_mouse(state)
+        advance_flight(state, imgui.get_io().delta_time)
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
@@ -125,9 +139,11 @@ class Frame:
         follow_actor(state)
         keep_fitting(state, files.stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
+        hover_joint(state)
         self._draw_scene(scale)
         if self.target is not None:
             answer_picks(state, self.renderer, self.target.size, scale, self._drawn)
+            answer_right_click(state, self.renderer, self.target.size, scale)
         imgui.render()
 
     def paint(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> None:
@@ -185,10 +201,14 @@ class Frame:
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)
-        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
-        if key != self._drawn:
-            self._drawn = key  # even if drawing fails: it is retried only after a change
-            self._draw_target(size)
+        renderer.outlines = outlined_parts(state)
+        drawn_over = renderer.marks, renderer.ghost, renderer.annotations, renderer.outlines
+        key = self._keys.key(state, size, *drawn_over)
+        self._drawn = key
+        # Even if drawing fails, it is retried only after a change.
+        step = self.pace.step(key, state.options, time.perf_counter())
+        if step is not None:
+            self._draw_target(size, step)
         if self.target is not None:
             picture = imgui.ImTextureRef(self.target.texture.glo)
             corner = (x + size[0] / scale, y + size[1] / scale)
@@ -196,21 +216,33 @@ class Frame:
             # Textures have their first row at the bottom.
             draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
             draw_hovered(state)
+            draw_hovered_name(state)
             draw_gizmo(state)
             draw_rig_tools(state)
             if state.panels_visible:
                 draw_hints(state)
+                draw_axis_gizmo(state)
 
-    def _draw_target(self, size: tuple[int, int]) -> None:
+    def _draw_target(self, size: tuple[int, int], step: Step) -> None:
         """Draw the scene; if the driver fails, show a message and keep the window open."""
-        state = self.state
+        state, started = self.state, time.perf_counter()
         try:
             target = self._target(size)
             selected = (state.chosen_actor, state.selected_joint)
             self.renderer.draw(
-                state.scene, state.camera, state.options, target, state.box, selected
+                state.scene,
+                state.camera,
+                step.options,
+                target,
+                state.box,
+                selected,
+                step.passes,
+                step.strength,
             )
             target.resolve()
+            if self._is_software:
+                self.context.finish()
+                self.pace.measured(step, time.perf_counter() - started)
             state.stats.samples = target.samples
             state.stats.scalar_range = self.renderer.scalar_range
             state.stats.scalar_ends = self.renderer.scalars.ends
@@ -347,6 +379,11 @@ class Frame:
         """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
+        if self.renderer.outlines or self.pace.is_unfinished:
+            # Outlines of the window are not part of the scene, and a picture gets all its passes.
+            self.renderer.outlines, options = (), self.state.options
+            self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))
+            self.pace.restart()
         return self.target.read()
 
     def release(self) -> None:

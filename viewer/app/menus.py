@@ -26,6 +26,7 @@ from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
 from viewer.app.linting.actions import check_rig
 from viewer.app.manual.manual_window import draw_manual_menu
+from viewer.app.palette.palette_window import toggle_palette
 from viewer.app.posing.pose_actions import (
     copy_numbers,
     copy_pose,
@@ -35,8 +36,8 @@ from viewer.app.posing.pose_actions import (
     save_export,
     save_pose,
 )
-from viewer.app.recording.state import Recording, RecordSettings
-from viewer.app.shown_panels import ShownPanels, is_open, set_open
+from viewer.app.recording.record_dialog import open_record_dialog
+from viewer.app.shown_panels import is_open, reset_layout, set_open
 from viewer.app.view.view_menu import draw_view_menu
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, files_written
@@ -44,7 +45,7 @@ from viewer.formats import FORMATS, file_stem, opened_text
 from viewer.models import known_models, load_model_folder, save_model_folder
 from viewer.phrases import printable
 
-__all__ = ["draw_menus"]
+__all__ = ["ask_for_export", "ask_for_pose", "draw_menus"]
 
 
 def draw_menus(state: AppState) -> list[Path]:
@@ -70,7 +71,7 @@ def draw_menus(state: AppState) -> list[Path]:
         if menu_item(state, "Messages", "Ctrl+M", state.messages.is_open):
             state.messages.is_open = not state.messages.is_open
         if menu_item(state, "Reset layout"):
-            state.of(ShownPanels).wants_reset = True
+            reset_layout(state)
         imgui.end_menu()
     if begin_menu(state, "Help"):
         if menu_item(state, "Keys", "H", keyboard.is_listed):
@@ -104,13 +105,13 @@ def _draw_file_menu(state: AppState) -> list[Path]:
         imgui.end_menu()
     imgui.separator()
     if menu_item(state, "Save pose…", why=no_pose(state)):
-        _ask_for_pose(state)
+        ask_for_pose(state)
     if menu_item(state, "Export…"):
-        _ask_for_export(state)
+        ask_for_export(state)
     if menu_item(state, "Export motion…", why=nothing_to_export(state) or no_job_room(state)):
         ask_for_motion(state)
     if menu_item(state, "Record pictures or video…", why=no_job_room(state)):
-        state.of(Recording).settings = RecordSettings()
+        open_record_dialog(state)
     if menu_item(state, "Save screenshot", "F12"):
         state.wants.add("screenshot")
     imgui.separator()
@@ -150,7 +151,8 @@ def _set_model_folder(state: AppState, paths: list[Path]) -> None:
     state.say(f"{count} body models in {printable(folder, 200)}")
 
 
-def _ask_for_pose(state: AppState) -> None:
+def ask_for_pose(state: AppState) -> None:
+    """Ask where to save the chosen actor's pose."""
     name = f"{file_stem(state.actor.name)}_pose.json"
     suffixes = FORMATS["pose"].suffixes
     state.of(Files).dialog = FileDialog(
@@ -163,7 +165,8 @@ def _ask_for_pose(state: AppState) -> None:
     )
 
 
-def _ask_for_export(state: AppState) -> None:
+def ask_for_export(state: AppState) -> None:
+    """Ask where to export the chosen actor as it is posed."""
     kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
     suffixes = tuple(suffix for kind in kinds for suffix in kind.suffixes)
     state.of(Files).dialog = FileDialog(
@@ -197,5 +200,7 @@ def _draw_edit_menu(state: AppState) -> None:
     if menu_item(state, "Paste pose", "Ctrl+V", why=why):
         paste_pose(state)
     imgui.separator()
+    if menu_item(state, "Find an action…", "Ctrl+P"):
+        toggle_palette(state)
     if menu_item(state, "Check the rig", why=no_job_room(state)):
         check_rig(state)

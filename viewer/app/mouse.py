@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.posing.gizmo import choose_joint, use_handles
 from viewer.app.rigging.tools import holds_mouse
+from viewer.app.view.axis_gizmo import holds_gizmo
 from viewer.app.view.state import Picking
 from viewer.app.weights.state import Weights, wants_vertex
 from viewer.rendering.camera import orbit, pan, zoom
@@ -16,7 +17,8 @@ __all__ = ["drop_motion_before_press", "handle_mouse"]
 _DEGREES_PER_POINT = 0.4
 _ZOOM_PER_NOTCH = 0.88
 _LEFT = imgui.MouseButton_.left
-_BUTTONS = (_LEFT, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+_RIGHT = imgui.MouseButton_.right
+_BUTTONS = (_LEFT, _RIGHT, imgui.MouseButton_.middle)
 
 
 def drop_motion_before_press() -> None:
@@ -37,7 +39,7 @@ def handle_mouse(state: AppState) -> None:
     picking = state.of(Picking)
     io = imgui.get_io()
     x, y, width, height = state.view_rect
-    if use_handles(state) or holds_mouse(state):
+    if use_handles(state) or holds_mouse(state) or holds_gizmo(state):
         return
     if io.want_capture_mouse or width < 1 or height < 1:
         return
@@ -58,6 +60,8 @@ def handle_mouse(state: AppState) -> None:
         and (wants_vertex(state.of(Weights)) or not choose_joint(state))
     ):
         picking.wanted = (*place, False)
+    if imgui.is_mouse_released(_RIGHT) and _is_still(_RIGHT):
+        picking.menu_at = place
     if io.mouse_wheel and imgui.is_mouse_pos_valid():
         across = (io.mouse_pos.x - x - width / 2) / height
         upward = -(io.mouse_pos.y - y - height / 2) / height
@@ -74,6 +78,11 @@ def _drags(button: imgui.MouseButton_) -> bool:
 
 def _is_click() -> bool:
     """Return whether a button was released without a drag or a double click."""
-    io, left = imgui.get_io(), _LEFT
-    is_still = io.mouse_drag_max_distance_sqr[left] < io.mouse_drag_threshold**2
-    return is_still and io.mouse_clicked_last_count[left] < 2 and not io.key_shift
+    io = imgui.get_io()
+    return _is_still(_LEFT) and io.mouse_clicked_last_count[_LEFT] < 2 and not io.key_shift
+
+
+def _is_still(button: imgui.MouseButton_) -> bool:
+    """Return whether the pointer has stayed in place since a button was pressed."""
+    io = imgui.get_io()
+    return bool(io.mouse_drag_max_distance_sqr[button] < io.mouse_drag_threshold**2)

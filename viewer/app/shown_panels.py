@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
 
-__all__ = ["ShownPanels", "is_open", "set_open"]
+__all__ = ["ShownPanels", "is_open", "reset_layout", "set_open"]
 
 
 @dataclass(slots=True)
@@ -46,3 +46,8 @@ def set_open(state: AppState, name: str, opened: bool) -> None:
         names.add(name)
     else:
         names.discard(name)
+
+
+def reset_layout(state: AppState) -> None:
+    """Arrange the panels as they are at first."""
+    state.of(ShownPanels).wants_reset = True

@@ -30,6 +30,8 @@ from viewer.app.files.recent import (  # noqa: E402
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.theme import apply_theme, change_scale  # noqa: E402
 from viewer.app.typed_keys import TypedKeys  # noqa: E402
+from viewer.app.view.flight import Flight  # noqa: E402
+from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
 from viewer.errors import RenderError  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
@@ -225,15 +227,17 @@ class _Window:
         self._is_dirty = False
         state = self.state
         # Threads are polled at intervals only, because drawing frames would slow them down.
-        steps = isinstance(state.job, FrameJob)
-        if is_settling or state.clock.playing or steps:
+        steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
+        # A picture that is not finished gets better in every frame.
+        improves = self.frame.pace.is_unfinished
+        if is_settling or state.clock.playing or steps or improves:
             glfw.poll_events()
         else:
             moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Redraw for messages that time out, progress bars and blinking text cursors.
             self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
-        self._is_dirty |= state.clock.playing or state.job is not None
+        self._is_dirty |= state.clock.playing or state.job is not None or steps or improves
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
@@ -242,7 +246,8 @@ class _Window:
         files = state.of(Files)
         is_read = files.loader is not None or files.stream is not None
         is_read |= not state.framing.is_settled
-        return is_read or state.of(Weights).is_waiting or _awaits_tooltip(self._imgui)
+        is_waiting = state.of(Weights).is_waiting or state.of(Hovered).is_waiting
+        return is_read or is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window has no pixels at present."""

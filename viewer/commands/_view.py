@@ -13,14 +13,36 @@ from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.camera_notes import image_notes, lens_notes
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BACKGROUNDS, SHOWN, DisplayOptions
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.options import (
+    BACKGROUNDS,
+    BONES,
+    MATCAPS,
+    QUALITIES,
+    SHOWN,
+    DisplayOptions,
+)
 from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
+
+_SWITCHES = (
+    ("no-shadows", "leave out shadows"),
+    ("flat", "use one normal per triangle"),
+    ("wireframe", "draw triangle edges"),
+    ("normals", "draw vertex normals"),
+    ("no-texture", "use plain colours instead of textures"),
+    ("no-grid", "omit the ground grid"),
+    ("keypoints", "draw a model's keypoints"),
+    ("reduced", "draw the coarser mesh, if there is one"),
+    ("xray", "draw bones visible through the skin"),
+    ("joint-names", "label joints, where labels do not overlap"),
+    ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
+    ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
+)
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,32 +81,33 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         default="skin",
         help="parts of the figures; binding is the skin in the bind pose (default: skin)",
     )
-    group.add_argument(
-        "--shading", choices=SHADING, default="phong", help="shading of surfaces (default: phong)"
-    )
+    _add_shading_arguments(group)
     add_scalar_arguments(group)
+    group.add_argument(
+        "--bones",
+        choices=BONES,
+        default="auto",
+        help="style of skeletons (default: auto, the boxes of files that have them, otherwise "
+        "octahedra)",
+    )
     group.add_argument(
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
-        help="gradient, transparent or a colour (default: gradient)",
+        help="gradient, white, environment (the studio, out of focus), transparent or a colour "
+        "(default: gradient)",
     )
     group.add_argument(
         "--samples", type=int, default=4, metavar="N", help="samples per pixel (default: 4)"
     )
-    for name, text in (
-        ("flat", "use one normal per triangle"),
-        ("wireframe", "draw triangle edges"),
-        ("normals", "draw vertex normals"),
-        ("no-texture", "use plain colours instead of textures"),
-        ("no-grid", "omit the ground grid"),
-        ("keypoints", "draw a model's keypoints"),
-        ("reduced", "draw the coarser mesh, if there is one"),
-        ("xray", "draw bones visible through the skin"),
-        ("joint-names", "label joints, where labels do not overlap"),
-        ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
-        ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
-    ):
+    group.add_argument(
+        "--quality",
+        choices=QUALITIES,
+        metavar="NAME",
+        help="draft: no shadows; normal: shadows; final: soft shadows, ambient occlusion and "
+        "smoother edges (default: final for pictures, normal for videos)",
+    )
+    for name, text in _SWITCHES:
         group.add_argument(f"--{name}", action="store_true", help=text)
     group.add_argument(
         "--hide-part",
@@ -92,6 +115,31 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME",
         help="hide a body part; may be repeated",
+    )
+
+
+def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options of surfaces."""
+    group.add_argument(
+        "--shading",
+        choices=SHADING_CHOICES,
+        default="auto",
+        help="shading of surfaces; auto is pbr for figures with metallic-roughness materials, else "
+        "phong (default: auto)",
+    )
+    for name, default in (("metallic", 0.0), ("roughness", 0.6)):
+        group.add_argument(
+            f"--{name}",
+            type=number,
+            default=default,
+            metavar="0..1",
+            help=f"with --shading pbr, of materials that do not state it (default: {default:g})",
+        )
+    group.add_argument(
+        "--matcap",
+        choices=MATCAPS,
+        default="clay",
+        help="picture for --shading matcap (default: clay)",
     )
 
 
@@ -163,16 +211,25 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
+    for name in ("metallic", "roughness"):
+        if not 0.0 <= getattr(arguments, name) <= 1.0:
+            raise ViewerError(f"--{name}: expected 0 to 1, found {getattr(arguments, name):g}")
     options = DisplayOptions(
         show=arguments.show,
         shading=arguments.shading,
+        matcap=arguments.matcap,
+        metallic=arguments.metallic,
+        roughness=arguments.roughness,
         flat=arguments.flat,
         wireframe=arguments.wireframe,
         normals=arguments.normals,
         texture=not arguments.no_texture,
         grid=not arguments.no_grid,
+        bones=arguments.bones,
         background=arguments.background,
         samples=arguments.samples,
+        quality=arguments.quality or "final",
+        shadows=not arguments.no_shadows,
         skinning=skinning_of(arguments),
         keypoints=arguments.keypoints,
         reduced=arguments.reduced,

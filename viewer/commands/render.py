@@ -15,8 +15,8 @@ from viewer.commands._scene import (
     print_warnings,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
-from viewer.commands._sequence.onion_picture import draw_onion
 from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
+from viewer.commands._sequence.shots import Request, shots_of
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
@@ -86,6 +86,9 @@ def run(arguments: argparse.Namespace) -> int:
     if request is None or request.kind != "pictures":
         check_targets([output], inputs_of(arguments), arguments.force)
     options = display_of(arguments)
+    is_still = request is None or request.kind == "onion"
+    if arguments.quality is None and (not is_still or arguments.panels):
+        options.quality = "normal"
     _check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format has no transparency"])
@@ -94,8 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + camera_notes(arguments, scene, options))
     if request is not None and request.kind == "onion":
-        line = draw_onion(request, arguments, scene, options, size)
-        print(line, file=summary_stream(output))
+        _draw_onion(request, arguments, scene, options, size)
     elif request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
         line = draw_sequence(request, arguments, scene, options, size)
         print(line, file=summary_stream(output))
@@ -126,12 +128,39 @@ def _draw_still(
         fits = arguments.distance is None and arguments.view is None
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
     else:
-        pixels = draw_scene(scene, size, camera, options, box, arguments.gpu)
+        is_chosen = arguments.quality is not None
+        pixels = draw_scene(scene, size, camera, options, box, arguments.gpu, is_chosen)
     save_image(output, pixels)
     grid = f", grid {_grid_step(points):g}" if options.grid else ""
     colors = scalar_text(scene, options)
     line = f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}"
     print(line, file=summary_stream(output))
+
+
+def _draw_onion(
+    request: Request,
+    arguments: argparse.Namespace,
+    scene: Scene,
+    options: DisplayOptions,
+    size: tuple[int, int],
+) -> None:
+    """Draw poses of a motion in one picture."""
+    from viewer.formats import save_image
+    from viewer.rig.motion.onion import onion
+
+    shots = shots_of(request, arguments, scene)
+    check_targets([request.output], inputs_of(arguments, scene), arguments.force)
+    print_warnings(shots.notes)
+    poses = onion(scene, shots.times.tolist(), interpolate=arguments.interpolate_gaps)
+    points = scene_points(poses, options.show)
+    camera = camera_of(arguments, poses, with_cameras(poses, options, points), size)
+    is_chosen = arguments.quality is not None
+    box = bounding_box(points)
+    pixels = draw_scene(poses, size, camera, options, box, arguments.gpu, is_chosen)
+    save_image(request.output, pixels)
+    frames = ", ".join(map(str, shots.numbers))
+    line = f"{printable(request.output)}: {size[0]} x {size[1]}, poses of frames {frames}"
+    print(line, file=summary_stream(request.output))
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
@@ -157,11 +186,18 @@ def draw_scene(
     options: DisplayOptions,
     box: Floats,
     device: int | None = None,
+    is_chosen: bool = False,
 ) -> Bytes:
-    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed."""
+    """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed.
+
+    A quality that was not chosen is lowered where drawing it in software takes long.
+    """
     from viewer.rendering.offscreen import Offscreen
+    from viewer.rendering.software_limits import limit_passes
 
     with deferred(), Offscreen(device) as offscreen:
+        if not is_chosen:
+            print_warnings(limit_passes(options, scene, size, offscreen.context))
         pixels = offscreen.render(scene, size, camera, options, box)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:

@@ -17,7 +17,8 @@ from viewer.errors import RigError
 from viewer.export._gaps import filled, gaps_text, runs
 from viewer.export._gltf.document import Document, text_of
 from viewer.export._gltf.losses import Written, gltf_losses, not_held, vertices_text
-from viewer.export._gltf.mesh import Color, add_mesh
+from viewer.export._gltf.materials import Color, material_losses
+from viewer.export._gltf.mesh import add_mesh
 from viewer.export._gltf.motion import add_animation, moving, still_locals
 from viewer.export._gltf.nodes import Locals, Tree, add_nodes, locals_of
 from viewer.export._gltf.reading import parsed
@@ -280,6 +281,8 @@ def _remarks(body: _Body, up: str) -> list[str]:
             f"lengths are unchanged: the unit of {printable(figure.name, 100)} is unknown, and "
             "programs interpret glTF lengths as metres"
         )
+    if figure.mesh is not None:
+        notes += [printable(note, 200) for note in material_losses(figure.mesh)]
     if figure.mesh is not None and figure.mesh.n_vertices == 0:
         notes.append("the mesh has no vertices and is omitted")
     if body.shape.baked is not None:

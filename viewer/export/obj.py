@@ -13,8 +13,8 @@ import numpy as np
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._motion_paths import numbered_paths
-from viewer.formats import all_or_none, free_path, save_bytes, save_text
-from viewer.media.image import encode_png
+from viewer.export._obj_materials import PLAIN, library_losses, material_library
+from viewer.formats import all_or_none, save_bytes, save_text
 from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
@@ -26,8 +26,6 @@ from viewer.rig.units import UNIT_NAMES
 
 __all__ = ["export", "export_animation"]
 
-_PLAIN = "plain"  # material of triangles without one
-
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     """Write ``v``, ``vt``, ``vn`` and triangles; see ``viewer.export.export``."""
@@ -35,7 +33,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     mesh = actor.figure.require_mesh()
     positions, normals = deform(actor.figure, actor.pose, skinning)
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
-    beside = _materials(mesh, path)
+    beside = material_library(mesh, path)
     unit = f", {UNIT_NAMES[actor.figure.unit]}" if actor.figure.unit in UNIT_NAMES else ""
     parts = [f"# {name}: {actor.figure.up} up{unit}\n"]
     if beside:
@@ -53,6 +51,9 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         save_text(path, "".join(parts))
     counts = f"{counted(mesh.n_vertices, 'vertex')}, {counted(mesh.n_triangles, 'triangle')}"
     notes = [f"{printable(file, 300)}: its texture" for file in beside if file.suffix == ".png"]
+    lost = library_losses(mesh)
+    if lost:
+        notes.append(f"not in the .mtl: {', '.join(lost)}")
     return [f"{printable(path, 300)}: {counts}", *notes]
 
 
@@ -103,25 +104,7 @@ def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
     for first, last in zip([0, *edges], [*edges, mesh.n_triangles], strict=True):
         index = int(mesh.material_indices[first]) if mesh.n_triangles else -1
         if with_materials:
-            parts.append(f"usemtl {f'material{index}' if index >= 0 else _PLAIN}\n")
+            parts.append(f"usemtl {f'material{index}' if index >= 0 else PLAIN}\n")
         rows = table[first:last]
         parts.append(line * len(rows) % tuple(rows.ravel().tolist()))
     return parts
-
-
-def _materials(mesh: Mesh, path: Path) -> dict[Path, bytes]:
-    """Return the pictures and finally their ``.mtl``; empty if there is no picture."""
-    files: dict[Path, bytes] = {}
-    parts = [f"newmtl {_PLAIN}\nKd 1 1 1\n"]
-    stem = path.stem[:80]  # longer names would be truncated after the number
-    for index, material in enumerate(mesh.materials if mesh.uvs is not None else ()):
-        parts.append(f"newmtl material{index}\nKd 1 1 1\n")
-        if material.image is not None:
-            data = encode_png(material.image)
-            picture = free_path(path.parent, f"{stem}_{index}", ".png", data)
-            files[picture] = data
-            parts.append(f"map_Kd {picture.name}\n")
-    if files:
-        library = "".join(parts).encode()
-        files[free_path(path.parent, stem, ".mtl", library)] = library
-    return files

@@ -12,7 +12,7 @@ from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
-from viewer.rendering.passes.joint_pass import draw_boxes
+from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.shown import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
@@ -66,9 +66,9 @@ class Casters:
                 continue
             # Over a skin, a skeleton is an overlay.
             if shows_skeleton(actor, options) and not shows_mesh(actor.figure, options):
-                program = self.programs.drawing("joint", fragment=fragment)
-                boxes, placement = self.buffers.skeleton(actor).boxes, placement_of(actor, options)
-                draw_boxes(program, boxes, placement, view, options)
+                skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
+                program = joint_program(self.programs, skeleton, options, "", fragment)
+                draw_joints(program, skeleton, placement, view, options)
             if has_points(actor):
                 points = self.buffers.points_of(actor)
                 self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import moderngl
@@ -15,7 +16,7 @@ __all__ = ["FILTER_RADIUS", "NO_EFFECTS", "SHADOW_UNIT", "Effects", "Occlusion",
 
 SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # lower units belong to materials and skinning
 FILTER_RADIUS = 3.5
-"""Radius of the filter of shadows, texels."""
+"""Radius of the filter of shadows on surfaces, texels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +33,24 @@ class Shadow:
         Side of a texel, scene units.
     strength : float
         0 to 1: fraction of the light that a shadow takes away.
+    angle : float
+        By which the filter's pattern is rotated, radians.
+    blur : float
+        Radius of the filter on the ground, scene units; at least that on surfaces counts.
     """
 
     texture: moderngl.Texture
     matrix: Floats
     texel: float
     strength: float
+    angle: float = 0.0
+    blur: float = 0.0
+
+    def filter(self, is_ground: bool = False) -> tuple[float, float]:
+        """Return the radius of the filter in widths of the map, as a vector at its angle."""
+        texels = max(FILTER_RADIUS, self.blur / self.texel if is_ground else 0.0)
+        radius = texels / self.texture.width
+        return radius * math.cos(self.angle), radius * math.sin(self.angle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +86,10 @@ class Effects:
         """Set the uniforms and textures of a program; ``view`` is scene to camera space, (4, 4)."""
         shadow, occlusion = self.shadow, self.occlusion
         if shadow is not None:
-            size = shadow.texture.width
             values = {
                 "u_shadow_map": SHADOW_UNIT,
                 "u_shadow_matrix": as_uniform(shadow.matrix @ np.linalg.inv(view)),
-                "u_shadow_radius": FILTER_RADIUS / size,
+                "u_shadow_filter": shadow.filter(),
                 # As far as the filter reaches, or the surface would shade itself.
                 "u_shadow_offset": (FILTER_RADIUS + 1.0) * shadow.texel,
                 "u_shadow_strength": shadow.strength,

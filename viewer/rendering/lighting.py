@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cached_property
 
@@ -15,8 +16,9 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.contact_pass import Contact, ContactPass
 from viewer.rendering.passes.ground_pass import ground_axes
 from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
-from viewer.rendering.passes.shadow_pass import ShadowPass
-from viewer.rendering.sampling import Sample, tilted
+from viewer.rendering.passes.occlusion_pass import OcclusionPass
+from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
+from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import View, key_direction
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
@@ -24,6 +26,7 @@ from viewer.rig.mesh import bounding_box, box_size
 __all__ = ["Lighting"]
 
 _SHADOW_STRENGTH = 0.9  # the rest stands for light that other surfaces reflect
+_BLUR = 0.011  # radius of the filter on the ground in sizes of a figure, where passes are averaged
 
 
 class Lighting:
@@ -42,12 +45,10 @@ class Lighting:
         self.bounds = Bounds()
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
-        self._made: list[ShadowPass | ContactPass | GroundShadowPass] = []
-
-    @cached_property
-    def _shadow_pass(self) -> ShadowPass:
-        self._made.append(made := ShadowPass(self.context))
-        return made
+        self._size = 0.0  # of the largest figure, scene units
+        self._shadow: ShadowPass | None = None
+        self._occlusion: OcclusionPass | None = None
+        self._made: list[ContactPass | GroundShadowPass] = []
 
     @cached_property
     def _contact_pass(self) -> ContactPass:
@@ -71,17 +72,28 @@ class Lighting:
         box : (2, 3)
             Bounds whose lowest point lies on the ground, scene space.
         """
-        self._spheres = self._contact = None
-        of_actors = casters.spheres(self.bounds) if casters.options.has_shadows else []
+        self._spheres, self._contact, self._size = None, None, 0.0
+        options = casters.options
+        if options.quality == "draft":
+            return
+        of_actors = casters.spheres(self.bounds)
         if not of_actors:
             return
-        self._spheres = np.concatenate(of_actors)
-        size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
-        if size > 0.0:
-            axes, height = _ground(up, box)
-            self._contact = self._contact_pass.draw(casters.draw, self._spheres, size, axes, height)
+        self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
+        if options.has_shadows and self._size > 0.0:
+            self._spheres, (axes, height) = np.concatenate(of_actors), _ground(up, box)
+            self._contact = self._contact_pass.draw(
+                casters.draw, self._spheres, self._size, axes, height
+            )
 
-    def light(self, casters: Casters, view: View, sample: Sample, strength: float) -> View:
+    def light(
+        self,
+        casters: Casters,
+        view: View,
+        size: tuple[int, int],
+        sample: Sample,
+        strength: float,
+    ) -> View:
         """Draw what one pass of a picture needs; return its view with the effects.
 
         Parameters
@@ -90,19 +102,45 @@ class Lighting:
             What casts shadows.
         view : View
             The camera's matrices.
+        size : (int, int)
+            Of the picture, pixels.
         sample : Sample
             The pass.
         strength : float
             0 to 1: how much of shadows and occlusion counts.
         """
-        options, shadow = casters.options, None
+        options, shadow, occlusion = casters.options, None, None
         casters = replace(casters, threshold=sample.threshold)
         if self._spheres is not None and options.lights.key.strength > 0.0:
             direction = tilted(key_direction(view, options.lights), sample.light)
-            shadow = self._shadow_pass.draw(
+            shadow = self._shadow_pass(size).draw(
                 casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
             )
-        return replace(view, effects=Effects(shadow))
+            # Shadows of the passes lie beside each other on the ground: they must overlap.
+            blur = _BLUR * self._size if n_passes(options) > 1 else 0.0
+            shadow = replace(shadow, angle=2.0 * math.pi * sample.phase, blur=blur)
+        if options.quality == "final" and self._size > 0.0:
+            occlusion = self._occlusion_pass(size).draw(
+                casters.draw, view, self._size, sample.phase, strength
+            )
+        return replace(view, effects=Effects(shadow, occlusion))
+
+    def _shadow_pass(self, size: tuple[int, int]) -> ShadowPass:
+        side = map_side(size)
+        if self._shadow is None or self._shadow.side != side:
+            if self._shadow is not None:
+                self._shadow.release()
+            self._shadow = None
+            self._shadow = ShadowPass(self.context, side)
+        return self._shadow
+
+    def _occlusion_pass(self, size: tuple[int, int]) -> OcclusionPass:
+        if self._occlusion is None or self._occlusion.size != size:
+            if self._occlusion is not None:
+                self._occlusion.release()
+            self._occlusion = None
+            self._occlusion = OcclusionPass(self.context, self.programs, size)
+        return self._occlusion
 
     def draw_ground(self, view: View, box: Floats, strength: float) -> None:
         """Draw the shadows on the ground, unless the camera is below it."""
@@ -117,8 +155,9 @@ class Lighting:
 
     def release(self) -> None:
         """Free all passes that were created."""
-        for item in self._made:
-            item.release()
+        for item in (*self._made, self._shadow, self._occlusion):
+            if item is not None:
+                item.release()
 
 
 def _ground(up: str, box: Floats) -> tuple[Floats, float]:

@@ -140,7 +140,7 @@ def render(
     camera : Camera, optional
         The camera; by default one that frames the scene.
     options : DisplayOptions, optional
-        Display options.
+        Display options; shadows are drawn (quality normal) if omitted.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def render(
         offscreen: Offscreen = _thread.kept.offscreen
         with offscreen.context:
             check_size(offscreen.context, size)  # before the camera divides by it
-    options = options or DisplayOptions()
+    options = options or DisplayOptions(quality="normal")
     camera = camera or default_camera(scene, size, options.show)
     box = scene_box(scene, options.show)
     with deferred():

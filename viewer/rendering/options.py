@@ -6,7 +6,18 @@ from dataclasses import dataclass, field
 
 from viewer.rig.skinning import Skinning
 
-__all__ = ["BACKGROUNDS", "QUALITIES", "SHOWN", "Color", "DisplayOptions", "Light", "Lights"]
+__all__ = [
+    "BACKGROUNDS",
+    "BONES",
+    "MATCAPS",
+    "OPACITIES",
+    "QUALITIES",
+    "SHOWN",
+    "Color",
+    "DisplayOptions",
+    "Light",
+    "Lights",
+]
 
 Color = tuple[float, float, float]
 
@@ -18,14 +29,29 @@ SHOWN = {
 }
 """Parts of a figure that are drawn, with labels for menus."""
 
-BACKGROUNDS = ("gradient", "transparent")
+MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
+"""Pictures of lit spheres for the shading ``"matcap"``, with labels for menus."""
+
+BONES = {
+    "auto": "Automatic",
+    "boxes": "Boxes",
+    "octahedra": "Octahedra",
+    "sticks": "Sticks",
+    "axes": "Axes",
+}
+"""Styles of skeletons, with labels for menus: see ``DisplayOptions.bones``."""
+
+OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
+"""Default opacity of a skeleton over the skin: boxes often enclose it, thin shapes do not."""
+
+BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
 
 
 QUALITIES = {
-    "draft": "Draft, no shadows",
-    "normal": "Normal, shadows",
-    "final": "Final, soft shadows and occlusion",
+    "draft": "Draft",
+    "normal": "Normal",
+    "final": "Final",
 }
 """Qualities of a picture, with labels for menus."""
 
@@ -65,6 +91,8 @@ class Lights:
         Colours of the ambient light on surfaces that face up and down, linear.
     specular, shininess : float
         Strength and exponent of the Blinn-Phong highlight.
+    studio : float
+        Strength of the studio that lights metallic-roughness surfaces.
     follow_camera : bool
         Whether the directions rotate with the camera.
     """
@@ -76,6 +104,7 @@ class Lights:
     ground: Color = (0.44, 0.36, 0.31)
     specular: float = 0.18
     shininess: float = 32.0
+    studio: float = 1.0
     follow_camera: bool = True
 
 
@@ -89,14 +118,23 @@ class DisplayOptions:
         A key of ``SHOWN``. A figure without a mesh always shows its skeleton, one without a
         skeleton its mesh.
     shading : str
-        A key of ``viewer.rendering.gpu.program.SHADING``.
+        A key of ``viewer.rendering.gpu.program.SHADING_CHOICES``; ``"auto"`` is metallic-roughness
+        for figures whose files describe such materials, otherwise Blinn-Phong.
+    matcap : str
+        A key of ``MATCAPS``, for the shading ``"matcap"``.
+    metallic, roughness : float
+        0 to 1, for the shading ``"pbr"`` of materials that do not state them.
     flat, wireframe, normals, texture, grid, cull : bool
         Use one normal per triangle; draw edges; draw vertex normals as lines; use the texture;
         draw the ground grid; cull back faces.
     background : str
-        ``"gradient"``, ``"transparent"`` or ``"#rrggbb"``.
-    skeleton_opacity : float
-        Opacity of the skeleton over the skin.
+        An entry of ``BACKGROUNDS`` or ``"#rrggbb"``.
+    bones : str
+        Style of skeletons, a key of ``BONES``: boxes as a file has them, or small cubes; octahedra,
+        sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
+        them, otherwise octahedra.
+    skeleton_opacity : float or None
+        Opacity of the skeleton over the skin; None for ``OPACITIES`` by style.
     samples : int
         Samples per pixel, limited by the driver's maximum.
     quality : str
@@ -142,10 +180,15 @@ class DisplayOptions:
         Draw the frusta of calibrated cameras, with their images if there are some.
     image_brightness : float
         Of the image behind the scene when looking through a calibrated camera, 0 to 1; 0 hides it.
+    outline : bool
+        Outline the selected joint, or else the selected actor, in pictures.
     """
 
     show: str = "skin"
-    shading: str = "phong"
+    shading: str = "auto"
+    matcap: str = "clay"
+    metallic: float = 0.0
+    roughness: float = 0.6
     flat: bool = False
     wireframe: bool = False
     normals: bool = False
@@ -153,7 +196,8 @@ class DisplayOptions:
     grid: bool = True
     cull: bool = False
     background: str = "gradient"
-    skeleton_opacity: float = 0.35
+    bones: str = "auto"
+    skeleton_opacity: float | None = None
     samples: int = 4
     quality: str = "draft"
     shadows: bool = True
@@ -175,6 +219,7 @@ class DisplayOptions:
     joint_axes: bool = False
     cameras: bool = False
     image_brightness: float = 0.6
+    outline: bool = False
 
     @property
     def has_shadows(self) -> bool:

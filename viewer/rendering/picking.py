@@ -14,7 +14,7 @@ from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.joint_marks import joint_at, marks_of
-from viewer.rendering.passes.joint_pass import draw_boxes
+from viewer.rendering.passes.joint_pass import draw_boxes, draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -132,7 +132,7 @@ class PickPass:
         update_skeletons(self.passes.buffers, scene.actors, options)
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
-                self._draw_boxes(index, actor, near, options)
+                self._draw_skeleton(index, actor, near, options)
             if has_points(actor):
                 self._draw_points(index, actor, near, options)
             if has_markers(actor, options):
@@ -201,13 +201,13 @@ class PickPass:
         array = instances.array(program, indices)
         array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=instances.count)
 
-    def _draw_boxes(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
+    def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self.passes.buffers.skeleton(actor)
         # A skeleton over a skin is drawn in front of it.
         view = in_front(view) if shows_mesh(actor.figure, options) else view
-        program = self.passes.programs.drawing("joint", fragment="pick")
+        program = joint_program(self.passes.programs, skeleton, options, "", "pick")
         self._number(program, lambda joint, _, point: Pick(index, joint, -1, -1, point))
-        draw_boxes(program, skeleton.boxes, placement_of(actor, options), view, options)
+        draw_joints(program, skeleton, placement_of(actor, options), view, options)
 
     def _draw_markers(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self.passes.buffers.keypoints_of(actor)

@@ -17,10 +17,13 @@ from viewer.rendering.camera_views import (
 )
 from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
+from viewer.rendering.overlays import Overlays, draw_overlays
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
@@ -32,7 +35,7 @@ from viewer.rendering.sampling import jittered, n_passes, sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.shown import (
     Meshes,
-    has_joint_marks,
+    far_first,
     has_markers,
     has_points,
     placement_of,
@@ -79,6 +82,8 @@ class Renderer:
         Annotations, drawn over everything except legends.
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
+    outlines : sequence of Outlined
+        Parts of the scene to outline; if empty, the selection with ``DisplayOptions.outline``.
     names_left_out : (int, int)
         Number of joint names omitted from the last picture for lack of room, and number of
         joints within it.
@@ -98,6 +103,7 @@ class Renderer:
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
+        self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
         self.lighting = Lighting(context, self.programs)
         self.late = LatePasses(
@@ -162,13 +168,22 @@ class Renderer:
         for index in range(count) if passes is None else passes:
             one = sample(index, count)
             shifted = jittered(view, one.shift, target.size)
-            lit = self.lighting.light(casters, shifted, one, strength)
+            lit = self.lighting.light(casters, shifted, target.size, one, strength)
             self._prepare(target)
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
-        frusta = frusta_of(scene, camera.fixed, options, box, target.size)
-        self._draw_marks(scene, view, options, target.size, selected, frusta)
+        over = Overlays(
+            self.marks,
+            self.ghost,
+            (*frusta_of(scene, camera.fixed, options, box, target.size), *self.annotations),
+        )
+        self.names_left_out = draw_overlays(
+            self.late, over, scene, view, options, target.size, selected
+        )
+        if self.outlines or options.outline:
+            outlined = self.outlines or [Outlined(*selected)]
+            self.late.outline_pass.draw(outlined, scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
 
@@ -184,7 +199,10 @@ class Renderer:
         strength: float,
     ) -> None:
         """Draw everything that is part of the scene, from the background on."""
-        self.ground_pass.draw_background(options.background)
+        if options.background == "environment":
+            self.late.backdrop_pass.draw(view, options.lights)
+        else:
+            self.ground_pass.draw_background(options.background)
         draw_image_behind(self.late, scene, view, options, target.size)
         self._draw_meshes(meshes, view, options)
         draw_image_planes(self.late, scene, view, options, box)
@@ -195,7 +213,7 @@ class Renderer:
         ]
         for actor, joint in skeletons:
             if not shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, joint)
+                self._draw_skeleton(actor, view, options, joint, 1.0)
         if options.has_shadows:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
@@ -207,7 +225,8 @@ class Renderer:
         self._draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
-                self._draw_skeleton(actor, view, options, joint, overlays=True)
+                opacity = self.buffers.skeleton(actor).opacity(options)
+                self._draw_skeleton(actor, view, options, joint, opacity, overlays=True)
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
@@ -287,13 +306,24 @@ class Renderer:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        if options.cull:
-            self.context.enable(moderngl.CULL_FACE)
+        drawn = [mesh.mesh for _, mesh in meshes.singles]
+        drawn += [instances.mesh for _, instances in meshes.instanced]
+        self.late.use_pictures(drawn, options)
+        self._draw_layer(meshes, view, options, blended=False)
+        if any(mesh.is_blended for mesh in drawn):
+            with without_depth_writes(self.context):
+                self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
+
+    def _draw_layer(
+        self, meshes: Meshes, view: View, options: DisplayOptions, blended: bool
+    ) -> None:
         for actor, mesh in meshes.opaque:
-            self.mesh_pass.draw(mesh, placement_of(actor, options), view, options, actor.color)
+            if mesh.mesh.is_blended or not blended:
+                placement = placement_of(actor, options)
+                self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended)
         for actors, instances in meshes.instanced:
-            draw_instances(self.programs, instances, actors, view, options)
-        self.context.disable(moderngl.CULL_FACE)
+            if instances.mesh.is_blended or not blended:
+                draw_instances(self.programs, instances, actors, view, options, blended)
 
     def _prepare(self, target: Target) -> None:
         """Bind and clear a target."""
@@ -321,13 +351,12 @@ class Renderer:
         view: View,
         options: DisplayOptions,
         selected: int,
+        opacity: float,
         overlays: bool = False,
     ) -> None:
         skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
-        opacity = actor.opacity * (options.skeleton_opacity if overlays else 1.0)
-        self.joint_pass.draw(
-            skeleton, placement, view, options, selected, opacity, actor.color, overlays
-        )
+        how = selected, opacity * actor.opacity, actor.color, overlays
+        self.joint_pass.draw(skeleton, placement, view, options, *how)
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self.buffers.keypoints_of(actor)
@@ -335,41 +364,6 @@ class Renderer:
         # Marker positions already include the placement of the pose.
         at = actor.placement
         self.late.keypoint_pass.draw(markers, at, view, options, actor.opacity)
-
-    def _draw_marks(
-        self,
-        scene: Scene,
-        view: View,
-        options: DisplayOptions,
-        size: tuple[int, int],
-        selected: tuple[int, int],
-        frusta: Sequence[Annotation],
-    ) -> None:
-        """Draw joint marks, ghost, frusta, marks and annotations, then all labels."""
-        self.names_left_out, drawn = (0, 0), []
-        if has_joint_marks(options):
-            from viewer.rendering.overlay.joint_annotation import joint_annotation
-
-            joints = joint_annotation(scene.actors, options, size, selected)
-            if joints is not None:
-                self.late.annotation_pass.draw(joints, view, size)
-                drawn.append(joints)
-        if self.ghost is not None:
-            self.late.ghost_pass.draw(self.ghost, view, options)
-        over = [*frusta, *self._marked(), *self.annotations]
-        for annotation in over:
-            self.late.annotation_pass.draw(annotation, view, size)
-        if drawn or over:
-            left_out = self.late.annotation_pass.write([*drawn, *over], view, size)
-            self.names_left_out = left_out[0] if drawn else (0, 0)
-
-    def _marked(self) -> list[Annotation]:
-        """Return the marks as annotations."""
-        if self.marks is None:
-            return []
-        from viewer.rendering.overlay.marks import mark_annotation
-
-        return [mark_annotation(self.marks)]
 
     def _draw_motion_paths(
         self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]

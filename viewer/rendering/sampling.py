@@ -13,7 +13,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["Sample", "jittered", "n_passes", "sample", "tilted"]
 
-_LIGHT_RADIUS = math.tan(math.radians(2.2))  # of the key light's disc, at distance 1
+_LIGHT_RADIUS = math.tan(math.radians(1.7))  # of the key light's disc, at distance 1
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 

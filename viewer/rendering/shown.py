@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import instance_groups
 from viewer.rendering.passes.skin_pass import PosedMesh
+from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, placement_matrix
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Meshes",
+    "far_first",
     "has_joint_marks",
     "has_markers",
     "has_points",
@@ -126,7 +130,7 @@ def update_skeletons(
         pose = actor.pose
         if pose is None or not shows_skeleton(actor, options):
             continue
-        if not buffers.skeleton(actor).is_current(pose):
+        if not buffers.skeleton(actor).is_current(pose, options):
             key = id(actor.figure), pose.shape_weights.tobytes()
             groups.setdefault(key, []).append((actor, pose))
     for group in groups.values():
@@ -137,7 +141,7 @@ def update_skeletons(
         assert skeleton is not None  # guaranteed by shows_skeleton
         posed_worlds(skeleton, poses)  # batched; each pose caches its result
         for actor, pose in group:
-            buffers.skeleton(actor).update(pose)
+            buffers.skeleton(actor).update(pose, options)
 
 
 def shows_mesh(figure: Figure, options: DisplayOptions) -> bool:
@@ -175,3 +179,13 @@ def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
     if actor.pose is None or options.show == "binding":
         return actor.placement
     return actor.placement @ placement_matrix(actor.pose)
+
+
+def far_first(meshes: Meshes, options: DisplayOptions, view: View) -> Meshes:
+    """Return the same meshes, those drawn singly from the farthest to the nearest."""
+
+    def depth(single: tuple[Actor, PosedMesh]) -> float:
+        center = placement_of(single[0], options) @ np.append(single[1].center, 1.0)
+        return float(view.matrix[2] @ center)
+
+    return Meshes(sorted(meshes.singles, key=depth), meshes.instanced)

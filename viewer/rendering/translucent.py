@@ -36,7 +36,8 @@ def draw_translucent(
     def draw() -> None:
         for actor, mesh in drawn:
             place = placement_of(actor, options)
-            mesh_pass.draw(mesh, place, view, options, actor.color, actor.opacity)
+            for blended in (False, True)[: 1 + mesh.mesh.is_blended]:
+                mesh_pass.draw(mesh, place, view, options, actor.color, blended, actor.opacity)
 
     draw_nearest(mesh_pass.context, draw)
     for actor, mesh in drawn:

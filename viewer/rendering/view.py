@@ -62,16 +62,19 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
     """Set the uniforms of the lights and of ``shade/phong.glsl`` that the program uses."""
     pair = (lights.key, lights.rim)
+    sky, ground = np.array(lights.sky), np.array(lights.ground)
     directions = [_direction(light, lights.follow_camera, view) for light in pair]
     colors = [[light.strength * channel for channel in light.color] for light in pair]
     values = {
         "u_light_directions": np.array(directions, dtype="f4").tobytes(),
         "u_light_colors": np.array(colors, dtype="f4").tobytes(),
         "u_up": tuple(view.matrix[:3, "xyz".index(view.camera.up)]),
-        "u_sky": tuple(lights.ambient * channel for channel in lights.sky),
-        "u_ground": tuple(lights.ambient * channel for channel in lights.ground),
+        "u_ambient": tuple(0.5 * lights.ambient * (sky + ground)),
+        "u_ambient_growth": tuple(0.5 * lights.ambient * (sky - ground)),
         "u_specular": lights.specular,
         "u_shininess": max(lights.shininess, 1.0),
+        "u_to_studio": as_uniform(_studio_axes(view, lights.follow_camera)),
+        "u_studio_strength": lights.studio,
     }
     set_uniforms(program, values)
     view.effects.bind(program, view.matrix)
@@ -80,6 +83,23 @@ def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
 def key_direction(view: View, lights: Lights) -> Floats:
     """Return the unit vector towards the key light in scene space: (3,)."""
     return _direction(lights.key, lights.follow_camera, view) @ view.matrix[:3, :3]
+
+
+def _studio_axes(view: View, follows: bool) -> Floats:
+    """Return the rotation from camera space to the studio's: +y up, +z towards the camera.
+
+    A studio that does not follow the camera has +z at azimuth 0.
+    """
+    axes = view.matrix[:3, :3]
+    front = np.stack(camera_axes(Camera(azimuth=0.0, inclination=0.0, up=view.camera.up)))
+    if follows:
+        up = front[1]
+        # Seen from straight above or below, the top of the picture is away from the camera.
+        level = axes[2] - (axes[2] @ up) * up
+        level = level if np.linalg.norm(level) > 1e-6 else -np.sign(axes[2] @ up) * axes[1]
+        back = level / np.linalg.norm(level)
+        front = np.stack([np.cross(up, back), up, back])
+    return front @ axes.T
 
 
 def _direction(light: Light, follows: bool, view: View) -> Floats:

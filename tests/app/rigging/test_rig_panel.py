@@ -124,7 +124,7 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
     hand.pick("Colours", 2)
     assert state.options.scalar == "field:match distance"
     hand.pick("Colours", 0)
-    assert state.options.shading == "phong"
+    assert state.options.shading == "auto"
 
 
 def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
@@ -280,7 +280,7 @@ def test_confidence_maps_are_buttons(rigging):
         hand.step(2)
         assert hand.state.error == "" and hand.state.stats.legend is not None
     hand.click("color ")
-    assert hand.state.options.shading == "phong"
+    assert hand.state.options.shading == "auto"
 
 
 def test_result_moves_as_the_template_where_the_target_stands(rigging):

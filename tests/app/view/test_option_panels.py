@@ -8,7 +8,7 @@ import pytest
 
 from viewer.rendering.camera import VIEWS
 from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import SHOWN, Lights
+from viewer.rendering.options import BONES, SHOWN, Lights
 from viewer.rig.scene import Actor
 
 
@@ -63,6 +63,16 @@ def test_skin_opacity_is_a_slider_while_both_are_shown(tall):
     tall.drag("Skeleton opacity", 1.3, "Skeleton opacity")
     assert tall.state.options.skeleton_opacity == pytest.approx(1.0, abs=0.02)
     assert (tall.scene_picture() != before).any()
+
+
+def test_bones_are_chosen_from_a_list(tall):
+    tall.click(SHOWN["skeleton"])
+    before = tall.scene_picture()
+    tall.pick("Bones", list(BONES).index("octahedra"))
+    assert tall.state.options.bones == "octahedra"
+    assert (tall.scene_picture() != before).any()
+    tall.key("z", "ctrl")
+    assert tall.state.options.bones == "auto"
 
 
 def test_shading_is_chosen_from_a_list(tall):

@@ -39,7 +39,7 @@ def test_menu_shows_weights_and_lets_go_of_them(hand):
     assert (hand.state.options.shading, hand.state.options.scalar) == ("scalar", "weight")
     assert hand.says("Weights of arm")
     hand.menu("menu View", "Weights of the selected joint")
-    assert hand.state.options.shading == "phong"
+    assert hand.state.options.shading == "auto"
 
 
 def test_menu_picks_vertices(hand):
@@ -62,4 +62,4 @@ def test_skeleton_alone_has_no_vertices_to_show(drive, rig):
     for text in ("Weights of the selected joint", "Pick vertices", "Vertex under the mouse"):
         lone.menu("menu View", text)
         lone.key("escape")
-    assert lone.state.options.shading == "phong" and not lone.state.of(Weights).picks_vertices
+    assert lone.state.options.shading == "auto" and not lone.state.of(Weights).picks_vertices

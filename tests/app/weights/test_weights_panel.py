@@ -71,7 +71,7 @@ def test_heat_map_box_switches_the_shading_and_the_legend(wide, texts):
     wide.step()
     assert "Distance to 4 influences, mm" in texts
     wide.click("Heat map")
-    assert wide.state.options.shading == "phong"
+    assert wide.state.options.shading == "auto"
     assert _legend_colours(wide) is None
     assert_array_equal(wide.scene_picture(), plain)
 
@@ -79,7 +79,7 @@ def test_heat_map_box_switches_the_shading_and_the_legend(wide, texts):
 def test_heat_map_is_undone(wide):
     wide.click("Heat map")
     wide.key("z", "ctrl")
-    assert wide.state.options.shading == "phong"
+    assert wide.state.options.shading == "auto"
     wide.key("z", "ctrl shift")
     assert wide.state.options.shading == "scalar"
 
@@ -153,7 +153,7 @@ def test_view_is_chosen_from_the_list(wide, name):
     choose(wide, name)
     if name in lacking:
         assert no_view(wide.state, name) == f"no figure in the scene has {lacking[name]}"
-        assert wide.state.options.scalar == first and wide.state.options.shading == "phong"
+        assert wide.state.options.scalar == first and wide.state.options.shading == "auto"
         return
     assert no_view(wide.state, name) == ""
     assert wide.state.options.scalar == name and wide.state.options.shading == "scalar"
@@ -316,13 +316,13 @@ def test_key_shows_weights_of_the_selected_joint_and_goes_back(bent):
     bent.step(2)
     assert bent.state.stats.legend.title == "Weight of arm"
     bent.key("v")
-    assert bent.state.options.shading == "phong"
+    assert bent.state.options.shading == "auto"
 
 
 def test_key_on_a_figure_without_weights_says_so(drive, rig):
     hand = drive(rig[0])
     hand.key("v")
-    assert hand.says("there is no mesh") and hand.state.options.shading == "phong"
+    assert hand.says("there is no mesh") and hand.state.options.shading == "auto"
 
 
 def test_several_fields_have_a_list(bent):

@@ -256,13 +256,17 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         ("x.gif", "--speed 2", NOTHING_MOVES),
         ("x.mp4", "--turntable --frames 0:3", "--frames: no file has a motion"),
         ("x.png", "--speed 2", "--speed: applies to videos only: .mp4, .webm, .gif"),
-        ("{frame}.png", "--quality 9", "--quality: applies to videos only: .mp4, .webm, .gif"),
+        (
+            "{frame}.png",
+            "--video-quality 9",
+            "--video-quality: applies to videos only: .mp4, .webm, .gif",
+        ),
         (
             "x.gif",
-            "--quality 9 --turntable",
-            "--quality: applies to .mp4 and .webm, not to a GIF",
+            "--video-quality 9 --turntable",
+            "--video-quality: applies to .mp4 and .webm, not to a GIF",
         ),
-        ("x.mp4", "--quality 900 --turntable", "video quality: expected 0 to 100, found 900"),
+        ("x.mp4", "--video-quality 900 --turntable", "video quality: expected 0 to 100, found 900"),
         ("x.mp4", "--speed 0", "--speed: expected 0.001 to 1000 or their negatives, found 0"),
         (
             "x.png",

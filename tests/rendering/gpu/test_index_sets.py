@@ -7,6 +7,7 @@ import pytest
 from rendering.drawn_figures import sphere
 
 from viewer.rendering.gpu.index_sets import curve_places, index_set
+from viewer.rendering.gpu.surfaces import PLAIN
 
 
 def shaded(triangles, kept=32) -> int:
@@ -21,7 +22,7 @@ def shaded(triangles, kept=32) -> int:
 
 
 def drawn(ctx, triangles, materials, positions):
-    made = index_set(ctx, triangles, materials, [None, None], positions)
+    made = index_set(ctx, triangles, materials, [PLAIN, PLAIN], positions)
     indices = np.frombuffer(made.indices.read(), dtype="u4").reshape(-1, 3)
     made.indices.release()
     return made, indices
@@ -66,7 +67,7 @@ def test_without_positions_the_order_stays(ctx):
 def test_few_triangles_are_no_exception(ctx, count):
     points = np.zeros((3, 3))
     triangles = np.array([[0, 1, 2]], dtype=np.int32)[:count]
-    made, _ = index_set(ctx, triangles, np.zeros(count), [None], points), None
+    made, _ = index_set(ctx, triangles, np.zeros(count), [PLAIN], points), None
     assert made.n_indices == 3 * count and len(made.order) == count
     made.indices.release()
 

@@ -12,6 +12,7 @@ from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View
@@ -131,7 +132,7 @@ def test_faces_of_sheared_boxes_have_the_inverse_transposed_normal(ctx):
     pose.dofs[5] = 0.7  # of the second joint, about z
     joint_pass = JointPass(ctx, Programs(ctx))
     joints_on_gpu = SkeletonBuffers(ctx, figure, joint_pass.cube)
-    joints_on_gpu.update(pose)
+    joints_on_gpu.update(pose, DisplayOptions(bones="boxes"))
     boxes = joints_on_gpu.boxes
     program = joint_pass.programs.feedback("joint", "", ("v_normal",))
     program["u_normal_matrix"].write(np.eye(3, dtype="f4").tobytes())

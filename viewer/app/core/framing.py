@@ -64,6 +64,10 @@ class Framing:
         """Remember the position of a fitted camera."""
         self._placed = _place(camera)
 
+    def has_placed(self, camera: Camera) -> bool:
+        """Return whether a fitted camera stands where it was placed last."""
+        return self.is_fitting and self._placed == _place(camera)
+
     def is_due(self, view: tuple[object, ...]) -> bool:
         """Return whether the camera must be fitted to a view now, and mark that as done."""
         is_due = self._fitted != view or (self._is_stale and self.points is None)

@@ -51,6 +51,8 @@ class AppState:
         Settings with which its motions were read, if any were given.
     chosen_actor : int
         Index of the actor that panels act on.
+    is_actor_selected : bool
+        Whether the user chose that actor, so that it is outlined among several.
     n_choices : int
         Number of times that an actor was chosen: features compare it to detect outdated state.
     selected_joint : int
@@ -89,6 +91,7 @@ class AppState:
     opened_at: float = field(default_factory=time.time)
     motion_settings: MotionSettings | None = None
     chosen_actor: int = 0
+    is_actor_selected: bool = False
     n_choices: int = 0
     selected_joint: int = -1
     in_degrees: bool = True
@@ -134,6 +137,7 @@ class AppState:
     def choose_actor(self, index: int) -> None:
         """Choose the actor that panels act on."""
         self.chosen_actor = index
+        self.is_actor_selected = True
         self.n_choices += 1
         self.clock.follow(self.actor)  # stepping uses its frames
         self.selected_joint = -1
@@ -162,6 +166,7 @@ class AppState:
         self.options.hidden_parts, self.options.reduced = (), False
         self.options.path_joints = ()
         self.choose_actor(0)
+        self.is_actor_selected = False
         self._begin()
 
     def _begin(self) -> None:

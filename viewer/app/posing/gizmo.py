@@ -38,9 +38,10 @@ __all__ = [
     "use_handles",
 ]
 
-DOT_REACH = 9.0
+DOT_REACH = 14.0
 """Radius around a joint in which a click selects it, window coordinates."""
 
+_BESIDE = 22.0  # window coordinates beside a handle within which a drag does not orbit
 _STILL = 2.0  # window coordinates by which the pointer may move in a click
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
@@ -52,6 +53,8 @@ def use_handles(state: AppState) -> bool:
     place = (io.mouse_pos.x, io.mouse_pos.y)
     if posing.drag is not None:
         return _go_on(state, posing.drag, place)
+    if posing.has_missed:
+        return _end_miss(state)
     if not posing.is_on or io.want_capture_mouse or no_tool(state):
         return False
     if io.key_shift or io.key_alt:  # Shift pans, Alt picks vertices
@@ -60,7 +63,8 @@ def use_handles(state: AppState) -> bool:
         return False
     handle = _grabbed(state, place)
     if handle is None:
-        return False
+        posing.has_missed = _is_beside_handle(state, place)
+        return posing.has_missed
     posing.drag = Drag(state.actor, handle, Outcome(_pose(state), ""))
     return True
 
@@ -89,6 +93,32 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
         if not drag.has_moved:
             choose_joint(state)  # a joint's dot may lie under a ring or an arrow
     return True
+
+
+def _is_beside_handle(state: AppState, place: Place) -> bool:
+    """Return whether a press narrowly missed the handles of the selected joint.
+
+    Such a drag was meant for a handle: it must not orbit the camera.
+    """
+    posing, posed, frame = state.of(Posing), selected(state), view_frame(state)
+    if posed is None or state.actor.pose is None:
+        return False
+    if posing.tool == "rotate":
+        found = rings(posed, state.actor.pose, posing.orientation, frame)
+        return grab_ring(found, posed.center, frame, place, _BESIDE) is not None
+    center = frame.place(posed.center)
+    if center is not None and _apart(center, place) <= _BESIDE:
+        return True
+    found_arrows = arrows(posed, posing.orientation)
+    return grab_arrow(found_arrows, posed.center, frame, place, _BESIDE) is not None
+
+
+def _end_miss(state: AppState) -> bool:
+    """Ignore a drag beside a handle until the button is released; return False for a click."""
+    if imgui.is_mouse_down(_LEFT):
+        return True
+    state.of(Posing).has_missed = False
+    return imgui.get_io().mouse_drag_max_distance_sqr[_LEFT] > _STILL**2
 
 
 def _apart(one: Place, other: Place) -> float:

@@ -23,7 +23,14 @@ from viewer.app.posing.captured_points import draw_captured_points
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.figure_place import draw_figure_place
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.posing.pose_actions import copy_numbers, copy_pose, mirror, paste_pose, reset_pose
+from viewer.app.posing.pose_actions import (
+    copy_numbers,
+    copy_pose,
+    mirror,
+    paste_pose,
+    reset_joint,
+    reset_pose,
+)
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
 from viewer.rig.hierarchy import depth_first
@@ -223,7 +230,7 @@ def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, lab
         state.selected_joint = -1 if state.selected_joint == joint else joint
     if imgui.begin_popup_context_item(f"menu of joint {joint}"):
         if menu_item(state, "Reset this joint"):
-            _reset(state, np.flatnonzero(skeleton.dof_joints == joint))
+            reset_joint(state, joint)
         imgui.end_popup()
 
 
@@ -315,9 +322,3 @@ def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
 def _value_text(value: float, kind: int, in_degrees: bool) -> str:
     """Return a DOF's value in the displayed unit."""
     return angle_text(value, in_degrees) if kind >= _FIRST_ROTATION else number_text(value)
-
-
-def _reset(state: AppState, dofs: np.ndarray) -> None:
-    actor = state.actor
-    if actor.pose is not None and actor.figure.skeleton is not None:
-        actor.pose.dofs[dofs] = actor.figure.skeleton.rest_dofs[dofs]

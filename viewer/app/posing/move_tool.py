@@ -117,7 +117,9 @@ def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
     return [Arrow(axes[:, axis], axis) for axis in range(3)]
 
 
-def grab_arrow(found: list[Arrow], center: Floats, frame: ViewFrame, place: Place) -> Arrow | None:
+def grab_arrow(
+    found: list[Arrow], center: Floats, frame: ViewFrame, place: Place, reach: float = _REACH
+) -> Arrow | None:
     """Return the arrow under the pointer, None if there is none.
 
     Parameters
@@ -130,8 +132,10 @@ def grab_arrow(found: list[Arrow], center: Floats, frame: ViewFrame, place: Plac
         Projection of the scene.
     place : (float, float)
         Position of the pointer, window coordinates.
+    reach : float
+        Largest distance from the pointer, window coordinates.
     """
-    best, nearest = None, _REACH
+    best, nearest = None, reach
     length = LENGTH * frame.unit_length(center)
     for arrow in found:
         ends = frame.project(np.stack([center, center + length * arrow.axis]))
@@ -142,7 +146,7 @@ def grab_arrow(found: list[Arrow], center: Floats, frame: ViewFrame, place: Plac
         x, y = np.array(place) - ends[0]
         along = float(x * way[0] + y * way[1]) / size
         across = abs(float(way[0] * y - way[1] * x)) / size
-        if _BARE < along < size + _REACH and across < nearest:
+        if _BARE < along < size + reach and across < nearest:
             best, nearest = arrow, across
     return best
 

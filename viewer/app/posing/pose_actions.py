@@ -28,6 +28,8 @@ __all__ = [
     "mirror",
     "paste_pose",
     "random_shape",
+    "reset_actor",
+    "reset_joint",
     "reset_pose",
     "reset_shape",
     "save_export",
@@ -132,6 +134,25 @@ def reset_pose(state: AppState) -> None:
             actor.pose = rest_pose(actor.figure.skeleton)
             actor.pose.shape_weights = weights
     state.say_status("Pose reset")
+
+
+def reset_actor(state: AppState) -> None:
+    """Reset the DOFs of the chosen actor to the file's pose; its shape stays."""
+    actor = state.actor
+    if actor.figure.skeleton is not None and actor.pose is not None:
+        weights = actor.pose.shape_weights
+        actor.pose = rest_pose(actor.figure.skeleton)
+        actor.pose.shape_weights = weights
+        pause_for_edit(state)
+
+
+def reset_joint(state: AppState, joint: int) -> None:
+    """Reset the DOFs of one joint of the chosen actor to the file's pose."""
+    actor = state.actor
+    if actor.pose is not None and actor.figure.skeleton is not None:
+        dofs = np.flatnonzero(actor.figure.skeleton.dof_joints == joint)
+        actor.pose.dofs[dofs] = actor.figure.skeleton.rest_dofs[dofs]
+        pause_for_edit(state)
 
 
 def random_shape(state: AppState) -> None:

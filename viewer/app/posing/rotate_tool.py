@@ -125,7 +125,7 @@ def _across(axis: Floats) -> Floats:
 
 
 def grab_ring(
-    found: list[Ring], center: Floats, frame: ViewFrame, place: Place
+    found: list[Ring], center: Floats, frame: ViewFrame, place: Place, reach: float = _REACH
 ) -> tuple[Ring, Floats] | None:
     """Return the ring under the pointer and the direction to its grabbed point.
 
@@ -141,8 +141,10 @@ def grab_ring(
         Projection of the scene.
     place : (float, float)
         Position of the pointer, window coordinates.
+    reach : float
+        Largest distance from the pointer, window coordinates.
     """
-    best, nearest = None, _REACH
+    best, nearest = None, reach
     length = frame.unit_length(center)
     eye = toward_eye(frame, center)
     for ring in found:

@@ -146,6 +146,8 @@ class Posing:
         root.
     drag : Drag or None
         The handle that is held.
+    has_missed : bool
+        Whether a press narrowly missed a handle and its button is still down.
     as_vectors : bool
         Whether ball joints are edited as rotation vectors instead of angles about x, y, z.
     held_vector : HeldVector or None
@@ -160,6 +162,7 @@ class Posing:
     orientation: str = "local"
     chain_length: int = 0
     drag: Drag | None = None
+    has_missed: bool = False
     as_vectors: bool = False
     held_vector: HeldVector | None = None
     shape_seed: int = 0

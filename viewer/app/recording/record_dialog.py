@@ -14,7 +14,7 @@ from viewer.app.recording.state import KINDS, LEAST_PIXELS, Recording, RecordSet
 from viewer.formats import file_stem
 from viewer.rig.number_text import number_text
 
-__all__ = ["draw_record_dialog"]
+__all__ = ["draw_record_dialog", "open_record_dialog"]
 
 _SIZES = {
     "view": "view size",
@@ -26,6 +26,11 @@ _SIZES = {
 }
 _TITLE = "Record"
 _MOST_PIXELS = 16384
+
+
+def open_record_dialog(state: AppState) -> None:
+    """Open the window."""
+    state.of(Recording).settings = RecordSettings()
 
 
 def draw_record_dialog(state: AppState) -> None:
@@ -84,6 +89,8 @@ def _draw_settings(state: AppState, settings: RecordSettings) -> None:
             settings.seconds = seconds
     if settings.kind != ".mp4":
         settings.transparent = checkbox(state, "Transparent background", settings.transparent)
+    if state.selected_joint >= 0 or len(state.scene.actors) > 1:
+        state.options.outline = checkbox(state, "Selection outline", state.options.outline)
     if state.options.shading == "scalar":
         state.options.legend = checkbox(state, "Legend in pictures", state.options.legend)
     imgui.text_disabled(_span_text(state, settings))

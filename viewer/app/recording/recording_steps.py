@@ -97,6 +97,8 @@ def _recording(
     """Return the description of a recording of the view, without tools and panels."""
     following = state.of(Following)
     options = copy.deepcopy(state.options)
+    if options.quality == "final" and len(times) > 1:
+        options.quality = "normal"
     if settings.transparent and settings.kind != ".mp4":
         options.background = "transparent"
     follow = None

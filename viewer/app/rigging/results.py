@@ -199,7 +199,7 @@ def show_colors(state: AppState, view: str) -> None:
     if view:
         options.shading, options.scalar, options.scalar_range = "scalar", view, None
     elif options.shading == "scalar":
-        options.shading = "phong"
+        options.shading = "auto"
 
 
 def plays_motion(result: Result) -> bool:

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.rendering.options import SHOWN, Lights
+from viewer.app.view.axis_gizmo import AxisGizmo
+from viewer.rendering.options import BONES, SHOWN, Lights
 
-__all__ = ["reset_lights", "show", "toggle_binding", "toggle_option", "toggle_skeleton"]
+__all__ = [
+    "reset_lights",
+    "show",
+    "show_bones",
+    "toggle_binding",
+    "toggle_gizmo",
+    "toggle_option",
+    "toggle_skeleton",
+]
 
 
 def toggle_skeleton(state: AppState) -> None:
@@ -30,6 +39,19 @@ def toggle_option(state: AppState, name: str, text: str) -> None:
     value = not getattr(state.options, name)
     setattr(state.options, name, value)
     state.say_status(f"{text} {'on' if value else 'off'}")
+
+
+def show_bones(state: AppState, style: str) -> None:
+    """Choose the style of skeletons, a key of ``BONES``, and say so."""
+    state.options.bones = style
+    state.say_status(f"Bones: {BONES[style].lower()}")
+
+
+def toggle_gizmo(state: AppState) -> None:
+    """Show or hide the axis gizmo of the view."""
+    gizmo = state.of(AxisGizmo)
+    gizmo.is_shown = not gizmo.is_shown
+    state.say_status(f"Axis gizmo {'on' if gizmo.is_shown else 'off'}")
 
 
 def reset_lights(state: AppState) -> None:

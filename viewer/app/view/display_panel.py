@@ -19,15 +19,22 @@ from viewer.app.view.display_actions import show
 from viewer.app.view.view_menu import JOINT_TOGGLES
 from viewer.app.weights.actions import start_heat_map
 from viewer.phrases import printable
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import SHOWN
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.options import BONES, MATCAPS, OPACITIES, QUALITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
+from viewer.rendering.passes.bone_style import skeleton_opacity
 from viewer.rendering.passes.ground_pass import grid_step, parse_color
 from viewer.rig.annotations import BodyParts
 
 __all__ = ["draw"]
 
-_BACKGROUNDS = {"gradient": "Gradient", "transparent": "Transparent", "#": "Colour"}
+_BACKGROUNDS = {
+    "gradient": "Gradient",
+    "white": "White",
+    "environment": "Studio",
+    "transparent": "Transparent",
+    "#": "Colour",
+}
 
 
 def draw(state: AppState) -> None:
@@ -45,15 +52,16 @@ def draw(state: AppState) -> None:
                 show(state, key)
             note_item(state, text)
             explain("", missing[key])
+        if key == "skeleton":
+            _draw_bones(state, missing[key])
     if options.show == "both":
-        options.skeleton_opacity = slider(
-            state, "Skeleton opacity", options.skeleton_opacity, 0.0, 1.0, flags=_CLAMP
-        )
+        _draw_opacity(state)
     imgui.separator()
     before = options.shading
-    options.shading = choice(state, "Shading", before, SHADING)
+    options.shading = choice(state, "Shading", before, SHADING_CHOICES)
     if options.shading == "scalar" != before:
         start_heat_map(state)
+    _draw_surface(state)
     _draw_extras(state)
     why = no_mesh(state)
     options.flat = checkbox(state, "Flat", options.flat, why)
@@ -68,9 +76,46 @@ def draw(state: AppState) -> None:
     _draw_background(state)
     imgui.separator()
     _draw_joint_toggles(state)
+    imgui.separator()
+    options.quality = choice(state, "Quality", options.quality, QUALITIES)
+    if options.quality != "draft":
+        options.shadows = checkbox(state, "Shadows", options.shadows)
 
 
 _CLAMP = imgui.SliderFlags_.always_clamp
+
+
+def _draw_surface(state: AppState) -> None:
+    """Draw what the chosen shading asks for: a matcap, or the surface of plain materials."""
+    options = state.options
+    if options.shading == "matcap":
+        options.matcap = choice(state, "Matcap", options.matcap, MATCAPS)
+    if options.shading == "pbr":
+        for name in ("metallic", "roughness"):
+            value = slider(state, name.capitalize(), getattr(options, name), 0.0, 1.0, flags=_CLAMP)
+            setattr(options, name, value)
+            explain("Of materials that do not state it")
+
+
+def _draw_bones(state: AppState, why: str) -> None:
+    """Draw the style of skeletons beside the button that shows them."""
+    imgui.same_line(imgui.get_content_region_avail().x * 0.5)
+    with disabled(why):
+        imgui.set_next_item_width(-1.0)
+        state.options.bones = choice(state, "##bones", state.options.bones, BONES)
+        note_item(state, "Bones")
+        text = "style of the skeleton; automatic: the boxes of its file, otherwise octahedra"
+        explain(text, why)
+
+
+def _draw_opacity(state: AppState) -> None:
+    """Draw the opacity of the skeleton, which has a default for each style until it is moved."""
+    options, skeleton = state.options, state.actor.figure.skeleton
+    usual = OPACITIES["boxes"] if skeleton is None else skeleton_opacity(skeleton, options)
+    shown = usual if options.skeleton_opacity is None else options.skeleton_opacity
+    moved = slider(state, "Skeleton opacity", shown, 0.0, 1.0, flags=_CLAMP)
+    if moved != shown:
+        options.skeleton_opacity = moved
 
 
 def _draw_joint_toggles(state: AppState) -> None:

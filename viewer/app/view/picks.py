@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.state import Posing
 from viewer.app.posing.tool_actions import no_tool
+from viewer.app.view.hovering import hover_actor, joint_near
 from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.hover_text import tells_vertices
@@ -31,7 +32,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
 
-__all__ = ["answer_picks", "take_pick", "vertex_at"]
+__all__ = ["Spot", "answer_picks", "spot_at", "take_pick", "vertex_at"]
 
 _LONGEST = 40  # characters of a name
 _REST = 0.2  # seconds without mouse movement before a vertex is described
@@ -62,6 +63,7 @@ def answer_picks(
             x, y, aims = wanted
             _take_click(state, renderer, size, (x * scale, y * scale), aims)
         _look_under_mouse(state, renderer, size, scale, picture)
+        hover_actor(state, renderer, size, scale)
     except ViewerError as problem:
         state.error = str(problem)
 
@@ -85,15 +87,61 @@ def _take_click(
             imgui.set_window_focus(PANELS["vertex"].title)  # another tab may hide it
         return
     pick = _pick(state, renderer, size, pixel, state.options)
+    if not aims and (pick is None or pick.joint < 0):
+        x, y, width, _ = state.view_rect
+        near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
+        if near >= 0:  # missed it by a little
+            select_joint(state, near)
+            return
     if pick is None:
         if not aims:
-            state.selected_joint = -1
+            state.selected_joint, state.is_actor_selected = -1, False
         return
     take_pick(state, pick, aims)
     mover = None if aims else _mover(state, pick)
     if mover is not None:
         select_joint(state, mover.joint)
         state.say_status(f"{mover.text}: the largest weight at vertex {mover.vertex}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spot:
+    """What lies at a pixel.
+
+    Attributes
+    ----------
+    actor : int
+        Index of an actor.
+    joint : int
+        Joint that is drawn there, or near it, or else that moves the surface most; -1 for none.
+    vertex : int
+        Nearest vertex of the surface; -1 for none.
+    """
+
+    actor: int
+    joint: int
+    vertex: int
+
+
+def spot_at(
+    state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
+) -> Spot | None:
+    """Return what lies at a pixel, None for the background; parameters are those of ``vertex_at``.
+
+    Raises
+    ------
+    ViewerError
+        If a figure's shapes cannot be read.
+    """
+    pick = _pick(state, renderer, size, pixel, state.options)
+    found = vertex_at(state, renderer, size, pixel)
+    x, y, width, _ = state.view_rect
+    near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
+    if pick is None or (pick.joint < 0 and near >= 0):
+        return Spot(state.chosen_actor, near, -1) if near >= 0 else None
+    mover = _mover(state, pick) if pick.joint < 0 else None
+    joint = pick.joint if mover is None else mover.joint
+    return Spot(pick.actor, joint, found[1] if found and found[0] == pick.actor else -1)
 
 
 class _Mover(NamedTuple):
@@ -129,7 +177,7 @@ def _pick(
 
 def take_pick(state: AppState, found: Pick, aims: bool) -> None:
     """Choose the actor and joint that were clicked; a double click aims the camera there."""
-    if found.actor != state.chosen_actor:
+    if found.actor != state.chosen_actor or not state.is_actor_selected:
         state.choose_actor(found.actor)
         state.say_status(printable(state.actor.name, 60))
     if found.joint >= 0:

@@ -16,6 +16,9 @@ class Picking:
     wanted : (x, y, aims) or None
         Position of a click, relative to the upper left corner of the view, and whether the camera
         is aimed there.
+    menu_at : (x, y) or None
+        Position of a right click without drag.
     """
 
     wanted: tuple[float, float, bool] | None = None
+    menu_at: tuple[float, float] | None = None

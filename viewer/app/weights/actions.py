@@ -114,7 +114,7 @@ def toggle_weights(state: AppState) -> None:
     """Switch between the weights of the selected joint as colours and normal shading."""
     options = state.options
     if options.shading == "scalar" and options.scalar == "weight":
-        options.shading = "phong"
+        options.shading = "auto"
         state.say_status("Weights off")
         return
     why = no_view(state, "weight")

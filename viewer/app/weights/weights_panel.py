@@ -39,7 +39,7 @@ def draw(state: AppState) -> None:
     shows = options.shading == "scalar"
     if checkbox(state, "Heat map", shows, why) != shows:
         if shows:
-            options.shading = "phong"
+            options.shading = "auto"
         else:
             start_heat_map(state)
     _draw_views(state)

@@ -71,7 +71,7 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         "by number: 1 or 1:pelvis",
     )
     group.add_argument(
-        "--quality",
+        "--video-quality",
         type=number,
         metavar="Q",
         help="quality of .mp4 and .webm: 0 to 100 (default: 75)",
@@ -123,11 +123,13 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
     if arguments.follow is not None and not kind:
         raise ViewerError("--follow: expected a video, contact sheet or numbered pictures")
     _check_onion(arguments, kind)
-    for option in ("speed", "quality"):
-        if getattr(arguments, option) is not None and kind != "video":
+    for option in ("speed", "video-quality"):
+        given = getattr(arguments, option.replace("-", "_"))
+        if given is not None and kind != "video":
             raise ViewerError(f"--{option}: applies to videos only: {', '.join(VIDEOS)}")
-    if arguments.quality is not None and Path(arguments.output).suffix.lower() == ".gif":
-        raise ViewerError("--quality: applies to .mp4 and .webm, not to a GIF")
+    is_gif = Path(arguments.output).suffix.lower() == ".gif"
+    if arguments.video_quality is not None and is_gif:
+        raise ViewerError("--video-quality: applies to .mp4 and .webm, not to a GIF")
     speed = arguments.speed
     if speed is not None and not 1e-3 <= abs(speed) <= 1e3:
         raise ViewerError(f"--speed: expected 0.001 to 1000 or their negatives, found {speed:g}")
@@ -250,7 +252,7 @@ def _sink(
     if request.kind == "video":
         from viewer.media.video import VideoSink
 
-        quality = 75.0 if arguments.quality is None else arguments.quality
+        quality = 75.0 if arguments.video_quality is None else arguments.video_quality
         is_transparent = options.background == "transparent"
         return VideoSink(outputs[0], size, shots.rate, quality, is_transparent)
     from viewer.media.picture_sinks import PictureSink, SheetSink

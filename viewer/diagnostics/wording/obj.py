@@ -24,6 +24,10 @@ MESSAGES = {
     "F002.obj-vt-none": f"f: expected a texture coordinate {_NONE}",
     "F002.obj-vn-none": f"f: expected a normal {_NONE}",
     "F005.obj-texture": "texture without vt lines: drawn untextured",
+    "F006.mtl-color": "{word:text}: expected 1 or 3 numbers {limits:text}, found "
+    "{found:quoted}; ignored",
+    "F006.mtl-number": "{word:text}: expected a number from 0 to 1, found {found:quoted}; ignored",
+    "F007.mtl-statements": "{statements:list8} not drawn",
     "F005.library": "material library {problem}; drawn untextured",
     "F005.library-refused": "material library {name:text} {reason}",
     "F005.mtl-materials": "{n:#material|is|are} not in any library (first: {material:text}): drawn "

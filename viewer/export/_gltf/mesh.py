@@ -8,21 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.export._gltf.document import INDICES, VERTICES, Document, text_of
+from viewer.export._gltf.materials import Color, Materials
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import Influences, influence_sets
-from viewer.media.image import encode_png
-from viewer.rig.arrays import Bytes, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
 
-_PLAIN = (0.62, 0.60, 0.57)  # the viewer's colour of untextured surfaces, linear
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
-_CLAMP, _LINEAR, _MIPMAPS = 33071, 9729, 9987
 _NOT_UNIT = 1e-3  # tolerance of unit length; normals may under- or overflow when squared
-
-Color = tuple[float, float, float]
 
 
 def add_mesh(
@@ -71,6 +67,9 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
         # glTF has the first row of a picture at v = 0, this program at v = 1.
         uvs = mesh.uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
         attributes["TEXCOORD_0"] = document.array(uvs, "VEC2", VERTICES)
+        if mesh.second_uvs is not None:
+            uvs = mesh.second_uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
+            attributes["TEXCOORD_1"] = document.array(uvs, "VEC2", VERTICES)
     return attributes
 
 
@@ -115,10 +114,10 @@ def _primitives(
     shared: dict[str, Any],
     color: Color | None,
 ) -> list[dict[str, Any]]:
+    materials = Materials(document, mesh, color)
     if len(triangles) == 0:
-        return [{**shared, "mode": _POINTS, "material": _plain(document, "plain", color)}]
+        return [{**shared, "mode": _POINTS, "material": materials.plain()}]
     dtype = np.uint16 if n_vertices <= _LONG else np.uint32
-    textures: dict[int, int] = {}
     primitives = []
     for index in np.unique(mesh.material_indices).tolist():
         chosen = triangles[mesh.material_indices == index].astype(dtype).ravel()
@@ -126,46 +125,7 @@ def _primitives(
             {
                 **shared,
                 "indices": document.array(chosen, "SCALAR", INDICES),
-                "material": _material(document, mesh, index, textures, color),
+                "material": materials.add(index),
             }
         )
     return primitives
-
-
-def _material(
-    document: Document, mesh: Mesh, index: int, textures: dict[int, int], color: Color | None
-) -> int:
-    if index < 0:
-        return _plain(document, "plain", color)
-    material = mesh.materials[index]
-    name = material.name or material.texture or f"material{index}"
-    if material.image is None or mesh.uvs is None or len(mesh.uvs) == 0:
-        return _plain(document, name, color)
-    # Materials may share an image.
-    if id(material.image) not in textures:
-        picture = material.texture or name
-        textures[id(material.image)] = _texture(document, material.image, picture)
-    surface = {"baseColorTexture": {"index": textures[id(material.image)]}}
-    return _surface(document, name, surface)
-
-
-def _texture(document: Document, image: Bytes, name: str) -> int:
-    # The viewer ignores alpha too: materials are opaque by default.
-    source = document.picture(encode_png(image), name)
-    if "samplers" not in document.root:
-        wraps = {"wrapS": _CLAMP, "wrapT": _CLAMP}
-        document.add("samplers", {"magFilter": _LINEAR, "minFilter": _MIPMAPS, **wraps})
-    return document.add("textures", {"sampler": 0, "source": source})
-
-
-def _plain(document: Document, name: str, color: Color | None) -> int:
-    return _surface(document, name, {"baseColorFactor": [*(color or _PLAIN), 1.0]})
-
-
-def _surface(document: Document, name: str, surface: dict[str, Any]) -> int:
-    # glTF's default is metallic. Triangles may have either winding, so draw both sides.
-    matte = {**surface, "metallicFactor": 0.0, "roughnessFactor": 0.8}
-    return document.add(
-        "materials",
-        {"name": text_of(name), "pbrMetallicRoughness": matte, "doubleSided": True},
-    )

@@ -1,16 +1,31 @@
-"""Material libraries (``.mtl``) referenced by an ``.obj``: the picture of each material.
+"""Material libraries (``.mtl``) that an ``.obj`` names.
 
 ::
 
-    mtl  = line*
-    line = "newmtl" name | "map_Kd" option* file | anything else
+    mtl   = line*
+    line  = "newmtl" name | color r (g b)? | number x | map option* file | anything else
+    color = "Kd" | "Ke"                     linear; one number stands for three
+    number = "Pr" | "Pm" | "d" | "Tr"       roughness, metallic, opacity, 1 - opacity
+    map   = "map_Kd" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d" | "norm" | "map_Kn"
 
-Colours and other maps are not shown. An option is a word that begins with ``-`` and its values.
+``Pr``, ``Pm`` and ``norm`` are those of the PBR extension (Burley and others, 2013, as Blender and
+tinyobjloader write it). An option is a word that begins with ``-`` and its values: ``-o`` and
+``-s`` place the picture, ``-clamp`` ends it at its edges, ``-bm`` scales a map of normals,
+``-imfchan`` picks a channel. Maps of bumps (heights), specular colours, reflections and the rest of
+the extension are not drawn.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
 from viewer.errors import FormatError
+from viewer.formats._numbers import to_number
+from viewer.formats._obj.map_options import MapOptions, map_options
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._texture import load_image
@@ -19,12 +34,30 @@ from viewer.rig.material import Material, Texture
 
 __all__ = ["read_libraries"]
 
-# Number of values after each option of a map; -o, -s and -t have one to three.
-_OPTIONS = {
-    "-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1,
-    "-imfchan": 1, "-type": 1, "-cc": 1,
-}  # fmt: skip
-_VECTORS = ("-o", "-s", "-t")
+_COLORS = {b"kd": "diffuse", b"ke": "emissive"}
+_NUMBERS = {b"pr": "roughness", b"pm": "metallic", b"d": "opacity", b"tr": "transparency"}
+_MAPS = {
+    b"map_kd": "base_texture",
+    b"map_ke": "emissive_texture",
+    b"map_pr": "roughness_texture",
+    b"map_pm": "metallic_texture",
+    b"map_d": "opacity_texture",
+    b"norm": "normal_texture",
+    b"map_kn": "normal_texture",
+}
+_NOT_DRAWN = (
+    *(b"map_ka", b"map_ks", b"map_ns", b"map_bump", b"bump", b"disp", b"decal", b"refl"),
+    *(b"map_ps", b"ps", b"pc", b"pcr", b"aniso", b"anisor", b"map_pc", b"map_pcr"),
+)
+
+
+@dataclass(slots=True)
+class _Statements:
+    """What one ``newmtl`` states: numbers, and maps with their place in the library."""
+
+    library: Source
+    numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    maps: dict[str, tuple[MapOptions, int]] = field(default_factory=dict)
 
 
 def read_libraries(
@@ -37,33 +70,31 @@ def read_libraries(
     source : Source
         The ``.obj``; warned of libraries, materials and pictures that are missing.
     libraries : list of (bytes, int)
-        Text after each ``mtllib``, and its offset.
+        What follows each ``mtllib``, and where.
     names : list of str
         The materials that faces use.
     """
-    pictures: dict[str, tuple[str, int, Source]] = {}
-    known: set[str] = set()
+    known: dict[str, _Statements] = {}
     for text, offset in libraries:
         for library in _opened(source, text, offset):
-            _read(library, pictures, known)
+            _read(library, known)
     missing = [name for name in names if name not in known]
     if missing and libraries:
         source.warn("F005.mtl-materials", n=len(missing), material=missing[0])
     loaded: dict[str, Bytes | None] = {}
-    materials = []
-    for name in names:
-        if name not in pictures:
-            materials.append(Material(name))
-            continue
-        file, where, library = pictures[name]
+
+    def load(library: Source, file: str, offset: int) -> Bytes | None:
         if file not in loaded:
-            loaded[file] = load_image(library, file, where)
-        materials.append(Material(name, Texture(file, loaded[file])))
-    return tuple(materials)
+            loaded[file] = load_image(library, file, offset)
+        return loaded[file]
+
+    return tuple(
+        _material(name, known[name], load) if name in known else Material(name) for name in names
+    )
 
 
 def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
-    """Return the libraries of one ``mtllib``: one whose name may contain spaces, or several."""
+    """Return the libraries of one ``mtllib``: one whose name may hold blanks, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     names = [whole]
     path = referenced_path(source.path.parent, whole)
@@ -84,39 +115,137 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     return found
 
 
-def _read(library: Source, pictures: dict[str, tuple[str, int, Source]], known: set[str]) -> None:
-    """Record the location of each material's picture."""
-    name = ""
+def _read(library: Source, known: dict[str, _Statements]) -> None:
+    """Record the statements of each material; the first material of a name counts."""
+    now: _Statements | None = None
+    ignored: dict[str, int] = {}
     position = 0
     for line in library.data.replace(b"\r", b"\n").split(b"\n"):
         words = line.split(None, 1)
-        rest = words[1].strip().decode("utf-8", "surrogateescape") if len(words) > 1 else ""
-        if words and words[0] == b"newmtl":
-            name = rest
-            known.add(name)
-        elif words and words[0].lower() == b"map_kd" and name:
-            file = _without_options(rest)
-            if file:
-                pictures.setdefault(name, (file, position, library))
+        word = words[0].lower() if words else b""
+        rest = words[1].strip() if len(words) > 1 else b""
+        if word == b"newmtl":
+            name = rest.decode("utf-8", "surrogateescape")
+            now = None if name in known else _Statements(library)
+            if now is not None:
+                known[name] = now
+        elif now is not None and word in _MAPS:
+            options = map_options(rest.decode("utf-8", "surrogateescape"))
+            if options.file:
+                now.maps.setdefault(_MAPS[word], (options, position))
+        elif now is not None and (word in _COLORS or word in _NUMBERS):
+            _record(now, words[0], rest, position)
+        elif now is not None and word in _NOT_DRAWN:
+            ignored.setdefault(words[0].decode("ascii"), position)
         position += len(line) + 1
+    if ignored:
+        library.warn("F007.mtl-statements", min(ignored.values()), statements=list(ignored))
 
 
-def _without_options(text: str) -> str:
-    """Return the file name after the options of a map; it may contain blanks."""
-    rest = text
-    while rest.startswith("-"):
-        option, _, behind = rest.partition(" ")
-        rest = behind.lstrip()
-        limit = 3 if option in _VECTORS else _OPTIONS.get(option, 0)
-        for _ in range(limit):
-            value, _, behind = rest.partition(" ")
-            if option in _VECTORS and not _is_number(value):
-                break
-            rest = behind.lstrip()
-        if option not in _VECTORS and option not in _OPTIONS:
-            return text  # a file whose name begins with "-"
-    return rest
+def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
+    """Record the numbers of a colour or of one number, or warn that there are none."""
+    lower = word.lower()
+    is_color = lower in _COLORS
+    words = rest.split()
+    if lower == b"d" and words[:1] == [b"-halo"]:
+        words = words[1:]
+    count = 3 if is_color and len(words) > 1 else 1
+    read = [to_number(text) for text in words[:count]]
+    values = [value for value in read if value is not None]
+    most = float("inf") if lower == b"ke" else 1.0
+    if len(values) != count or not all(0.0 <= value <= most for value in values):
+        written = word.decode("ascii")
+        if is_color:
+            limits = "from 0" if lower == b"ke" else "from 0 to 1"
+            now.library.warn("F006.mtl-color", position, word=written, limits=limits, found=rest)
+        else:
+            now.library.warn("F006.mtl-number", position, word=written, found=rest)
+        return
+    name = _COLORS[lower] if is_color else _NUMBERS[lower]
+    now.numbers.setdefault(name, tuple(values * 3 if is_color and count == 1 else values))
 
 
-def _is_number(word: str) -> bool:
-    return word.lstrip("+-").replace(".", "", 1).isdecimal()
+def _material(
+    name: str, stated: _Statements, load: Callable[[Source, str, int], Bytes | None]
+) -> Material:
+    """Return the material of one ``newmtl``."""
+    textures = {
+        kind: _texture(options, load(stated.library, options.file, offset))
+        for kind, (options, offset) in stated.maps.items()
+    }
+    numbers = stated.numbers
+    cut = textures.pop("opacity_texture", None)
+    if cut is not None and cut.image is not None:
+        textures["base_texture"] = _with_opacity(textures.get("base_texture"), cut)
+    parts: dict[str, Any] = dict(textures)
+    for kind in ("roughness", "metallic"):
+        if kind in numbers or f"{kind}_texture" in textures:
+            # A map without a factor counts in full.
+            parts[kind] = numbers.get(kind, (1.0,))[0]
+    if "normal_texture" in stated.maps:
+        parts["normal_scale"] = stated.maps["normal_texture"][0].strength
+    opacity = _opacity(numbers)
+    return Material(
+        name,
+        base_color=_base_color(numbers.get("diffuse"), opacity, "base_texture" in textures),
+        emissive=_emissive(numbers.get("emissive"), "emissive_texture" in textures),
+        alpha_mode="blend" if opacity < 1.0 or cut is not None else "opaque",
+        is_physical="roughness" in parts or "metallic" in parts,
+        **parts,
+    )
+
+
+def _base_color(
+    color: tuple[float, ...] | None, opacity: float, has_texture: bool
+) -> tuple[float, float, float, float] | None:
+    """Return Kd and opacity; None if neither has an effect."""
+    if has_texture and color == (0.0, 0.0, 0.0):
+        # Many exporters write a black Kd beside a picture, which they mean to be seen.
+        color = None
+    if (color is None or (has_texture and min(color) == 1.0)) and opacity == 1.0:
+        return None
+    red, green, blue = color or (1.0, 1.0, 1.0)
+    return red, green, blue, opacity
+
+
+def _emissive(color: tuple[float, ...] | None, has_texture: bool) -> tuple[float, float, float]:
+    """Return Ke; white for a map without it."""
+    if color is None or (has_texture and max(color) == 0.0):
+        color = (1.0, 1.0, 1.0) if has_texture else (0.0, 0.0, 0.0)
+    return color[0], color[1], color[2]
+
+
+def _opacity(numbers: dict[str, tuple[float, ...]]) -> float:
+    """Return d, or 1 - Tr without it."""
+    if "opacity" in numbers:
+        return numbers["opacity"][0]
+    # Some exporters take Tr for d: with Tr 1 a visible surface is meant.
+    return 1.0 - numbers.get("transparency", (0.0,))[0] or 1.0
+
+
+def _texture(options: MapOptions, image: Bytes | None) -> Texture:
+    """Return the texture of a map."""
+    wrap = "clamp" if options.clamps else "repeat"
+    return Texture(
+        options.file,
+        image,
+        channel=options.channel,
+        transform=np.column_stack([np.diag(options.scale), options.offset]),
+        wrap=(wrap, wrap),
+    )
+
+
+def _with_opacity(base: Texture | None, cut: Texture) -> Texture:
+    """Return the base texture with the opacity of a ``map_d``."""
+    assert cut.image is not None  # the caller looked
+    opacity = cut.image[..., cut.channel]
+    if cut.image[..., 3].min() < 255:
+        opacity = cut.image[..., 3]  # a picture with alpha: that is what is meant
+    if base is None or base.image is None:
+        white = np.full((*opacity.shape, 3), 255, np.uint8)
+        return replace(cut, image=np.dstack([white, opacity]), channel=0)
+    rows, columns = (
+        np.arange(wanted) * have // wanted
+        for wanted, have in zip(base.image.shape[:2], opacity.shape, strict=True)
+    )
+    return replace(base, image=np.dstack([base.image[..., :3], opacity[np.ix_(rows, columns)]]))

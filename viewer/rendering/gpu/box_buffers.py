@@ -67,11 +67,14 @@ class BoxBuffers:
             self.world = keep(matrix_texture(context, self.count))
         self._arrays = self._owner.keep(VertexArrays(context))
 
-    def move(self, matrices: Floats) -> None:
-        """Upload the boxes' matrices, (N, 4, 4) box to figure space; modified in place."""
+    def move(self, matrices: Floats, hides: bool = True) -> None:
+        """Upload the boxes' matrices, (N, 4, 4) box to figure space; modified in place.
+
+        Of many coincident boxes only one is drawn if ``hides``.
+        """
         self.center = bounding_box(matrices[:, :3, 3]).mean(axis=0)
         matrices[:, :3, 3] -= self.center
-        if self.count > _MANY:
+        if hides and self.count > _MANY:
             matrices[self._hidden(matrices)] = 0.0
         write_matrices(self.world, matrices)
 

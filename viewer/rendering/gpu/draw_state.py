@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import moderngl
 
-__all__ = ["opacities", "without_colors", "without_depth_test", "without_depth_writes"]
+__all__ = ["opacities", "sides", "without_colors", "without_depth_test", "without_depth_writes"]
 
 
 @contextmanager
@@ -44,6 +44,34 @@ def without_depth_test(context: moderngl.Context) -> Iterator[None]:
         yield
     finally:
         context.enable(moderngl.DEPTH_TEST)
+
+
+@contextmanager
+def sides(
+    context: moderngl.Context, culled: bool, double_sided: bool, blended: bool
+) -> Iterator[tuple[str, ...]]:
+    """Cull faces for some draws: yield the culled side of each.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    culled : bool
+        Whether back faces are left out of all surfaces.
+    double_sided : bool
+        Whether this surface has two sides.
+    blended : bool
+        Whether it is translucent: of two sides the farther one is drawn first.
+    """
+    both = double_sided and not culled
+    if both and not blended:
+        yield ("back",)
+        return
+    context.enable(moderngl.CULL_FACE)
+    try:
+        yield ("front", "back") if both else ("back",)
+    finally:
+        context.disable(moderngl.CULL_FACE)
 
 
 def opacities(context: moderngl.Context, hidden: float | None) -> Iterator[float]:

@@ -13,6 +13,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rendering.gpu.surfaces import PLAIN, Surface
 from viewer.rendering.gpu.upload import buffer
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -24,11 +25,11 @@ _CURVE_BITS = 10  # per axis
 
 @dataclass(frozen=True, slots=True)
 class MeshRun:
-    """Consecutive triangles with one material: first index, number of indices, texture."""
+    """Consecutive triangles with one material: first index, number of indices, surface."""
 
     first: int
     count: int
-    texture: moderngl.Texture | None
+    surface: Surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ def index_set(
     context: moderngl.Context,
     triangles: Ints,
     materials: Ints,
-    textures: list[moderngl.Texture | None],
+    surfaces: list[Surface],
     positions: Floats | None = None,
 ) -> IndexSet:
     """Upload triangles, sorted by material and along a space-filling curve within each.
@@ -71,9 +72,9 @@ def index_set(
     triangles : (T, 3)
         Indices of split vertices.
     materials : (T,)
-        Index into ``textures`` of each triangle, -1 for none.
-    textures : list
-        Texture of each material.
+        Index into ``surfaces`` of each triangle, -1 for none.
+    surfaces : list of Surface
+        Surface of each material.
     positions : (R, 3), optional
         Rest positions of the split vertices; without them triangles keep their order.
     """
@@ -81,8 +82,8 @@ def index_set(
     runs = []
     for first, last in zip([0, *edges], [*edges, len(materials)], strict=True):
         index = int(materials[first]) if len(materials) else -1
-        texture = None if index < 0 else textures[index]
-        runs.append(MeshRun(3 * int(first), 3 * int(last - first), texture))
+        surface = PLAIN if index < 0 else surfaces[index]
+        runs.append(MeshRun(3 * int(first), 3 * int(last - first), surface))
     order: Ints = np.arange(len(triangles), dtype=np.int32)
     if positions is not None and len(triangles):
         run = np.zeros(len(triangles), dtype=np.int64)

@@ -10,7 +10,8 @@ import numpy as np
 from viewer.rendering.gpu.index_sets import IndexSet, index_set, kept_triangles
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
-from viewer.rendering.gpu.upload import buffer, float32, offset_texture, picture_texture
+from viewer.rendering.gpu.surfaces import needs_materials, upload_surfaces
+from viewer.rendering.gpu.upload import buffer, float32, offset_texture
 from viewer.rendering.part_colors import part_colors
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -44,6 +45,10 @@ class MeshBuffers:
         Vertex of the figure for each split vertex.
     copies : (V,) int32
         One split vertex for each vertex of the figure.
+    surfaces : list of Surface
+        Of each material.
+    has_materials : bool
+        Whether these have more than a picture each.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
@@ -70,12 +75,13 @@ class MeshBuffers:
         self.uvs: moderngl.Buffer | None = None
         if mesh.uvs is not None and len(mesh.uvs):
             self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
-        self._textures = [
-            None
-            if material.image is None or self.uvs is None
-            else keep(picture_texture(self.context, material.image, notes))
-            for material in mesh.materials
-        ]
+        self.second_uvs: moderngl.Buffer | None = None
+        if mesh.second_uvs is not None and self.uvs is not None:
+            self.second_uvs = keep(buffer(self.context, mesh.second_uvs[uv_indices], "f4"))
+        self.has_materials = needs_materials(mesh.materials)
+        self.surfaces = upload_surfaces(
+            self.context, mesh.materials, self.uvs is not None, notes, self._owner
+        )
         self.index_set(False, ())
         self.skin(Skinning())
 
@@ -105,7 +111,7 @@ class MeshBuffers:
             of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
         kept = kept_triangles(self.figure, hidden, of_figure)
         rest = None if as_listed else mesh.positions[self.sources]
-        made = index_set(self.context, split[kept], materials[kept], self._textures, rest)
+        made = index_set(self.context, split[kept], materials[kept], self.surfaces, rest)
         self._owner.keep(made.indices)
         return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
@@ -118,6 +124,16 @@ class MeshBuffers:
             buffers = SkinBuffers(self.context, used, self.sources)
             self._skins[key] = self._owner.keep(buffers)
         return self._skins[key]
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether a material is described by metallic and roughness."""
+        return any(surface.is_physical for surface in self.surfaces)
+
+    @property
+    def is_blended(self) -> bool:
+        """Whether a material is translucent."""
+        return any(surface.is_blended for surface in self.surfaces)
 
     @property
     def colors(self) -> moderngl.Buffer | None:

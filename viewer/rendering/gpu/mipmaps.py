@@ -19,12 +19,13 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["add_mipmaps", "halved_pictures"]
 
-_SRGB8_ALPHA8, _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x8C43, 0x1908, 0x1401, 0x0DE1
+_SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
+_RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x1908, 0x1401, 0x0DE1
 _STEPS = 1 << 14  # steps of linear light; the sum of four values still fits 16 bits
 
 
-def add_mipmaps(texture: moderngl.Texture, pixels: Bytes) -> None:
-    """Add all smaller levels to an sRGB texture.
+def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = False) -> None:
+    """Add all smaller levels to a texture.
 
     Parameters
     ----------
@@ -32,32 +33,37 @@ def add_mipmaps(texture: moderngl.Texture, pixels: Bytes) -> None:
         RGBA; its context must be current.
     pixels : (H, W, 4) uint8
         Its contents, first row at v = 0.
+    is_linear : bool
+        Whether they are numbers, not sRGB.
     """
     upload = _upload_function() if is_software(texture.ctx) else None
     if upload is None:
         texture.build_mipmaps()
         return
     texture.use()
-    for level, picture in enumerate(halved_pictures(pixels), 1):
+    for level, picture in enumerate(halved_pictures(pixels, is_linear), 1):
         height, width = picture.shape[:2]
-        size = (level, _SRGB8_ALPHA8, width, height, 0)
+        stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
+        size = (level, stored_as, width, height, 0)
         upload(_TEXTURE_2D, *size, _RGBA, _UNSIGNED_BYTE, picture.ctypes.data)
 
 
-def halved_pictures(pixels: Bytes) -> list[Bytes]:
+def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
     """Return the mipmap levels from half the size down to one pixel, averaged in linear light.
 
     Parameters
     ----------
     pixels : (H, W, 4) uint8
-        sRGB; alpha is treated like a colour, since it is not drawn.
+        sRGB unless ``is_linear``; alpha is treated like a colour.
+    is_linear : bool
+        Whether the pixels are numbers.
 
     Returns
     -------
     list of (H >> n, W >> n, 4) uint8
         No side is shorter than 1; an odd last row or column is dropped.
     """
-    decode, encode = _tables()
+    decode, encode = _tables(is_linear)
     linear = decode[pixels]
     pictures = []
     while max(linear.shape[:2]) > 1:
@@ -73,10 +79,12 @@ def halved_pictures(pixels: Bytes) -> list[Bytes]:
     return pictures
 
 
-def _tables() -> tuple[np.ndarray, Bytes]:
-    """Return the lookup tables from sRGB bytes to steps of linear light, and back."""
-    decode = np.rint(decode_srgb(np.arange(256) / 255.0) * (_STEPS - 1)).astype(np.uint16)
-    encoded = encode_srgb(np.arange(_STEPS) / (_STEPS - 1))
+def _tables(is_linear: bool) -> tuple[np.ndarray, Bytes]:
+    """Return the lookup tables from bytes to steps of linear light, and back."""
+    values, steps = np.arange(256) / 255.0, np.arange(_STEPS) / (_STEPS - 1)
+    decoded = values if is_linear else decode_srgb(values)
+    encoded = steps if is_linear else encode_srgb(steps)
+    decode = np.rint(decoded * (_STEPS - 1)).astype(np.uint16)
     return decode, np.rint(255.0 * encoded).astype(np.uint8)
 
 

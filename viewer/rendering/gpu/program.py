@@ -11,10 +11,12 @@ from viewer.errors import RenderError
 from viewer.interrupts import deferred
 from viewer.resources import resource
 
-__all__ = ["SHADING", "Programs", "set_uniforms"]
+__all__ = ["SHADING", "SHADING_CHOICES", "Programs", "set_uniforms"]
 
 SHADING = {
     "phong": "Blinn-Phong, two lights",
+    "pbr": "Metallic-roughness, studio",
+    "matcap": "Matcap (lit sphere)",
     "normals": "Normals as colours",
     "checker": "UV checker",
     "parts": "Body parts as colours",
@@ -22,8 +24,12 @@ SHADING = {
 }
 """Chunks in ``shaders/shade``, with labels for menus."""
 
+SHADING_CHOICES = {"auto": "Blinn-Phong, or by material", **SHADING}
+"""Shadings that can be chosen, with labels for menus."""
+
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
+_INCLUDES = re.compile(r"^#pragma include (\w+)[ \t]*$", re.MULTILINE)
 _CHUNK_MARK = "#pragma chunk"
 _LINES_PER_FILE = 10_000
 _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
@@ -44,7 +50,8 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
             uniform = program[name]
             assert isinstance(uniform, moderngl.Uniform)  # by the prefix u_
             if isinstance(value, bytes):
-                uniform.write(value)
+                # Compilers drop the end of an array that is unused.
+                uniform.write(value[: 4 * uniform.dimension * uniform.array_length])
             else:
                 uniform.value = value
 
@@ -70,6 +77,7 @@ class Programs:
         skin: str = "",
         geometry: str = "",
         affine: bool = False,
+        materials: bool = False,
         effects: tuple[str, ...] = (),
     ) -> moderngl.Program:
         """Return the program of ``name.vert`` and a fragment shader, each with its chunk.
@@ -88,6 +96,8 @@ class Programs:
             Name of the geometry shader between the two, if any.
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
+        materials : bool
+            Surfaces have more than a picture each, see ``include/surface.glsl``.
         effects : tuple of str
             Macros of the fragment shader, see ``viewer.rendering.effects``.
 
@@ -96,7 +106,8 @@ class Programs:
         RenderError
             If the driver rejects a shader; the message names the file and its line.
         """
-        return self._get((name, skin, fragment or name, chunk, geometry, affine, *effects), ())
+        files = name, skin, fragment or name, chunk, geometry
+        return self._get((*files, affine, materials, *effects), ())
 
     def feedback(
         self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
@@ -105,16 +116,19 @@ class Programs:
 
         The chunk is a skinning method; ``affine`` tells whether joints may scale or shear.
         """
-        return self._get((name, chunk, "", "", "", affine), outputs)
+        return self._get((name, chunk, "", "", "", affine, False), outputs)
 
     def _get(self, key: tuple[str | bool, ...], outputs: tuple[str, ...]) -> moderngl.Program:
         if key not in self._cache:
             name, skin, fragment_name, chunk, middle = (str(part) for part in key[:5])
-            affine, effects = key[5], tuple(str(part) for part in key[6:])
+            affine, materials, effects = key[5], key[6], tuple(str(part) for part in key[7:])
             files: list[str] = []
-            vertex = _compose(f"{name}.vert", skin, files, ("AFFINE_PALETTE",) if affine else ())
+            common = ("MATERIALS",) if materials else ()
+            defines = (*common, "AFFINE_PALETTE") if affine else common
+            vertex = _compose(f"{name}.vert", skin, files, defines)
+            defines = *common, *effects
             fragment = (
-                _compose(f"{fragment_name}.frag", chunk, files, effects) if fragment_name else None
+                _compose(f"{fragment_name}.frag", chunk, files, defines) if fragment_name else None
             )
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
@@ -193,13 +207,14 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
     """Return a chunk's text after the chunks it needs, whose functions get a suffix: their name."""
     inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     needs = _NEEDS.match(inner)
-    parts = []
+    parts = [_included(name, files) for name in _INCLUDES.findall(inner)]
     for name in needs[1].split() if needs else []:
         parts.append(f"#define {folder} {folder}_{name}\n")
         parts.append(_chunk(folder, name, files))
         parts.append(f"#undef {folder}\n")
     if needs:
         inner = f"\n{inner[needs.end() :]}"  # keep the line, so that line numbers stay correct
+    inner = _INCLUDES.sub("", inner)
     parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
     files.append(f"{folder}/{chunk}.glsl")
     return "".join(parts)

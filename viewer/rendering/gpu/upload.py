@@ -39,7 +39,7 @@ _MATRICES_PER_ROW = 256  # three texels each
 _PAIRS_PER_ROW = 1024
 _OFFSETS_PER_ROW = 4096
 _RIGID_PER_ROW = 128  # five texels each
-_SRGB8_ALPHA8 = 0x8C43
+_SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 
 
 def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffer:
@@ -149,10 +149,13 @@ def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
     return _data_texture(context, size, 3, f"{count} offsets")
 
 
-def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) -> moderngl.Texture:
-    """Return a mip-mapped sRGB texture, clamped at its edges, v = 0 at the picture's last row.
+def picture_texture(
+    context: moderngl.Context, pixels: Bytes, notes: list[str], is_linear: bool = False
+) -> moderngl.Texture:
+    """Return a mip-mapped texture, clamped at its edges, v = 0 at the picture's last row.
 
-    A picture above the driver's limit is reduced by an integer factor, with a message in ``notes``.
+    Pixels are sRGB unless ``is_linear``. A picture above the driver's limit is reduced by an
+    integer factor, with a message in ``notes``.
     """
     limit = context.info["GL_MAX_TEXTURE_SIZE"]
     factor = -(-max(pixels.shape[:2]) // limit)
@@ -164,9 +167,10 @@ def picture_texture(context: moderngl.Context, pixels: Bytes, notes: list[str]) 
         pixels = pixels[::factor, ::factor]
     flipped = np.ascontiguousarray(pixels[::-1])
     size = (pixels.shape[1], pixels.shape[0])
-    texture = context.texture(size, 4, flipped.tobytes(), internal_format=_SRGB8_ALPHA8)
+    stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
+    texture = context.texture(size, 4, flipped.tobytes(), internal_format=stored_as)
     texture.repeat_x = texture.repeat_y = False
-    add_mipmaps(texture, flipped)
+    add_mipmaps(texture, flipped, is_linear)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
         texture.anisotropy = 8.0  # doubles the drawing time in software

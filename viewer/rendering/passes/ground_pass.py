@@ -11,6 +11,7 @@ from viewer.errors import ViewerError
 from viewer.rendering.gpu.draw_state import without_depth_test, without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import buffer
+from viewer.rendering.options import BACKGROUNDS
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import box_size
@@ -18,6 +19,7 @@ from viewer.rig.mesh import box_size
 __all__ = ["GroundPass", "grid_step", "parse_color"]
 
 _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
+_NAMED = {"gradient": (_BOTTOM, _TOP), "white": ((1.0, 1.0, 1.0),) * 2}
 _LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
 _EXTENT = 6.0  # half the side length of the grid, in figure sizes
@@ -48,9 +50,8 @@ def parse_color(text: str) -> tuple[float, float, float]:
     """
     digits = text.removeprefix("#")
     if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
-        raise ViewerError(
-            f'background: expected "gradient", "transparent" or "#rrggbb", found "{text}"'
-        )
+        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
+        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
     red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
     return red, green, blue
 
@@ -77,9 +78,7 @@ class GroundPass:
         if background == "transparent":
             return
         program = self.programs.drawing("background")
-        bottom, top = (
-            (_BOTTOM, _TOP) if background == "gradient" else (parse_color(background),) * 2
-        )
+        bottom, top = _NAMED.get(background) or (parse_color(background),) * 2
         program["u_bottom"], program["u_top"] = bottom, top
         if self._background is None:
             self._background = self.context.vertex_array(program, [])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from viewer.rendering.effects import FILTER_RADIUS, SHADOW_UNIT, Shadow
+from viewer.rendering.effects import SHADOW_UNIT, Shadow
 from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
@@ -66,7 +66,7 @@ class GroundShadowPass:
         growth = depths[1:] - depths[0]
         values = {
             "u_shadow_map": SHADOW_UNIT,
-            "u_shadow_radius": FILTER_RADIUS / shadow.texture.width,
+            "u_shadow_filter": shadow.filter(is_ground=True),
             "u_depth": (float(depths[0]), *growth.tolist()),
             "u_opacity": _OPACITY * fade * shadow.strength,
         }

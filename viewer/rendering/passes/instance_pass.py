@@ -9,7 +9,7 @@ import moderngl
 
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.mesh_pass import draw_runs, set_surface
+from viewer.rendering.passes.mesh_pass import draw_runs, set_surface, shading_of
 from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
 
@@ -59,6 +59,7 @@ def draw_instances(
     actors: Sequence[Actor],
     view: View,
     options: DisplayOptions,
+    blended: bool = False,
 ) -> None:
     """Draw the surfaces of actors that share a mesh.
 
@@ -74,13 +75,16 @@ def draw_instances(
         The camera's matrices.
     options : DisplayOptions
         Shading and lights.
+    blended : bool
+        Whether to draw the blended triangles instead of the opaque ones.
     """
     program = programs.drawing(
         "instance",
-        options.shading,
+        shading_of(instances.mesh, options),
         "mesh",
         skin=instances.method,
         affine=instances.is_affine,
+        materials=instances.mesh.has_materials,
         effects=view.effects.defines,
     )
     instances.place(actors, view)
@@ -88,9 +92,8 @@ def draw_instances(
     set_lights(program, view, options.lights)
     set_surface(program, instances.mesh, options)
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
-    draw_runs(
-        instances.array(program, indices), indices, options.texture, instances=instances.count
-    )
+    array = instances.array(program, indices)
+    draw_runs(array, indices, options, instances.count, blended)
 
 
 def draw_instance_shapes(

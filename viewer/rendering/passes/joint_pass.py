@@ -1,8 +1,9 @@
-"""Pass that draws skeletons: one box per joint, as instances of a cube."""
+"""Pass that draws skeletons: boxes, octahedra, sticks or axes, as instances."""
 
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -11,6 +12,7 @@ from viewer.rendering.gpu.box_buffers import BoxBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.passes.bone_style import bone_style, skeleton_opacity
 from viewer.rendering.passes.see_through import draw_nearest
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
@@ -22,7 +24,10 @@ from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["JointPass", "SkeletonBuffers", "draw_boxes"]
+if TYPE_CHECKING:
+    from viewer.rendering.gpu.bone_buffers import BoneBuffers
+
+__all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
 _CUBE_SIZE = 0.015  # of the skeleton's size, for a skeleton without boxes
@@ -31,41 +36,65 @@ _CUBE_VERTICES = 36
 
 
 class SkeletonBuffers:
-    """Boxes of one figure's joints, moved by one actor's pose."""
+    """Shapes of one figure's joints, moved by one actor's pose."""
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
         skeleton = figure.require_skeleton()
-        self.figure = figure
+        self.context, self.figure = context, figure
         self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton))
-        self._key: NumberKey | None = None
+        self._bones: dict[str, BoneBuffers] = {}
+        self._key: tuple[NumberKey, bool] | None = None
 
-    def is_current(self, pose: Pose) -> bool:
+    def style(self, options: DisplayOptions) -> str:
+        """Return how the skeleton is drawn, as ``bone_style``."""
+        return bone_style(self.figure.require_skeleton(), options)
+
+    def opacity(self, options: DisplayOptions) -> float:
+        """Return the opacity of the skeleton over a skin."""
+        return skeleton_opacity(self.figure.require_skeleton(), options)
+
+    def bones(self, style: str) -> BoneBuffers:
+        """Return the shapes of a style other than boxes, made on first use."""
+        if style not in self._bones:
+            from viewer.rendering.gpu.bone_buffers import BoneBuffers
+
+            skeleton = self.figure.require_skeleton()
+            self._bones[style] = BoneBuffers(self.context, skeleton, style)
+        return self._bones[style]
+
+    def is_current(self, pose: Pose, options: DisplayOptions) -> bool:
         """Return whether the uploaded joint matrices belong to a pose."""
-        return self._key == pose.skinning_key
+        return self._key == (pose.skinning_key, self.style(options) == "boxes")
 
-    def update(self, pose: Pose) -> None:
+    def update(self, pose: Pose, options: DisplayOptions) -> None:
         """Upload the joints' matrices if the pose changed.
 
         Parameters
         ----------
         pose : Pose
             DOFs in lengths and radians.
+        options : DisplayOptions
+            Style of the skeleton.
         """
-        key = pose.skinning_key
-        if key == self._key:
+        if self.is_current(pose, options):
             return
         skeleton = shaped(self.figure, pose.shape_weights).skeleton
         assert skeleton is not None  # applying a shape keeps the skeleton
-        self.boxes.move(posed_skeleton(skeleton, pose).world.copy())
-        self._key = key
+        are_boxes = self.style(options) == "boxes"
+        # Bones need the matrices of all joints, as they reach from one to another.
+        self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)
+        self._key = pose.skinning_key, are_boxes
 
     def release(self) -> None:
         """Free every buffer."""
         self.boxes.release()
+        for bones in self._bones.values():
+            bones.release()
+        self._bones.clear()
 
 
 class JointPass:
-    """Draws skeletons as boxes.
+    """Draws skeletons.
 
     Parameters
     ----------
@@ -90,7 +119,7 @@ class JointPass:
         color: Color | None = None,
         overlays: bool = False,
     ) -> None:
-        """Draw one box per joint.
+        """Draw a skeleton.
 
         Parameters
         ----------
@@ -101,25 +130,26 @@ class JointPass:
         view : View
             The camera's matrices.
         options : DisplayOptions
-            Lights.
+            Style and lights.
         selected : int
             The joint to highlight, -1 for none.
         opacity : float
-            Below 1 the boxes are drawn as one translucent layer.
+            Below 1 the skeleton is one translucent layer.
         color : (r, g, b), optional
-            Colour of all boxes, linear; by default each joint has its own colour.
+            Of all joints, linear; a colour for each joint if omitted.
         overlays : bool
-            Draw over everything else: boxes often enclose the skin, which would hide them.
+            Draw a translucent skeleton over everything drawn before: boxes often enclose the skin,
+            which would hide them.
         """
         overlays = overlays and opacity < 1.0
         view = in_front(view) if overlays else view
-        program = self.programs.drawing(
-            "joint", "phong", fragment="mesh", effects=view.effects.defines
+        program = joint_program(
+            self.programs, skeleton, options, "phong", "mesh", view.effects.defines
         )
         how = placement, view, options, selected, opacity, color
-        draw = partial(draw_boxes, program, skeleton.boxes, *how)
+        draw = partial(draw_joints, program, skeleton, *how)
         if opacity < 1.0:
-            # Draw only the nearest surface, so that other boxes do not show through.
+            # Only the nearest parts count: the others would show through them.
             draw_nearest(self.context, draw)
         else:
             draw()
@@ -129,17 +159,67 @@ class JointPass:
         self.cube.release()
 
 
-def draw_boxes(
+def joint_program(
+    programs: Programs,
+    skeleton: SkeletonBuffers,
+    options: DisplayOptions,
+    chunk: str = "phong",
+    fragment: str = "mesh",
+    effects: tuple[str, ...] = (),
+) -> moderngl.Program:
+    """Return the program that draws a skeleton in its style; for ``draw_joints``."""
+    name = "joint" if skeleton.style(options) == "boxes" else "bone"
+    return programs.drawing(name, chunk, fragment=fragment, effects=effects)
+
+
+def draw_joints(
     program: moderngl.Program,
-    boxes: BoxBuffers,
+    skeleton: SkeletonBuffers,
     placement: Floats,
     view: View,
     options: DisplayOptions,
     selected: int = -1,
     opacity: float = 1.0,
     color: Color | None = None,
+    only: int = -1,
 ) -> None:
-    """Draw boxes whose matrices are already uploaded."""
+    """Draw a skeleton in its style; ``only`` leaves out all but one joint."""
+    style, boxes = skeleton.style(options), skeleton.boxes
+    _set_up(program, boxes, placement, view, options, selected, opacity, color)
+    set_uniforms(program, {"u_only": only})
+    if style == "boxes":
+        _draw_instances(program, boxes)
+    else:
+        set_uniforms(program, {"u_height": skeleton.context.fbo.viewport[3]})
+        skeleton.bones(style).draw(program)
+
+
+def draw_boxes(
+    program: moderngl.Program,
+    boxes: BoxBuffers,
+    placement: Floats,
+    view: View,
+    options: DisplayOptions,
+    color: Color | None = None,
+    opacity: float = 1.0,
+) -> None:
+    """Draw boxes that were moved to where they belong."""
+    _set_up(program, boxes, placement, view, options, -1, opacity, color)
+    set_uniforms(program, {"u_only": -1})
+    _draw_instances(program, boxes)
+
+
+def _set_up(
+    program: moderngl.Program,
+    boxes: BoxBuffers,
+    placement: Floats,
+    view: View,
+    options: DisplayOptions,
+    selected: int,
+    opacity: float,
+    color: Color | None,
+) -> None:
+    """Set matrices, lights and colours."""
     set_model(program, view, placement, boxes.center)
     set_lights(program, view, options.lights)
     values = {
@@ -154,6 +234,9 @@ def draw_boxes(
     }
     set_uniforms(program, values)
     boxes.world.use(_WORLD_UNIT)
+
+
+def _draw_instances(program: moderngl.Program, boxes: BoxBuffers) -> None:
     array = boxes.array(program)
     array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=boxes.count)
 

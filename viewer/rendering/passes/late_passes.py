@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -9,19 +10,37 @@ import moderngl
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import JointPass
-from viewer.rendering.passes.mesh_pass import MeshPass
+from viewer.rendering.passes.mesh_pass import MeshPass, shading_of
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.accumulation import Accumulation
+    from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+    from viewer.rendering.gpu.studio import Matcaps, Studio
     from viewer.rendering.passes.annotation_pass import AnnotationPass
+    from viewer.rendering.passes.backdrop_pass import BackdropPass
     from viewer.rendering.passes.camera_image_pass import CameraImagePass
     from viewer.rendering.passes.ghost_pass import GhostPass
     from viewer.rendering.passes.keypoint_pass import KeypointPass
     from viewer.rendering.passes.legend_pass import LegendPass
     from viewer.rendering.passes.motion_path_pass import MotionPathPass
+    from viewer.rendering.passes.outline_pass import OutlinePass
     from viewer.rendering.passes.point_pass import PointPass
     from viewer.rendering.picking import PickPass
+
+    _Made = (
+        PointPass
+        | PickPass
+        | LegendPass
+        | AnnotationPass
+        | GhostPass
+        | BackdropPass
+        | Studio
+        | Matcaps
+        | OutlinePass
+        | CameraImagePass
+    )
 
 __all__ = ["LatePasses"]
 
@@ -52,9 +71,7 @@ class LatePasses:
         self._context, self._programs, self._buffers = context, programs, buffers
         self._mesh_pass, self._joint_pass = mesh_pass, joint_pass
         self._sum: Accumulation | None = None
-        self._made: list[
-            PointPass | PickPass | LegendPass | AnnotationPass | GhostPass | CameraImagePass
-        ] = []
+        self._made: list[_Made] = []
 
     @cached_property
     def keypoint_pass(self) -> KeypointPass:
@@ -124,6 +141,50 @@ class LatePasses:
         images = CameraImagePass(self._context, self._programs)
         self._made.append(images)
         return images
+
+    @cached_property
+    def studio(self) -> Studio:
+        """Light of metallic-roughness surfaces."""
+        from viewer.rendering.gpu.studio import Studio
+
+        studio = Studio(self._context)
+        self._made.append(studio)
+        return studio
+
+    @cached_property
+    def matcaps(self) -> Matcaps:
+        """Pictures of lit spheres."""
+        from viewer.rendering.gpu.studio import Matcaps
+
+        matcaps = Matcaps(self._context)
+        self._made.append(matcaps)
+        return matcaps
+
+    @cached_property
+    def backdrop_pass(self) -> BackdropPass:
+        """Draws the studio behind the scene."""
+        from viewer.rendering.passes.backdrop_pass import BackdropPass
+
+        backdrop = BackdropPass(self._context, self._programs, self.studio)
+        self._made.append(backdrop)
+        return backdrop
+
+    def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
+        """Bind what the shading of these meshes needs beside their own textures."""
+        if options.shading == "matcap":
+            self.matcaps.use(options.matcap)
+        elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):
+            self.studio.use()
+
+    @cached_property
+    def outline_pass(self) -> OutlinePass:
+        """Draws outlines of what is selected or hovered."""
+        from viewer.rendering.passes.outline_pass import OutlinePass, OutlineTools
+
+        tools = OutlineTools(self._programs, self._mesh_pass, self.point_pass, self._buffers)
+        outlines = OutlinePass(self._context, tools)
+        self._made.append(outlines)
+        return outlines
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
         """Return the sum of passes of a picture of this size."""

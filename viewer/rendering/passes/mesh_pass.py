@@ -6,10 +6,13 @@ from typing import Any
 
 import moderngl
 
+from viewer.rendering.gpu.draw_state import sides
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
+from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.see_through import surface_opacity
@@ -18,7 +21,7 @@ from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 
-__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface"]
+__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface", "shading_of"]
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""
@@ -26,8 +29,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
 _NORMAL_LENGTH = 0.02  # of the figure's size
-_USUAL = DisplayOptions().shading
-_TEXTURE_UNIT, _COLORMAP_UNIT = 5, 6  # lower units belong to the skinning shader
+_COLORMAP_UNIT = 6
 
 
 class MeshPass:
@@ -52,9 +54,10 @@ class MeshPass:
         view: View,
         options: DisplayOptions,
         color: Color | None = None,
+        blended: bool = False,
         opacity: float = 1.0,
     ) -> None:
-        """Draw the surface.
+        """Draw the surface: its opaque or its blended triangles.
 
         Parameters
         ----------
@@ -74,7 +77,11 @@ class MeshPass:
         look = mesh.scalars.look if options.shading == "scalar" else None
         corners = "corners" if look is not None else ""
         program = self.programs.drawing(
-            "mesh", _shading(mesh, options), geometry=corners, effects=view.effects.defines
+            "mesh",
+            "scalar" if look is not None else shading_of(mesh.mesh, options),
+            geometry=corners,
+            materials=look is None and mesh.mesh.has_materials,
+            effects=view.effects.defines,
         )
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
@@ -88,7 +95,7 @@ class MeshPass:
             set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        draw_runs(self.array(mesh, program, indices), indices, options.texture)
+        draw_runs(self.array(mesh, program, indices), indices, options, blended=blended)
 
     def draw_shape(
         self,
@@ -162,6 +169,7 @@ class MeshPass:
                 found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
             for values, layout, name in (
                 (mesh.mesh.uvs, "2f4", "in_uv"),
+                (mesh.mesh.second_uvs, "2f4", "in_second_uv"),
                 (mesh.mesh.colors, "3f4", "in_color"),
                 (mesh.scalars.values, "f4", "in_scalar"),
             ):
@@ -183,11 +191,14 @@ class MeshPass:
         self._arrays.keep_only([])
 
 
-def _shading(mesh: PosedMesh, options: DisplayOptions) -> str:
-    """Return the shading of a mesh: the default one if it lacks the scalar quantity."""
-    if options.shading == "scalar" and mesh.scalars.look is None:
-        return _USUAL
-    return options.shading
+def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
+    """Return the shading of a mesh, a key of ``SHADING``.
+
+    ``"auto"`` follows the materials, and so does ``"scalar"`` where there are no numbers.
+    """
+    if options.shading not in ("auto", "scalar"):
+        return options.shading
+    return "pbr" if mesh.is_physical else "phong"
 
 
 def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:
@@ -196,22 +207,33 @@ def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOp
         "u_flat": options.flat,
         "u_opacity": surface_opacity(options),
         "u_has_uv": mesh.uvs is not None,
-        "u_texture": _TEXTURE_UNIT,
         "u_has_colors": options.shading == "parts" and mesh.colors is not None,
+        **SAMPLERS,
+        **STUDIO_SAMPLERS,
     }
     set_uniforms(program, values)
 
 
 def draw_runs(
-    array: moderngl.VertexArray, indices: IndexSet, textured: bool, instances: int = 1
+    array: moderngl.VertexArray,
+    indices: IndexSet,
+    options: DisplayOptions,
+    instances: int = 1,
+    blended: bool = False,
 ) -> None:
-    """Draw all triangles, one material at a time."""
+    """Draw all opaque or all blended triangles, one material at a time."""
+    plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
     for run in indices.runs:
-        has_texture = textured and run.texture is not None
-        set_uniforms(array.program, {"u_textured": has_texture})
-        if has_texture and run.texture is not None:
-            run.texture.use(_TEXTURE_UNIT)
-        array.render(moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances)
+        if run.surface.is_blended != blended:
+            continue
+        set_uniforms(array.program, plain)
+        run.surface.use(array.program, options.texture)
+        with sides(array.ctx, options.cull, run.surface.double_sided, blended) as orders:
+            for order in orders:
+                array.ctx.cull_face = order
+                array.render(
+                    moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
+                )
 
 
 def _premultiplied(color: tuple[float, float, float, float], opacity: float) -> tuple[float, ...]:

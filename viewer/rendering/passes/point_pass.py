@@ -17,7 +17,7 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer, float32
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.options import OPACITIES, Color, DisplayOptions
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip, PointLayout
@@ -246,7 +246,8 @@ class PointPass:
         self.context.front_face = "cw" if is_reflected else "ccw"
         self.context.enable(moderngl.CULL_FACE)
         if overlays:
-            self._draw_hidden(array, count, options.skeleton_opacity)
+            given = options.skeleton_opacity
+            self._draw_hidden(array, count, OPACITIES["boxes"] if given is None else given)
         array.render(moderngl.TRIANGLES, instances=count)
         self.context.disable(moderngl.CULL_FACE)
         self.context.front_face = "ccw"

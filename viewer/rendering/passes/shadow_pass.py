@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import moderngl
@@ -14,11 +15,9 @@ from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
 
-__all__ = ["SHADOW_SIZE", "ShadowPass", "light_view", "parallel_view"]
+__all__ = ["ShadowPass", "light_view", "map_side", "parallel_view"]
 
-SHADOW_SIZE = 2048
-"""Texels on each side of a shadow map."""
-
+_SIDES = 256, 2048  # texels on each side of a shadow map
 _MARGIN = FILTER_RADIUS + 2.0  # texels without shadow around all casters
 _STEP = 2.0**0.25  # of the map's extent: moving figures don't change its resolution each frame
 _TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1.0]])
@@ -31,14 +30,15 @@ class ShadowPass:
     ----------
     context : moderngl.Context
         The context in use.
+    side : int
+        Texels on each side of the map.
     """
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self.context = context
+    def __init__(self, context: moderngl.Context, side: int) -> None:
+        self.context, self.side = context, side
         self._owner = Owner()
         with self._owner.guard():
-            size = SHADOW_SIZE, SHADOW_SIZE
-            self._texture = self._owner.keep(context.depth_texture(size))
+            self._texture = self._owner.keep(context.depth_texture((side, side)))
             self._texture.compare_func = "<="
             self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             self._texture.repeat_x = self._texture.repeat_y = False
@@ -64,23 +64,33 @@ class ShadowPass:
         strength : float
             0 to 1: fraction of the light that a shadow takes away.
         """
-        view, extent = light_view(spheres, direction)
+        view, extent = light_view(spheres, direction, self.side)
         self._framebuffer.use()
         context = self.context
-        context.viewport = (0, 0, SHADOW_SIZE, SHADOW_SIZE)
+        context.viewport = (0, 0, self.side, self.side)
         context.enable_only(moderngl.DEPTH_TEST)
         context.depth_func = "<"
         self._framebuffer.clear(depth=1.0)
         draw(view, "depth")
         matrix = _TO_TEXTURE @ view.projection @ view.matrix
-        return Shadow(self._texture, matrix, 2.0 * extent / SHADOW_SIZE, strength)
+        return Shadow(self._texture, matrix, 2.0 * extent / self.side, strength)
 
     def release(self) -> None:
         """Free the map."""
         self._owner.release()
 
 
-def light_view(spheres: Floats, direction: Floats) -> tuple[View, float]:
+def map_side(size: tuple[int, int]) -> int:
+    """Return the texels on each side of the shadow map of a picture, at least four a pixel.
+
+    >>> map_side((1280, 720)), map_side((100, 75))
+    (2048, 512)
+    """
+    wanted = 1 << math.ceil(math.log2(4 * max(size)))
+    return min(max(wanted, _SIDES[0]), _SIDES[1])
+
+
+def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float]:
     """Return the view of a directional light that contains some spheres, and its half extent.
 
     Extents grow in steps, and the middle lies on a grid of texels, so that edges of shadows do not
@@ -92,6 +102,8 @@ def light_view(spheres: Floats, direction: Floats) -> tuple[View, float]:
         Centres and radii, scene space.
     direction : (3,)
         Towards the light, unit length.
+    side : int
+        Texels on each side of the map.
     """
     aside = np.eye(3)[np.argmin(np.abs(direction))]
     right = np.cross(aside, direction)
@@ -101,9 +113,9 @@ def light_view(spheres: Floats, direction: Floats) -> tuple[View, float]:
     low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
     half = 0.5 * max(high[0] - low[0], high[1] - low[1])
     # Half a texel of snapping, and room for the filter.
-    half /= 1.0 - 2.0 * (_MARGIN + 1.0) / SHADOW_SIZE
+    half /= 1.0 - 2.0 * (_MARGIN + 1.0) / side
     extent = _STEP ** np.ceil(np.log(max(half, 1e-30)) / np.log(_STEP))
-    texel = 2.0 * extent / SHADOW_SIZE
+    texel = 2.0 * extent / side
     middle = 0.5 * (low + high)
     middle[:2] = np.round(middle[:2] / texel) * texel
     deep = 0.5 * (high[2] - low[2]) * 1.01 + 1e-3 * extent

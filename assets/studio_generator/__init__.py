@@ -1,0 +1,1 @@
+"""The studio that lights metallic-roughness surfaces, and the matcaps."""

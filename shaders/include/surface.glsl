@@ -1,0 +1,70 @@
+// The surface of the material that is drawn: its colour, opacity and normal. Files without more
+// than a picture per material are drawn without MATERIALS, which costs them nothing.
+
+in vec2 v_uv;
+in vec3 v_color;                // linear
+
+uniform bool u_has_uv;
+uniform bool u_textured;
+uniform sampler2D u_texture;    // sRGB, decoded by the sampler
+
+#ifndef MATERIALS
+vec4 base_color() {
+    return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);
+}
+#else
+const int BASE = 0, METALLIC = 1, ROUGHNESS = 2, NORMAL = 3, OCCLUSION = 4, EMISSIVE = 5;
+
+in vec2 v_second_uv;
+
+uniform vec4 u_base_factor;     // linear
+uniform bool u_has_base_factor; // else untextured surfaces have v_color
+uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
+uniform float u_alpha_cutoff;
+uniform mat3 u_places[6];       // texture coordinates to those of each texture's picture
+uniform int u_uv_sets[6];       // 0: v_uv, 1: v_second_uv
+uniform sampler2D u_normal_map;
+uniform float u_normal_scale;   // 0: no map
+
+vec2 place(int map) {
+    vec2 uv = u_uv_sets[map] == 0 ? v_uv : v_second_uv;
+    return (u_places[map] * vec3(uv, 1.0)).xy;
+}
+
+vec4 base_color() {
+    vec4 color = u_has_base_factor ? u_base_factor : vec4(v_color, 1.0);
+    if (u_textured)
+        color = u_base_factor * texture(u_texture, place(BASE));
+    return color;
+}
+
+// Opacity of the surface; what a mask cuts out is not drawn.
+float surface_alpha() {
+    if (u_alpha_mode == 0)
+        return 1.0;
+    float alpha = base_color().a;
+    if (u_alpha_mode == 2)
+        return alpha;
+    if (alpha < u_alpha_cutoff)
+        discard;
+    return 1.0;
+}
+
+// A normal as the normal map bends it. The tangents are those of the screen's derivatives
+// (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
+vec3 mapped_normal(vec3 position, vec3 normal) {
+    if (u_normal_scale == 0.0)
+        return normal;
+    vec2 uv = place(NORMAL);
+    vec3 mapped = 2.0 * texture(u_normal_map, uv).xyz - 1.0;
+    vec3 across = cross(dFdy(position), normal), up = cross(normal, dFdx(position));
+    vec2 right_uv = dFdx(uv), up_uv = dFdy(uv);
+    vec3 tangent = across * right_uv.x + up * up_uv.x;
+    vec3 bitangent = across * right_uv.y + up * up_uv.y;
+    float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
+    if (longest == 0.0)
+        return normal;
+    mapped.xy *= u_normal_scale * inversesqrt(longest);
+    return normalize(tangent * mapped.x + bitangent * mapped.y + normal * max(mapped.z, 1e-3));
+}
+#endif

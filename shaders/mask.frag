@@ -1,0 +1,10 @@
+#version 330
+// What is outlined, as a coverage: one channel for each kind of outline.
+
+uniform vec4 u_mask;
+
+out vec4 f_color;
+
+void main() {
+    f_color = u_mask;
+}

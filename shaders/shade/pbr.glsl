@@ -1,0 +1,106 @@
+// Metallic-roughness surfaces as glTF 2.0 defines them (appendix B), lit by the studio and, more
+// faintly, by the two lights. The lobe is GGX (Walter et al. 2007) with the height-correlated Smith
+// term (Heitz 2014) and Schlick's Fresnel term; the studio's light comes as a split sum (Karis
+// 2013) with the energy that one bounce loses added back (Fdez-Aguera 2019).
+#pragma include studio
+uniform float u_metallic;
+uniform float u_roughness;
+uniform sampler2D u_split_sum;  // factor and summand of the reflectance by n . v and roughness
+uniform bool u_unlit;
+#ifdef MATERIALS
+uniform sampler2D u_metallic_map;
+uniform sampler2D u_roughness_map;
+uniform sampler2D u_occlusion_map;
+uniform sampler2D u_emissive_map;
+uniform vec4 u_channels[6];     // which number of a texel counts
+uniform bool u_has_metallic_map;
+uniform bool u_has_roughness_map;
+uniform bool u_has_emissive_map;
+uniform float u_occlusion_map_strength;  // 0: no map
+uniform vec3 u_emissive;        // linear
+#endif
+
+const float PI = 3.14159265358979;
+const float LIGHTS = 0.30;      // of the two lights beside the studio's
+const float BOX = 0.5;          // of the studio's light on a surface that faces its key box
+const float SMOOTHEST = 0.045;  // roughness at which highlights of points are still seen
+
+struct Surface {
+    vec3 diffuse;               // albedo
+    vec3 specular;              // reflectance at normal incidence
+    float roughness;
+};
+
+// A texel's number.
+#ifdef MATERIALS
+float number(sampler2D map, int index) {
+    return dot(texture(map, place(index)), u_channels[index]);
+}
+#endif
+
+Surface surface(vec3 base) {
+    float metallic = u_metallic, roughness = u_roughness;
+#ifdef MATERIALS
+    if (u_has_metallic_map)
+        metallic *= number(u_metallic_map, METALLIC);
+    if (u_has_roughness_map)
+        roughness *= number(u_roughness_map, ROUGHNESS);
+#endif
+    return Surface(base * (1.0 - metallic), mix(vec3(0.04), base, metallic), roughness);
+}
+
+// Light of the studio that goes towards the eye.
+vec3 surrounding(Surface s, vec3 normal, vec3 to_eye, float occlusion) {
+    float n_v = clamp(dot(normal, to_eye), 1e-3, 1.0);
+    vec2 table = texture(u_split_sum, vec2(n_v, s.roughness)).rg;
+    vec3 single = s.specular * table.x + table.y;
+    float lost = 1.0 - (table.x + table.y);
+    vec3 average = s.specular + (1.0 - s.specular) / 21.0;
+    vec3 several = single * average / (1.0 - lost * average) * lost;
+    vec3 diffuse = s.diffuse * (1.0 - single - several);
+    vec3 reflected = studio_light(reflect(-to_eye, normal), s.roughness);
+    return occlusion * (single * reflected + (several + diffuse) * studio_irradiance(normal));
+}
+
+// Light of one direction that goes towards the eye: BRDF times pi times cosine.
+vec3 direct(Surface s, vec3 normal, vec3 to_eye, vec3 to_light) {
+    float n_l = dot(normal, to_light), n_v = max(dot(normal, to_eye), 1e-3);
+    if (n_l <= 0.0)
+        return vec3(0.0);
+    vec3 halfway = normalize(to_light + to_eye);
+    float n_h = clamp(dot(normal, halfway), 0.0, 1.0), v_h = clamp(dot(to_eye, halfway), 0.0, 1.0);
+    float alpha = max(s.roughness, SMOOTHEST);
+    float squared = alpha * alpha * alpha * alpha;
+    float narrow = n_h * n_h * (squared - 1.0) + 1.0;
+    float lobe = squared / (narrow * narrow);  // times pi
+    float smith = n_l * sqrt(n_v * n_v * (1.0 - squared) + squared)
+        + n_v * sqrt(n_l * n_l * (1.0 - squared) + squared);
+    vec3 fresnel = s.specular + (1.0 - s.specular) * pow(1.0 - v_h, 5.0);
+    return n_l * ((1.0 - fresnel) * s.diffuse + fresnel * (0.5 * lobe / smith));
+}
+
+vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
+    vec3 base = base_color().rgb;
+    if (u_unlit)
+        return base;
+    Surface s = surface(base);
+    float occlusion = 1.0;
+    vec3 color = vec3(0.0);
+#ifdef MATERIALS
+    if (u_occlusion_map_strength > 0.0)
+        occlusion = mix(1.0, number(u_occlusion_map, OCCLUSION), u_occlusion_map_strength);
+    color = u_emissive;
+    if (u_has_emissive_map)
+        color *= texture(u_emissive_map, place(EMISSIVE)).rgb;
+#endif
+    occlusion *= ambient_visibility(position.z);
+    for (int i = 0; i < 2; ++i) {
+        float cosine = max(dot(normal, u_light_directions[i]), 0.0);
+        float seen = visibility(i, position, normal, cosine);
+        color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
+        // The studio's key box hangs about where the key light is, and the same things hide it.
+        occlusion *= 1.0 - BOX * cosine * (1.0 - seen);
+    }
+    color += surrounding(s, normal, to_eye, occlusion);
+    return toned(color);
+}

@@ -1,0 +1,92 @@
+"""The command palette by keyboard alone, and by mouse."""
+
+from __future__ import annotations
+
+import pytest
+
+from viewer.app.palette.entries import entries
+from viewer.app.palette.palette_window import Palette
+from viewer.app.shown_panels import is_open
+
+
+def opened(hand, text=""):
+    hand.key("p", "ctrl")
+    hand.step(3)
+    hand.type(text)
+    hand.step(2)
+    return hand.state.of(Palette)
+
+
+def found(hand):
+    palette = hand.state.of(Palette)
+    return [palette.known[index].text for index in palette.shown]
+
+
+def test_enter_runs_the_best_match_and_closes(hand):
+    opened(hand, "wiref")
+    assert found(hand)[0] == "Wireframe" and not hand.state.options.wireframe
+    hand.key("enter")
+    hand.step(2)
+    assert hand.state.options.wireframe and not hand.state.of(Palette).is_open
+    hand.key("z", "ctrl")
+    assert not hand.state.options.wireframe
+
+
+def test_letters_run_no_keys_and_escape_closes_it_alone(hand):
+    hand.state.selected_joint = 1
+    opened(hand, "w")
+    hand.key("escape")
+    hand.step(2)
+    assert not hand.state.of(Palette).is_open
+    assert not hand.state.options.wireframe and hand.state.selected_joint == 1
+
+
+def test_arrows_move_the_highlight_around_the_ends(hand):
+    palette = opened(hand, "view")
+    count = len(palette.shown)
+    assert count > 2
+    for key, row in (("down_arrow", 1), ("up_arrow", 0), ("up_arrow", count - 1)):
+        hand.key(key)
+        assert hand.state.of(Palette).row == row
+    time = hand.state.clock.time
+    hand.key("home")
+    assert hand.state.clock.time == time
+
+
+def test_joint_is_selected_by_name(hand):
+    opened(hand, "arm")
+    hand.key("enter")
+    hand.step(2)
+    assert hand.state.selected_joint == 1
+
+
+def test_panel_is_opened_by_name(hand):
+    assert not is_open(hand.state, "lint")
+    opened(hand, "lint")
+    hand.key("enter")
+    hand.step(3)
+    assert is_open(hand.state, "lint")
+
+
+def test_click_runs_an_entry_and_one_elsewhere_closes(hand):
+    opened(hand, "octahedra")
+    hand.click("palette 0")
+    assert hand.state.options.bones == "octahedra" and not hand.state.of(Palette).is_open
+    opened(hand)
+    hand.click((450.0, 600.0))
+    assert not hand.state.of(Palette).is_open
+
+
+def test_disabled_entries_say_why_and_do_not_run(hand):
+    palette = opened(hand, "curves")
+    entry = palette.known[palette.shown[0]]
+    assert entry.text == "Curves" and "no motion" in entry.why
+    hand.key("enter")
+    hand.step(2)
+    assert hand.state.of(Palette).is_open
+
+
+@pytest.mark.parametrize("kind", ["action", "panel", "choice", "joint", "figure"])
+def test_all_kinds_are_there_with_names_of_their_own(hand, kind):
+    named = [entry.text for entry in entries(hand.state) if entry.kind == kind]
+    assert named and len(named) == len(set(named))

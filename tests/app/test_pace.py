@@ -1,0 +1,48 @@
+"""When the window draws which pass, and how shadows fade."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.app.pace import Pace
+from viewer.rendering.options import DisplayOptions
+
+DRAFT, FINAL = DisplayOptions(), DisplayOptions(quality="final", passes=4)
+
+
+def test_a_draft_is_drawn_once_for_each_change():
+    pace = Pace()
+    assert pace.step("a", DRAFT, 0.0) is not None
+    assert pace.step("a", DRAFT, 0.1) is None and not pace.is_unfinished
+    assert pace.step("b", DRAFT, 0.2) is not None
+
+
+def test_final_quality_adds_passes_while_nothing_changes():
+    pace = Pace()
+    steps = [pace.step("a", FINAL, 0.1 * frame) for frame in range(5)]
+    assert [step.passes for step in steps[:4]] == [range(i, i + 1) for i in range(4)]
+    assert steps[4] is None and not pace.is_unfinished
+    assert pace.step("b", FINAL, 1.0).passes == range(1)
+    assert pace.is_unfinished
+
+
+def test_slow_drivers_fade_shadows_out_while_things_move_and_in_again():
+    pace, strengths, qualities = Pace(), [], []
+    for frame in range(60):
+        key = min(frame, 30)  # rests from the 31st frame on, half a second after the start
+        step = pace.step(key, FINAL, frame / 60)
+        if step is not None:
+            pace.measured(step, 0.08)
+            strengths.append(step.strength)
+            qualities.append(step.options.quality)
+    assert "draft" in qualities and qualities[-1] == "final" and strengths[-1] == 1.0
+    # No jump: a fifth of a second from all to nothing.
+    assert np.abs(np.diff(strengths)).max() <= 1 / 12 + 1e-9
+
+
+def test_fast_drivers_keep_their_shadows():
+    pace = Pace()
+    for frame in range(60):
+        step = pace.step(frame, FINAL, frame / 60)
+        pace.measured(step, 0.004)
+        assert step.strength == 1.0 and step.options.quality == "final"

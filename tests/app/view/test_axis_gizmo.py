@@ -1,0 +1,105 @@
+"""The axis gizmo: a click looks along an axis within a fifth of a second, a drag orbits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.app.view.axis_gizmo import AxisGizmo
+from viewer.app.view.camera_actions import fly_to
+from viewer.app.view.flight import Flight
+from viewer.rendering.camera import VIEWS, camera_axes
+
+ARM = 31.0  # points
+
+
+@pytest.fixture
+def seen(drive, rig):
+    """A hand on a window with the camera between the axes."""
+    hand = drive(*rig, size=(900, 640))
+    hand.state.camera.azimuth, hand.state.camera.inclination = 35.0, 25.0
+    hand.step(2)
+    return hand
+
+
+def end_of(hand, axis, sign=1):
+    """Return where the end of an axis is drawn: x to the right, y up as the camera sees them."""
+    x, y = hand.place("axis gizmo")
+    right, up, _ = camera_axes(hand.state.camera)
+    return x + sign * ARM * right[axis], y - sign * ARM * up[axis]
+
+
+def backward(hand):
+    return camera_axes(hand.state.camera)[2]
+
+
+@pytest.mark.parametrize(("axis", "sign"), [(0, 1), (1, 1), (2, 1), (0, -1), (1, -1), (2, -1)])
+def test_click_on_an_end_looks_from_there(seen, axis, sign):
+    seen.click(end_of(seen, axis, sign))
+    assert seen.state.of(Flight).is_active
+    seen.step(12)
+    assert not seen.state.of(Flight).is_active
+    np.testing.assert_allclose(backward(seen), sign * np.eye(3)[axis], atol=1e-12)
+    assert seen.undo_steps == 0
+
+
+def test_second_click_looks_from_the_other_side(seen):
+    seen.key("_1")
+    seen.step(15)
+    seen.click(end_of(seen, 2))
+    seen.step(15)
+    assert (seen.state.camera.azimuth, seen.state.camera.inclination) == VIEWS["back"]
+
+
+def test_camera_keeps_fitting_after_the_flight_and_moves_on_the_way(seen):
+    seen.key("f")
+    angles = []
+    seen.menu("menu View", "Left view")
+    for _ in range(14):
+        angles.append(seen.state.camera.azimuth)
+        seen.step()
+    assert angles == sorted(angles) and len({*angles}) > 5 and angles[-1] == 90.0
+    assert seen.state.framing.is_fitting
+
+
+def test_orbiting_ends_a_flight(seen):
+    fly_to(seen.state, "left")
+    x, y = seen.middle
+    seen.pull((x, y), (x + 40, y))
+    seen.step(15)
+    assert seen.state.camera.azimuth < 80.0
+
+
+def test_drag_orbits_twice_as_fast_as_in_the_view(seen):
+    x, y = seen.place("axis gizmo")
+    seen.pull((x, y), (x + 20, y - 10))
+    assert seen.state.camera.azimuth == pytest.approx(35.0 - 18.0)
+    assert seen.state.camera.inclination == pytest.approx(25.0 - 9.0)
+
+
+def test_gizmo_selects_nothing_under_it_and_goes_with_the_panels(seen):
+    seen.state.selected_joint = 1
+    seen.click(seen.place("axis gizmo"))
+    assert seen.state.selected_joint == 1
+    seen.key("tab")
+    seen.step(2)
+    assert "axis gizmo" not in seen.state.item_rects
+
+
+def test_gizmo_follows_the_up_axis(seen):
+    seen.state.camera.up = "z"
+    seen.step(2)
+    # z points up wherever the camera stands.
+    assert end_of(seen, 2)[1] < seen.place("axis gizmo")[1] - 20
+    seen.click(end_of(seen, 2))
+    seen.step(15)
+    np.testing.assert_allclose(backward(seen), [0, 0, 1], atol=1e-12)
+
+
+def test_gizmo_is_drawn_into_the_window_but_not_into_pictures(seen):
+    x0, y0, x1, y1 = (round(side) for side in seen.state.item_rects["axis gizmo"])
+    with_gizmo, picture = seen.screen()[y0:y1, x0:x1], seen.scene_picture()
+    seen.menu("menu View", "Axis gizmo")
+    assert not seen.state.of(AxisGizmo).is_shown
+    assert (seen.screen()[y0:y1, x0:x1] != with_gizmo).any(axis=-1).mean() > 0.1
+    assert (seen.scene_picture() == picture).all()

@@ -1,0 +1,59 @@
+"""Skeletons in each style and outlines, against the same picture with boxes or without an outline.
+
+The bundled body with a new pose in each frame, 1280 x 720, one sample, drawn alternately, so that
+the machine cancels out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from measure import interleaved, report
+
+import viewer
+from viewer.loading import bundled_body
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
+from viewer.rig.scene import Scene, scene_box
+
+SIZE, ROUNDS = (1280, 720), 30
+
+
+def frames(
+    offscreen: Offscreen, scene: Scene, options: DisplayOptions, outlined: tuple[Outlined, ...]
+) -> Callable[[], object]:
+    """Return what poses the scene anew, draws it, and waits for the picture."""
+    camera, box = default_camera(scene, SIZE), scene_box(scene)
+    rng = np.random.default_rng(0)
+
+    def run() -> None:
+        pose = scene.actors[0].require_pose()
+        pose.dofs[:] = rng.normal(0.0, 0.15, len(pose.dofs))
+        offscreen.renderer.outlines = outlined
+        offscreen.render(scene, SIZE, camera, options, box)
+
+    return run
+
+
+def main() -> None:
+    """Print the medians and ratios."""
+    scene = viewer.load(bundled_body())
+    with Offscreen() as offscreen:
+        styles = ("boxes", "octahedra", "sticks", "axes")
+        work = {
+            style: frames(offscreen, scene, DisplayOptions(show="both", samples=1, bones=style), ())
+            for style in styles
+        }
+        plain = DisplayOptions(samples=1)
+        work["no outline"] = frames(offscreen, scene, plain, ())
+        work["outline of the body"] = frames(offscreen, scene, plain, (Outlined(0),))
+        times = interleaved(work, ROUNDS)
+    report("Styles of skeletons", {style: times[style] for style in styles}, ("octahedra", "boxes"))
+    pair = ("outline of the body", "no outline")
+    report("Outlines", {name: times[name] for name in pair}, pair)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,196 @@
+"""Shadows on the ground and on figures, contact shadows, ambient occlusion, averaged passes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rendering.drawn_figures import picture, random_figure, random_pose, scene_of, sphere, square
+from rendering.golden_motion import SHOTS
+from rendering.plain_pictures import N, front, lights, plain
+
+from viewer.rendering.bounds import Bounds
+from viewer.rendering.gpu.target import Target
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes import instance_pass
+from viewer.rendering.software_limits import limit_passes
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skinning import deform
+
+WHITE = picture([[(255, 255, 255)]])
+GROUND = np.array([[-1.0, 0.0, -1.0], [1.0, 1.5, 1.0]])  # at height 0
+
+
+def draw(offscreen, scene, options, camera, box=GROUND, size=(N, N)):
+    return offscreen.render(scene, size, camera, options, box)
+
+
+def plate(height: float, half: float = 0.25) -> Mesh:
+    """Return a level square above the origin."""
+    upright = square(half=half, material=WHITE)
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y becomes -z, z becomes y
+    positions = upright.positions @ turn.T + [0.0, height, 0.0]
+    return replace(upright, positions=positions, normals=upright.normals @ turn.T)
+
+
+def from_above() -> object:
+    """Return a camera that sees -2 to 2 of x and z, a unit is 25 pixels; x is right."""
+    return front(inclination=90.0)
+
+
+def with_shadows(**changes) -> DisplayOptions:
+    return plain(**{"quality": "normal", **changes})
+
+
+def test_shadow_of_a_plate_lies_where_light_at_45_degrees_throws_it(offscreen):
+    """From +x: a plate of -0.25 to 0.25 at height 1 darkens x from -1.25 to -0.75."""
+    light = lights(0.2, 1.0, azimuth=90.0, inclination=45.0, follow_camera=False)
+    pixels = draw(offscreen, scene_of(plate(1.0)), with_shadows(lights=light), from_above())
+    alpha = pixels[..., 3].astype(float)
+    shadow = alpha[:, :40]  # the plate itself begins at column 43
+    dark = shadow > 0.5 * shadow.max()
+    rows, columns = np.nonzero(dark)
+    assert 60 < shadow.max() < 200
+    np.testing.assert_allclose((columns.min(), columns.max()), (18.75, 30.25), atol=1.0)
+    np.testing.assert_allclose((rows.min(), rows.max()), (43.75, 55.25), atol=1.0)
+    assert alpha[:, 65:].max() == 0 and pixels[:, :40][dark][:, :3].max() == 0
+
+
+def test_shadow_falls_on_another_figure(offscreen):
+    """Below a plate, light from straight above reaches a larger plate only beside it."""
+    light = lights(0.2, 0.6, inclination=90.0, follow_camera=False)
+    scene = scene_of(plate(1.0), plate(0.4, half=1.0))
+    options = with_shadows(lights=light)
+    camera = front(inclination=60.0, target=np.array([0.0, 0.7, 0.0]))
+    lit = draw(offscreen, scene, replace(options, quality="draft"), camera)
+    shaded = draw(offscreen, scene, options, camera)
+    changed = np.abs(lit[..., :3].astype(int) - shaded[..., :3]).max(axis=2) > 40
+    solid = (lit[..., 3] == 255) & (shaded[..., 3] == 255)
+    # The shadow has a sixteenth of the large plate's area; the upper plate covers none of it
+    # from this angle: 0.6 / tan 60 = 0.35 units aside, against half a width of 0.25.
+    share = (changed & solid).sum() / solid.sum()
+    assert 0.02 < share < 0.09
+
+
+def test_surfaces_do_not_shadow_themselves(offscreen):
+    """A ball under a grazing light differs from one without shadows at its terminator only."""
+    light = lights(0.2, 0.8, azimuth=60.0, inclination=20.0)
+    camera, box = front(), np.array([[-1.0, -1, -1], [1, 1, 1]])
+    options = with_shadows(lights=light)
+    first, second = (
+        draw(offscreen, scene_of(sphere(48)), replace(options, shadows=value), camera, box)
+        for value in (False, True)
+    )
+    inside = first[..., 3] == 255
+    difference = np.abs(first[..., :3].astype(int) - second[..., :3]).max(axis=2)[inside]
+    assert (difference > 6).mean() < 0.01
+
+
+def test_contact_shadow_is_darkest_below_and_needs_no_light(offscreen):
+    options = with_shadows(lights=lights(0.2, 0.0))
+    alpha = {
+        height: draw(offscreen, scene_of(plate(height)), options, from_above())[50, :, 3]
+        for height in (0.005, 1.0)
+    }
+    outside = alpha[0.005][57:].astype(int)  # from 0.28 on
+    assert outside[0] > 8 and outside[-1] == 0 and (np.diff(outside) <= 0).all()
+    assert (alpha[1.0][57:] == 0).all()
+
+
+def test_ground_below_the_camera_only(offscreen):
+    light = lights(0.2, 1.0, azimuth=90.0, inclination=45.0, follow_camera=False)
+    camera = front(inclination=-60.0)
+    with_ground = draw(offscreen, scene_of(plate(1.0)), with_shadows(lights=light), camera)
+    assert set(np.unique(with_ground[..., 3])) == {0, 255}
+
+
+def test_occlusion_darkens_a_corner_and_no_open_plane(offscreen):
+    options = plain(quality="final", shadows=False, passes=4, lights=lights(0.5))
+    wall, floor = square(half=1.0, material=WHITE), plate(-1.0, half=1.0)
+    floor = replace(floor, positions=floor.positions + np.array([0.0, 0.0, 1.0]))
+    camera, box = front(inclination=35.0), np.array([[-1.0, -1, 0], [1, 1, 2]])
+    camera.target = np.array([0.0, 0.0, 0.5])
+    merged = scene_of(wall, floor)
+    alone, corner = (draw(offscreen, scene, options, camera, box) for scene in
+                     (scene_of(wall), merged))  # fmt: skip
+    plane = alone[..., 0][alone[..., 3] == 255]
+    assert plane.min() >= plane.max() - 3
+    column = corner[:, 50, 0].astype(int)
+    assert column.min() < 0.85 * column.max()
+
+
+def test_averaged_alpha_is_that_of_supersampling(offscreen):
+    """Sixteen passes of one sample against 64: coverage to a sixteenth, on average exactly."""
+    scene, camera = scene_of(sphere(32)), front()
+    fine = draw(offscreen, scene, plain(), camera, size=(8 * N, 8 * N))[..., 3].astype(float)
+    wanted = fine.reshape(N, 8, N, 8).mean(axis=(1, 3))
+    edge = (wanted > 0) & (wanted < 255)
+    once, often = (
+        draw(offscreen, scene, plain(shadows=False, **change), camera)
+        for change in ({}, {"quality": "final", "passes": 16})
+    )
+    errors = [(pixels[..., 3] - wanted)[edge] for pixels in (once, often)]
+    assert np.abs(errors[1]).mean() < 255 / 16 < 40.0 < np.abs(errors[0]).mean()
+    assert abs(errors[1].mean()) < 3.0
+    # Straight colours of edges are those of the surface.
+    inner = often[50, 50, :3].astype(int)
+    partial = (often[..., 3] > 40) & (often[..., 3] < 255)
+    assert np.abs(often[partial][:, :3] - inner).max() <= 8
+
+
+def test_passes_one_by_one_are_the_picture_of_all(offscreen):
+    scene, camera, options = scene_of(sphere(24)), front(), plain(quality="final", passes=3)
+    wanted = draw(offscreen, scene, options, camera)
+    with offscreen.context:
+        target = Target(offscreen.context, (N, N), 1)
+        for index in range(3):
+            offscreen.renderer.draw(
+                scene, camera, options, target, GROUND, passes=range(index, index + 1)
+            )
+        target.resolve()
+        np.testing.assert_array_equal(target.read(), wanted)
+        target.release()
+
+
+def test_instances_cast_the_same_shadows(offscreen, monkeypatch):
+    shot = SHOTS["instances"]()
+    options = replace(shot.options, quality="normal", samples=1)
+    box = scene_box(shot.scene)
+    together = offscreen.render(shot.scene, (N, N), shot.camera, options, box)
+    monkeypatch.setattr(instance_pass, "FEWEST", 100)
+    alone = offscreen.render(shot.scene, (N, N), shot.camera, options, box)
+    assert (np.abs(together.astype(int) - alone).max(axis=2) > 8).mean() < 0.005
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_spheres_of_joints_contain_all_vertices(seed):
+    rng = np.random.default_rng(seed)
+    figure = random_figure(rng, 9)
+    actor = Actor(figure)
+    actor.pose = random_pose(figure.skeleton, rng)
+    actor.placement[:3] = np.array([[0.0, -2, 0, 5], [2, 0, 0, 1], [0, 0, 2, -3]])
+    spheres = Bounds().spheres(actor, DisplayOptions())
+    points = deform(figure, actor.pose)[0] @ actor.placement[:3, :3].T + actor.placement[:3, 3]
+    directions = rng.normal(size=(50, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    reach = (spheres[:, :3] @ directions.T + spheres[:, 3:]).max(axis=0)
+    assert (reach >= (points @ directions.T).max(axis=0)).all()
+
+
+def test_software_draws_fewer_passes_of_large_pictures(offscreen):
+    """8.3 megapixels take 0.85 s a pass by the estimate: 2 of 8 passes are too few."""
+    scene = Scene([])
+    found = {}
+    for size in ((640, 480), (2400, 1800), (3840, 2160)):
+        options = DisplayOptions(quality="final")
+        notes = limit_passes(options, scene, size, offscreen.context)
+        found[size] = options.quality, options.passes, len(notes)
+    if "llvmpipe" not in offscreen.context.info["GL_RENDERER"]:
+        pytest.skip("drawn by hardware")
+    assert found == {
+        (640, 480): ("final", 8, 0),
+        (2400, 1800): ("final", 4, 1),
+        (3840, 2160): ("normal", 8, 1),
+    }

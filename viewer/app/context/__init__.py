@@ -1,0 +1,1 @@
+"""Context menus: actions on what a right click in the view hits."""

@@ -1,0 +1,95 @@
+"""What to draw in each frame of the window: passes while it rests, less while things move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.sampling import n_passes
+
+__all__ = ["Pace", "Step"]
+
+_FADE = 0.2  # seconds in which shadows appear or vanish
+_RESTS = 0.25  # seconds without a change after which nothing moves any more
+_SLOW = 1.0 / 24.0  # seconds of a frame from which on what moves is drawn as a draft
+_LONGEST = 0.1  # seconds between two frames that count for fading
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What to draw now: options, passes of final quality, and strength of shadows, 0 to 1."""
+
+    options: DisplayOptions
+    passes: range
+    strength: float
+
+
+class Pace:
+    """Draws a picture anew when it changes, and improves it while it stays the same.
+
+    Where a frame with shadows takes too long, shadows fade out while things move, and in again
+    afterwards: brightness never jumps.
+    """
+
+    def __init__(self) -> None:
+        self._key: object = None
+        self._changed = self._now = float("-inf")
+        self._is_moving = False
+        self._done = 0  # passes of the picture that is shown
+        self._strength = 1.0
+        self._cost = 0.0  # seconds of a frame with shadows, as far as measured
+        self.is_unfinished = False
+
+    def step(self, key: object, options: DisplayOptions, now: float) -> Step | None:
+        """Return what to draw in this frame; None if the picture is finished.
+
+        Parameters
+        ----------
+        key : object
+            Everything that the picture depends on.
+        options : DisplayOptions
+            The quality that is asked for.
+        now : float
+            Seconds of any clock.
+        """
+        is_changed = key != self._key
+        faded = self._fade(is_changed, options, now)
+        self._key = key
+        total = n_passes(options)
+        if self._strength == 0.0:
+            options, total = replace(options, quality="draft"), 1
+        if is_changed or faded:
+            self._done = 0
+        self.is_unfinished = options.quality != "draft" and self._done + 1 < total
+        self.is_unfinished |= self._strength < 1.0
+        if self._done >= total:
+            return None
+        # While shadows fade, the first pass alone is drawn again and again.
+        index = self._done
+        self._done = total if self._strength < 1.0 else index + 1
+        return Step(options, range(index, index + 1), self._strength)
+
+    def _fade(self, is_changed: bool, options: DisplayOptions, now: float) -> bool:
+        """Move the strength of shadows towards what it should be; return whether it changed."""
+        change = min(now - self._now, _LONGEST) / _FADE
+        is_first, before, self._now = self._key is None, self._strength, now
+        if is_changed:
+            self._is_moving = now - self._changed < _RESTS
+            self._changed = now
+        elif now - self._changed >= _RESTS:
+            self._is_moving = False
+        wanted = 0.0 if self._is_moving and self._cost > _SLOW else 1.0
+        if is_first or options.quality == "draft":
+            self._strength = 1.0
+        else:
+            self._strength = min(max(wanted, before - change), before + change)
+        return self._strength != before
+
+    def restart(self) -> None:
+        """Draw the next frame again, although nothing has changed."""
+        self._done = 0
+
+    def measured(self, step: Step, seconds: float) -> None:
+        """Take note of how long a step took to draw."""
+        if step.options.quality != "draft":
+            self._cost = seconds

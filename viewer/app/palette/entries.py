@@ -1,0 +1,123 @@
+"""Everything that the command palette finds: actions, panels, choices, joints and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_panel, no_skeleton
+from viewer.app.core.state import AppState
+from viewer.app.features import ACTIONS, KEYS, PANELS
+from viewer.app.posing.joint_tree import select_joint
+from viewer.app.shown_panels import is_open, set_open
+from viewer.app.view.display_actions import show, show_bones
+from viewer.phrases import printable
+from viewer.rendering.gpu.program import SHADING
+from viewer.rendering.options import BONES, SHOWN
+from viewer.rig.skeleton import joint_labels
+from viewer.rig.skinning import METHODS
+
+__all__ = ["Entry", "entries"]
+
+_LEFT_OUT = ("Ctrl+P", "Esc")  # keys of the palette itself
+_LONGEST = 60  # characters of a name
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Something that can be found and run.
+
+    Attributes
+    ----------
+    text : str
+        Its name.
+    kind : str
+        What it is, in one word.
+    run : callable
+        Called with the state.
+    key : str
+        Key that does the same; empty for none.
+    why : str
+        Why it cannot be run now; empty if it can.
+    """
+
+    text: str
+    kind: str
+    run: Callable[[AppState], None]
+    key: str = ""
+    why: str = ""
+
+
+def entries(state: AppState) -> list[Entry]:
+    """Return all entries for the present scene."""
+    return [*_actions(state), *_panels(state), *_choices(state), *_joints(state), *_figures(state)]
+
+
+def _actions(state: AppState) -> Iterator[Entry]:
+    for key in KEYS:
+        if key.label not in _LEFT_OUT:
+            yield Entry(key.text[0].upper() + key.text[1:], "action", key.run, key.label)
+    for action in ACTIONS:
+        yield Entry(action.text, "action", action.run, why=action.reason(state))
+
+
+def _panels(state: AppState) -> Iterator[Entry]:
+    for name, panel in PANELS.items():
+        why = no_panel(state, panel.needs)
+        yield Entry(panel.title, "panel", partial(_open_panel, name=name), why=why)
+
+
+def _open_panel(state: AppState, name: str) -> None:
+    """Open a panel, or bring it to the front of its tabs."""
+    state.panels_visible = True
+    if is_open(state, name):
+        imgui.set_window_focus(PANELS[name].title)
+    set_open(state, name, True)
+
+
+def _choices(state: AppState) -> Iterator[Entry]:
+    """Yield the choices of shading, skeletons and skinning."""
+    for name, text in SHADING.items():
+        yield Entry(f"Shading: {text}", "choice", partial(_shade, name=name))
+    for name, text in SHOWN.items():
+        yield Entry(f"Show: {text}", "choice", partial(show, what=name))
+    for name, text in BONES.items():
+        yield Entry(
+            f"Bones: {text}", "choice", partial(show_bones, style=name), why=no_skeleton(state)
+        )
+    for name, method in METHODS.items():
+        yield Entry(f"Skinning: {method.title}", "choice", partial(_skin, name=name))
+
+
+def _shade(state: AppState, name: str) -> None:
+    from viewer.app.weights.actions import start_heat_map
+
+    state.options.shading = name
+    if name == "scalar":
+        start_heat_map(state)
+    state.say_status(SHADING[name])
+
+
+def _skin(state: AppState, name: str) -> None:
+    state.options.skinning.method = name
+    state.say_status(METHODS[name].title)
+
+
+def _joints(state: AppState) -> Iterator[Entry]:
+    """Yield the joints of the chosen actor."""
+    skeleton = state.actor.figure.skeleton
+    for joint, label in enumerate(joint_labels(skeleton) if skeleton is not None else ()):
+        yield Entry(printable(label, _LONGEST), "joint", partial(select_joint, joint=joint))
+
+
+def _figures(state: AppState) -> Iterator[Entry]:
+    for index, actor in enumerate(state.scene.actors):
+        yield Entry(printable(actor.name, _LONGEST), "figure", partial(_choose, index=index))
+
+
+def _choose(state: AppState, index: int) -> None:
+    state.choose_actor(index)
+    state.say_status(printable(state.actor.name, _LONGEST))

@@ -1,0 +1,132 @@
+"""The joint or actor under the pointer, which a click would select."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from viewer.app.core.state import AppState
+from viewer.app.posing.gizmo import joint_at
+from viewer.app.posing.state import Posing
+from viewer.app.posing.tool_actions import no_tool
+from viewer.app.view.axis_gizmo import is_over_gizmo
+from viewer.app.weights.state import Weights, wants_vertex
+from viewer.errors import ViewerError
+from viewer.rendering.renderer import Renderer
+from viewer.rendering.shown import has_joint_marks, shows_skeleton
+from viewer.rig.skeleton import joint_label
+
+__all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
+
+_REST = 0.06  # seconds for which the mouse must rest before actors are looked for
+_AWAY = 14.0  # points between the pointer and the name
+
+
+@dataclass(slots=True)
+class Hovered:
+    """What lies under the pointer.
+
+    Attributes
+    ----------
+    joint : int
+        Joint of the chosen actor; -1 for none.
+    actor : int
+        Another actor; -1 for none.
+    place : (float, float)
+        Position of the pointer, window coordinates.
+    since : float
+        Time at which it came to rest, seconds of ImGui's clock.
+    is_waiting : bool
+        Whether it rests, but not long enough yet.
+    """
+
+    joint: int = -1
+    actor: int = -1
+    place: tuple[float, float] = (-1.0, -1.0)
+    since: float = 0.0
+    is_waiting: bool = False
+
+
+def hover_joint(state: AppState) -> None:
+    """Find the joint under the pointer; called in each frame before the scene is drawn."""
+    hovered, mouse = state.of(Hovered), imgui.get_io().mouse_pos
+    is_free = _is_free(state)
+    hovered.joint = joint_near(state, (mouse.x, mouse.y)) if is_free else -1
+    if not is_free:
+        hovered.actor, hovered.is_waiting = -1, False
+
+
+def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scale: float) -> None:
+    """Find the actor under a pointer that rests, where there are several.
+
+    Parameters
+    ----------
+    state : AppState
+        The state; its ``Hovered`` gets the actor.
+    renderer : Renderer
+        The renderer that drew the scene.
+    size : (int, int)
+        Width and height of the view, pixels.
+    scale : float
+        Pixels per window coordinate.
+    """
+    hovered, mouse, now = state.of(Hovered), imgui.get_io().mouse_pos, imgui.get_time()
+    place = (mouse.x, mouse.y)
+    is_alone = len(state.scene.actors) < 2 or state.of(Posing).is_on
+    if is_alone or state.clock.playing or not _is_free(state):
+        hovered.actor, hovered.is_waiting = -1, False
+        return
+    if place != hovered.place:
+        hovered.place, hovered.since, hovered.is_waiting = place, now, True
+    if not hovered.is_waiting or now - hovered.since < _REST:
+        return
+    hovered.is_waiting = False
+    x, y = (scale * (place[axis] - state.view_rect[axis]) for axis in range(2))
+    try:
+        pick = renderer.pick(state.scene, state.camera, state.options, size, x, y, state.box)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    hovered.actor = -1 if pick is None else pick.actor
+
+
+def joint_near(state: AppState, place: tuple[float, float]) -> int:
+    """Return the chosen actor's joint near a place of the window if joints are visible; else -1."""
+    posing, actor = state.of(Posing), state.actor
+    if actor.figure.skeleton is None or actor.pose is None or not actor.is_drawn:
+        return -1
+    is_posed = posing.is_on and not no_tool(state)
+    if not (is_posed or shows_skeleton(actor, state.options) or has_joint_marks(state.options)):
+        return -1
+    return joint_at(state, place)
+
+
+def draw_hovered_name(state: AppState) -> None:
+    """Draw the name of the joint or actor under the pointer; tools draw names of their own."""
+    hovered, skeleton = state.of(Hovered), state.actor.figure.skeleton
+    if state.of(Posing).is_on or state.of(Weights).hover.lines:
+        return
+    text = ""
+    if hovered.joint >= 0 and skeleton is not None and hovered.joint < skeleton.n_joints:
+        text = joint_label(skeleton, hovered.joint)
+    elif 0 <= hovered.actor < len(state.scene.actors):
+        text = state.scene.actors[hovered.actor].name
+    if not text:
+        return
+    mouse, pen = imgui.get_io().mouse_pos, imgui.get_background_draw_list()
+    extent, pad = imgui.calc_text_size(text), 4.0
+    x = min(mouse.x + _AWAY, state.view_rect[0] + state.view_rect[2] - extent.x - 2.0 * pad)
+    y = mouse.y - 0.5 * extent.y
+    corner = (x + extent.x + pad, y + extent.y + pad)
+    pen.add_rect_filled((x - pad, y - pad), corner, imgui.get_color_u32((0.1, 0.11, 0.13, 0.85)), 3)
+    pen.add_text((x, y), imgui.get_color_u32((1.0, 1.0, 1.0, 1.0)), text)
+
+
+def _is_free(state: AppState) -> bool:
+    """Return whether the pointer is over the view and holds nothing."""
+    io, (x, y, width, height) = imgui.get_io(), state.view_rect
+    is_held = any(io.mouse_down[button] for button in range(3))
+    is_inside = x <= io.mouse_pos.x < x + width and y <= io.mouse_pos.y < y + height
+    is_free = is_inside and not is_held and not io.want_capture_mouse and not state.error
+    return is_free and not wants_vertex(state.of(Weights)) and not is_over_gizmo(state)

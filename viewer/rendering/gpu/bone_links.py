@@ -1,0 +1,121 @@
+"""Links between joints as a skeleton is drawn: bones to children, and short ends without one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.pose import rest_pose
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["BoneLinks", "bone_links"]
+
+_END = 0.4  # length of an end, of the bone before it
+_END_LIMITS = 0.01, 0.07  # the same, of the figure's size
+_AXIS = 0.4  # length of axes, of the nearest bone beside the joint
+_AXIS_LIMITS = 0.008, 0.06  # the same, of the figure's size
+_REACH = 12.0  # largest size of a figure in lengths of its long bones: roots may be far away
+_SAME = 1e-6  # of the figure's size: joints that are nearer coincide
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoneLinks:
+    """Bones of a skeleton at rest.
+
+    Attributes
+    ----------
+    ids : (N, 3) int32
+        Joint; its child, -1 for an end; the joint's axis that lies most across the bone.
+    ends : (N, 4)
+        Of an end: its direction in joint space, and its length in figure units; 0 for others.
+    longest : (J,)
+        Length of the longest bone beside each joint, figure units.
+    axis_lengths : (J,)
+        Length of the axes drawn at each joint, figure units.
+    size : float
+        Size that widths are derived from, figure units.
+    """
+
+    ids: Ints
+    ends: Floats
+    longest: Floats
+    axis_lengths: Floats
+    size: float
+
+
+def bone_links(skeleton: Skeleton) -> BoneLinks:
+    """Return the links of a skeleton.
+
+    A joint with several children has a bone to each. One without children has a short end in the
+    direction of the bone before it if it can rotate, so that its rotation is visible. Bones between
+    coincident joints have length 0.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Its rest pose counts.
+    """
+    worlds = world_matrices(skeleton, rest_pose(skeleton))
+    points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
+    parents = np.asarray(skeleton.parents)
+    children = np.flatnonzero(parents >= 0)
+    above = parents[children]
+    spans = points[children] - points[above]
+    lengths = np.linalg.norm(spans, axis=1)
+    size = _size(points, lengths)
+    lengths = np.where(lengths > _SAME * size, lengths, 0.0)
+    ends = _end_joints(skeleton)
+    ways, reach = _ends(points, parents, ends, axes, size)
+    joints = np.concatenate([above, ends])
+    along = np.abs(np.einsum("nka,na->nk", axes[joints], np.concatenate([unit(spans), ways])))
+    ids = np.stack([joints, np.append(children, np.full(len(ends), -1)), along.argmin(axis=1)], 1)
+    free = np.zeros((len(ids), 4))
+    # Coordinates of the direction along the joint's own, perhaps oblique, axes.
+    back = np.linalg.pinv(np.swapaxes(axes[ends], 1, 2))
+    free[len(children) :, :3] = np.einsum("nab,nb->na", back, ways)
+    free[len(children) :, 3] = reach
+    longest, nearest = np.zeros(len(points)), np.full(len(points), np.inf)
+    for beside in (children, above):
+        np.maximum.at(longest, beside, lengths)
+        np.minimum.at(nearest, beside, np.where(lengths > 0.0, lengths, np.inf))
+    shown = np.clip(_AXIS * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
+    return BoneLinks(ids.astype(np.int32), free, longest, shown, size)
+
+
+def _size(points: Floats, lengths: Floats) -> float:
+    """Return the size of a figure, without a root that is far from everything else."""
+    whole = box_size(bounding_box(points))
+    long = float(np.quantile(lengths, 0.9)) if len(lengths) else 0.0
+    return (min(whole, _REACH * long) if long > 0.0 else whole) or 1.0
+
+
+def _end_joints(skeleton: Skeleton) -> Ints:
+    """Return the joints without children that can rotate."""
+    is_end = np.ones(skeleton.n_joints, dtype=bool)
+    is_end[skeleton.parents[skeleton.parents >= 0]] = False
+    turns = np.zeros(skeleton.n_joints, dtype=bool)
+    turns[skeleton.dof_joints[(skeleton.dof_kinds >= 3) & ~skeleton.locked]] = True
+    return np.flatnonzero(is_end & turns).astype(np.int32)
+
+
+def _ends(
+    points: Floats, parents: Ints, joints: Ints, axes: Floats, size: float
+) -> tuple[Floats, Floats]:
+    """Return direction and length of each end: (N, 3) and (N,), figure space."""
+    ways, lengths = np.zeros((len(joints), 3)), np.zeros(len(joints))
+    for row, joint in enumerate(joints.tolist()):
+        above, ways[row] = int(parents[joint]), axes[joint, 1]
+        while above >= 0:
+            span = points[joint] - points[above]
+            lengths[row] = float(np.linalg.norm(span))
+            if lengths[row] > _SAME * size:
+                ways[row] = span / lengths[row]
+                break
+            above = int(parents[above])
+    low, high = _END_LIMITS
+    return ways, np.clip(_END * lengths, low * size, high * size)

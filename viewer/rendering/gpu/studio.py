@@ -1,0 +1,83 @@
+"""The studio's light and the matcaps on the GPU; ``assets/make_studio.py`` makes them."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.upload import checked
+from viewer.resources import resource
+
+__all__ = ["STUDIO_SAMPLERS", "Matcaps", "Studio"]
+
+STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
+"""Texture units beside those of materials and effects; no program has the last two."""
+
+_SRGB8 = 0x8C41
+
+
+class Studio:
+    """Blurred light of the studio, and the table of the split sum.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        with np.load(resource("assets", "studio", "studio.npz")) as stored:
+            light, table = stored["light"], stored["split_sum"]
+        self._owner = Owner()
+        with self._owner.guard():
+            layers, height, width = light.shape[:3]
+            size = width, height, layers
+            lights = context.texture_array(size, 3, light.tobytes(), alignment=2, dtype="f2")
+            self._light = self._owner.keep(lights)
+            lights.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            lights.repeat_x = lights.repeat_y = False
+            split_sum = context.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f2")
+            self._table = self._owner.keep(checked(context, split_sum, "the studio's light"))
+            split_sum.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            split_sum.repeat_x = split_sum.repeat_y = False
+
+    def use(self) -> None:
+        """Bind the textures."""
+        self._light.use(STUDIO_SAMPLERS["u_studio"])
+        self._table.use(STUDIO_SAMPLERS["u_split_sum"])
+
+    def release(self) -> None:
+        """Free the textures."""
+        self._owner.release()
+
+
+class Matcaps:
+    """Pictures of lit spheres, each uploaded on first use.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context, self._owner = context, Owner()
+        self._textures: dict[str, moderngl.Texture] = {}
+
+    def use(self, name: str) -> None:
+        """Bind a matcap, an entry of ``options.MATCAPS``."""
+        if name not in self._textures:
+            with np.load(resource("assets", "studio", "matcaps.npz")) as stored:
+                pixels = stored[name]
+            data = np.ascontiguousarray(pixels[::-1]).tobytes()
+            size = pixels.shape[1], pixels.shape[0]
+            texture = self._context.texture(size, 3, data, alignment=1, internal_format=_SRGB8)
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            texture.repeat_x = texture.repeat_y = False
+            self._textures[name] = self._owner.keep(texture)
+        self._textures[name].use(STUDIO_SAMPLERS["u_matcap"])
+
+    def release(self) -> None:
+        """Free the textures."""
+        self._owner.release()

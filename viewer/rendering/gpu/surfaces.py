@@ -1,0 +1,208 @@
+"""Materials on the GPU: pictures, each uploaded once, and the uniforms of each material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import set_uniforms
+from viewer.rendering.gpu.upload import picture_texture
+from viewer.rig.arrays import Bytes
+from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Texture
+
+__all__ = ["PLAIN", "SAMPLERS", "Surface", "needs_materials", "upload_surfaces"]
+
+SAMPLERS = {
+    "u_texture": 5,
+    "u_metallic_map": 8,
+    "u_roughness_map": 9,
+    "u_normal_map": 10,
+    "u_occlusion_map": 11,
+    "u_emissive_map": 12,
+}
+"""Texture unit of each entry of ``TEXTURES``; lower ones are the skinning shader's."""
+
+_UNITS = tuple(SAMPLERS.values())
+_COLORS = ("base_texture", "emissive_texture")  # sRGB
+_UNTEXTURED: dict[str, Any] = {
+    "u_textured": False,
+    "u_has_metallic_map": False,
+    "u_has_roughness_map": False,
+    "u_normal_scale": 0.0,
+    "u_occlusion_map_strength": 0.0,
+    "u_has_emissive_map": False,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """How the triangles of one material are drawn.
+
+    Attributes
+    ----------
+    uniforms : dict
+        Of ``include/surface.glsl`` and ``shade/pbr.glsl``.
+    untextured : dict
+        Those that differ where textures are off.
+    textures : tuple of (unit, texture)
+        Bound before the triangles are drawn.
+    is_physical : bool
+        Whether the material has a metallic and a roughness of its own.
+    is_blended : bool
+        Whether the triangles are drawn after all opaque ones.
+    double_sided : bool
+        Whether back faces are drawn.
+    """
+
+    uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}))
+    untextured: dict[str, Any] = field(default_factory=dict)
+    textures: tuple[tuple[int, moderngl.Texture], ...] = ()
+    is_physical: bool = False
+    is_blended: bool = False
+    double_sided: bool = True
+
+    def use(self, program: moderngl.Program, textured: bool) -> None:
+        """Set uniforms and bind textures."""
+        set_uniforms(program, self.uniforms)
+        if not textured:
+            set_uniforms(program, self.untextured)
+            return
+        for unit, texture in self.textures:
+            texture.use(unit)
+
+
+def needs_materials(materials: Sequence[Material]) -> bool:
+    """Return whether materials have more than a plainly placed picture each, see ``MATERIALS``."""
+    return any(
+        set(material.textures) - {"base_texture"}
+        or material.base_color is not None
+        or material.alpha_mode != "opaque"
+        or any(material.emissive)
+        or (material.base_texture is not None and not _is_plain(material.base_texture))
+        for material in materials
+    )
+
+
+def _is_plain(texture: Texture) -> bool:
+    return texture.uv_set == 0 and texture.is_placed_plainly and "mirror" not in texture.wrap
+
+
+def upload_surfaces(
+    context: moderngl.Context,
+    materials: Sequence[Material],
+    has_uvs: bool,
+    notes: list[str],
+    owner: Owner,
+) -> list[Surface]:
+    """Upload the pictures of materials.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    materials : sequence of Material
+        Of one mesh.
+    has_uvs : bool
+        Whether the mesh has texture coordinates.
+    notes : list of str
+        Receives messages about limitations of the driver.
+    owner : Owner
+        Takes the textures.
+    """
+    made: dict[tuple[object, ...], moderngl.Texture] = {}
+    surfaces = []
+    for material in materials:
+        found: dict[str, moderngl.Texture] = {}
+        for name, texture in material.textures.items() if has_uvs else ():
+            if texture.image is None:
+                continue
+            is_linear = name not in _COLORS
+            key = id(texture.image), is_linear, texture.wrap, texture.is_smooth
+            if key not in made:
+                made[key] = owner.keep(_upload(context, texture, is_linear, notes))
+            found[name] = made[key]
+        surfaces.append(_surface(material, found))
+    return surfaces
+
+
+def _upload(
+    context: moderngl.Context, texture: Texture, is_linear: bool, notes: list[str]
+) -> moderngl.Texture:
+    assert texture.image is not None  # the caller looked
+    made = picture_texture(context, _mirrored(texture.image, texture.wrap), notes, is_linear)
+    made.repeat_x, made.repeat_y = (side != "clamp" for side in texture.wrap)
+    if not texture.is_smooth:
+        made.filter = (moderngl.NEAREST_MIPMAP_LINEAR, moderngl.NEAREST)
+    return made
+
+
+def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
+    """Return a picture and its mirror image side by side: moderngl repeats, but does not mirror."""
+    if wrap[0] == "mirror":
+        image = np.concatenate([image, image[:, ::-1]], axis=1)
+    if wrap[1] == "mirror":
+        # v = 0 is at the last row: there the picture itself begins.
+        image = np.concatenate([image[::-1], image], axis=0)
+    return image
+
+
+def _surface(material: Material, textures: dict[str, moderngl.Texture]) -> Surface:
+    units = dict(zip(TEXTURES, _UNITS, strict=True))
+    untextured: dict[str, Any] = dict(_UNTEXTURED)
+    if material.base_texture is not None:
+        untextured["u_has_base_factor"] = False
+    return Surface(
+        uniforms=_uniforms(material, textures),
+        untextured=untextured,
+        textures=tuple((units[name], texture) for name, texture in textures.items()),
+        is_physical=material.is_physical,
+        is_blended=material.alpha_mode == "blend",
+        double_sided=material.double_sided,
+    )
+
+
+def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict[str, Any]:
+    """Return all uniforms of a material, as programs keep those of the last one."""
+    placed = [getattr(material, name) or Texture("") for name in TEXTURES]
+    channels = np.eye(4, dtype="f4")[[texture.channel for texture in placed]]
+    values: dict[str, Any] = {
+        "u_textured": "base_texture" in textures,
+        "u_base_factor": material.base_color or (1.0, 1.0, 1.0, 1.0),
+        "u_has_base_factor": material.base_color is not None,
+        "u_alpha_mode": ALPHA_MODES.index(material.alpha_mode),
+        "u_alpha_cutoff": material.alpha_cutoff,
+        "u_places": np.stack([_place(texture) for texture in placed]).tobytes(),
+        "u_uv_sets": np.array([texture.uv_set for texture in placed], dtype="i4").tobytes(),
+        "u_channels": channels.tobytes(),
+        "u_has_metallic_map": "metallic_texture" in textures,
+        "u_has_roughness_map": "roughness_texture" in textures,
+        "u_normal_scale": material.normal_scale if "normal_texture" in textures else 0.0,
+        "u_occlusion_map_strength": (
+            material.occlusion_strength if "occlusion_texture" in textures else 0.0
+        ),
+        "u_has_emissive_map": "emissive_texture" in textures,
+        "u_emissive": material.emissive,
+        "u_unlit": material.unlit,
+    }
+    if material.is_physical:
+        values |= {"u_metallic": material.metallic, "u_roughness": material.roughness}
+    return values
+
+
+def _place(texture: Texture) -> np.ndarray:
+    """Return a texture's placement as GLSL stores it: columns of a 3 x 3 matrix."""
+    matrix = np.eye(3)
+    matrix[:2] = texture.matrix
+    for row, side in enumerate(texture.wrap):
+        if side == "mirror":
+            matrix[row] *= 0.5
+    return matrix.T.astype("f4")
+
+
+PLAIN = Surface()
+"""Of triangles without a material."""

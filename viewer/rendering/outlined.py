@@ -1,0 +1,37 @@
+"""Parts of a scene that are outlined because they are selected or lie under the pointer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+
+__all__ = ["Outlined"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlined:
+    """Something with an outline.
+
+    Attributes
+    ----------
+    actor : int
+        Index in the scene.
+    joint : int
+        A joint of it, outlined where the skeleton is drawn; -1 for the whole actor.
+    points : (N, 3)
+        In place of actor and joint, if there are any: points in scene space.
+    is_hovered : bool
+        Whether it lies under the pointer, rather than being selected.
+    """
+
+    actor: int
+    joint: int = -1
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    is_hovered: bool = False
+
+    def key(self) -> tuple[object, ...]:
+        """Return a key that identifies the outline in an unchanged scene."""
+        return self.actor, self.joint, self.points.tobytes(), self.is_hovered

@@ -1,0 +1,214 @@
+"""Pass that draws outlines around actors, joints and points: a mask, its distances, a line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.draw_state import without_depth_test
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.target import Target
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
+from viewer.rendering.overlay.segments import Manner, SegmentPass, dots
+from viewer.rendering.passes.joint_pass import draw_joints, joint_program
+from viewer.rendering.passes.mesh_pass import MeshPass
+from viewer.rendering.passes.point_pass import PointPass
+from viewer.rendering.projection import picture_scale
+from viewer.rendering.shown import has_points, placement_of, shows_mesh, shows_skeleton
+from viewer.rendering.view import View
+from viewer.rig.scene import Actor, Scene
+
+__all__ = ["OutlinePass", "OutlineTools"]
+
+_COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
+"""Selected and hovered, sRGB."""
+_WIDTH = 2.0  # of the line, pixels of a picture of standard height
+_POINT = 9.0  # diameter of a point, the same
+_TILE, _LEVEL = 16, 4  # side of tile.vert's tiles, pixels; mipmaps with texels of that size
+_MOST = 12  # pixels around a mask that are looked at
+
+
+@dataclass(frozen=True, slots=True)
+class OutlineTools:
+    """Resources that outlines share with the passes that draw the scene."""
+
+    programs: Programs
+    meshes: MeshPass
+    points: PointPass
+    buffers: ActorBuffers
+
+
+class OutlinePass:
+    """Draws outlines over everything, whatever lies in front of the outlined parts.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    tools : OutlineTools
+        Programs, and what was uploaded for drawing.
+    """
+
+    def __init__(self, context: moderngl.Context, tools: OutlineTools) -> None:
+        self.context, self.tools = context, tools
+        self._segments = SegmentPass(context, tools.programs)
+        self._spread = tools.programs.drawing("tile", fragment="spread")
+        self._line = tools.programs.drawing("tile", fragment="outline")
+        self._arrays = [context.vertex_array(p, []) for p in (self._spread, self._line)]
+        self._mask: Target | None = None
+        self._distance: list[Any] = []
+
+    def draw(
+        self,
+        outlined: Sequence[Outlined],
+        scene: Scene,
+        view: View,
+        options: DisplayOptions,
+        target: Target,
+    ) -> None:
+        """Draw outlines into a target; its framebuffer is bound afterwards.
+
+        Parameters
+        ----------
+        outlined : sequence of Outlined
+            Parts of the scene.
+        scene : Scene
+            As it was drawn.
+        view : View
+            The camera's matrices.
+        options : DisplayOptions
+            What is shown.
+        target : Target
+            The picture.
+
+        Raises
+        ------
+        RenderError
+            If the driver has no room for the masks.
+        """
+        self._make(target)
+        assert self._mask is not None  # made above
+        mask = self._mask
+        mask.framebuffer.use()
+        self.context.viewport = (0, 0, *target.size)
+        mask.framebuffer.clear()
+        self.context.blend_func = moderngl.ONE, moderngl.ONE
+        with without_depth_test(self.context):
+            for one in outlined:
+                if 0 <= one.actor < len(scene.actors):
+                    self._cover(one, scene.actors[one.actor], view, options, target.size)
+            self.context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+            covered = mask.resolve()
+            covered.build_mipmaps(max_level=_LEVEL)
+            covered.use(0)
+            self._compose(target)
+
+    def _make(self, target: Target) -> None:
+        """Create masks of the picture's size."""
+        mask = self._mask
+        if mask is not None and (mask.size, mask.samples) == (target.size, target.samples):
+            return
+        self._free()
+        self._mask = Target(self.context, target.size, target.samples)
+        self._mask.texture.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
+        texture = self.context.texture(target.size, 2, dtype="f2")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._distance = [texture, self.context.framebuffer([texture])]
+
+    def _compose(self, target: Target) -> None:
+        """Find distances from the resolved mask, and draw the lines, in tiles with an edge."""
+        size, scale = target.size, picture_scale(target.size)
+        reach = min(int(np.ceil(scale * _WIDTH)) + 2, _MOST)
+        level = min(_LEVEL, int(np.log2(min(size))))
+        tiles = -(-size[0] // _TILE) * -(-size[1] // _TILE)
+        texture, framebuffer = self._distance
+        framebuffer.use()
+        self.context.viewport = (0, 0, *size)
+        framebuffer.clear(1.0, 1.0, 1.0, 1.0)
+        self.context.disable(moderngl.BLEND)
+        edges = {"u_mask": 0, "u_reach": reach, "u_level": level}
+        set_uniforms(self._spread, edges)
+        self._arrays[0].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=tiles)
+        self.context.enable(moderngl.BLEND)
+        target.framebuffer.use()
+        self.context.viewport = (0, 0, *size)
+        texture.use(1)
+        colors = np.array(_COLORS, dtype="f4").tobytes()
+        values = {"u_distance": 1, "u_width": scale * _WIDTH, "u_colors": colors}
+        set_uniforms(self._line, {**edges, **values})
+        self._arrays[1].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=tiles)
+
+    def _cover(
+        self,
+        one: Outlined,
+        actor: Actor,
+        view: View,
+        options: DisplayOptions,
+        size: tuple[int, int],
+    ) -> None:
+        """Add the coverage of one part to the mask."""
+        mask = (0.0, 1.0, 0.0, 1.0) if one.is_hovered else (1.0, 0.0, 0.0, 1.0)
+        if len(one.points):
+            marks = dots(one.points, np.array(mask), picture_scale(size) * _POINT)
+            self._segments.draw(marks, view, size, Manner(on_top=True))
+            return
+        if not actor.is_drawn:
+            return
+        if shows_skeleton(actor, options):
+            self._cover_joints(actor, one.joint, mask, view, options)
+        if one.joint >= 0:
+            return
+        if shows_mesh(actor.figure, options):
+            self._cover_mesh(actor, mask, view, options)
+        if has_points(actor):
+            self._cover_points(actor, mask, view, options)
+
+    def _cover_joints(
+        self,
+        actor: Actor,
+        joint: int,
+        mask: tuple[float, ...],
+        view: View,
+        options: DisplayOptions,
+    ) -> None:
+        skeleton = self.tools.buffers.skeleton(actor)
+        program = joint_program(self.tools.programs, skeleton, options, "", "mask")
+        set_uniforms(program, {"u_mask": mask})
+        draw_joints(program, skeleton, placement_of(actor, options), view, options, only=joint)
+
+    def _cover_mesh(
+        self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
+    ) -> None:
+        mesh = self.tools.buffers.posed_mesh(actor)
+        mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
+        program = self.tools.programs.drawing("mesh", fragment="mask")
+        set_uniforms(program, {"u_mask": mask})
+        self.tools.meshes.draw_shape(mesh, placement_of(actor, options), view, options, "mask")
+
+    def _cover_points(
+        self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
+    ) -> None:
+        points = self.tools.buffers.points_of(actor)
+        points.update(actor, actor.placement, view, options.min_confidence)
+        set_uniforms(self.tools.programs.drawing("point", fragment="mask"), {"u_mask": mask})
+        self.tools.points.draw_shapes(points, actor.placement, view, "mask")
+
+    def _free(self) -> None:
+        for item in self._distance:
+            item.release()
+        if self._mask is not None:
+            self._mask.release()
+        self._mask, self._distance = None, []
+
+    def release(self) -> None:
+        """Free the masks and vertex arrays."""
+        self._free()
+        self._segments.release()
+        for array in self._arrays:
+            array.release()

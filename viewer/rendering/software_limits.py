@@ -1,0 +1,67 @@
+"""Passes of final quality that software rendering draws in reasonable time."""
+
+from __future__ import annotations
+
+import math
+
+import moderngl
+
+from viewer.rendering.gpu.context import is_software
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.scene import Scene
+
+__all__ = ["limit_passes", "seconds_per_pass"]
+
+_PATIENCE = 2.0  # seconds for a still picture
+_FEWEST = 3  # passes; fewer look no better than normal quality
+_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # seconds on two cores, measured
+
+
+def seconds_per_pass(size: tuple[int, int], n_triangles: int) -> float:
+    """Return about how long llvmpipe draws a pass of final quality on two cores.
+
+    >>> round(seconds_per_pass((1280, 720), 12000), 2)
+    0.13
+    """
+    return _PER_PASS + _PER_PIXEL * math.prod(size) + _PER_TRIANGLE * n_triangles
+
+
+def limit_passes(
+    options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
+) -> list[str]:
+    """Lower a quality that would take longer than two seconds in software.
+
+    Estimated and not measured, so that the picture does not depend on what else runs.
+
+    Parameters
+    ----------
+    options : DisplayOptions
+        Changed if necessary.
+    scene : Scene
+        What is drawn.
+    size : (int, int)
+        Width and height in pixels.
+    context : moderngl.Context
+        Tells whether drawing is done in software.
+
+    Returns
+    -------
+    list of str
+        A message if the quality was lowered.
+    """
+    if options.quality != "final" or not is_software(context):
+        return []
+    meshes = [actor.figure.mesh for actor in scene.actors if actor.is_drawn]
+    seconds = seconds_per_pass(size, sum(mesh.n_triangles for mesh in meshes if mesh))
+    passes, wanted = int(_PATIENCE / seconds), options.passes
+    if passes >= wanted:
+        return []
+    what = f"{passes} of {wanted} passes"
+    if passes < _FEWEST:
+        options.quality, what = "normal", "normal quality"
+    else:
+        options.passes = passes
+    return [
+        f"drawn with {what}, as software rendering takes about {seconds:.1f} s for each of "
+        f"{wanted}; --quality final draws them all"
+    ]
