@@ -17,12 +17,11 @@ uniform float u_shadow_offset;   // along the normal of a surface that the light
 uniform float u_shadow_strength;
 #endif
 
-// Fraction of a light, key or rim, that reaches a surface: from the cosine of its incidence, and the
-// fraction of the ambient light, which also stands for the rim light's shadow.
-float visibility(int light, vec3 position, vec3 normal, float cosine, float ambient) {
-    if (light == 1)
-        return mix(1.0, ambient, 0.7);
+// Fraction of a light, key or rim, that reaches a surface; the cosine is that of its incidence.
+float visibility(int light, vec3 position, vec3 normal, float cosine) {
 #ifdef SHADOWS
+    if (light != 0)
+        return 1.0;
     float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     vec3 lifted = position + u_shadow_offset * (0.2 + sine) * normal;
     vec4 place = u_shadow_matrix * vec4(lifted, 1.0);

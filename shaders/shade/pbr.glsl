@@ -93,13 +93,15 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     if (u_has_emissive_map)
         color *= texture(u_emissive_map, place(EMISSIVE)).rgb;
 #endif
-    occlusion *= ambient_visibility(position.z);
+    float ambient = ambient_visibility(position.z);
+    occlusion *= ambient;
     for (int i = 0; i < 2; ++i) {
         float cosine = max(dot(normal, u_light_directions[i]), 0.0);
-        float seen = visibility(i, position, normal, cosine);
+        float seen = visibility(i, position, normal, cosine, ambient);
         color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
         // The studio's key box hangs about where the key light is, and the same things hide it.
-        occlusion *= 1.0 - BOX * cosine * (1.0 - seen);
+        if (i == 0)
+            occlusion *= 1.0 - BOX * cosine * (1.0 - seen);
     }
     color += surrounding(s, normal, to_eye, occlusion);
     return toned(color);

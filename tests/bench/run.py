@@ -18,6 +18,7 @@ NAMES = [
     "motion",
     "read",
     "captures",
+    "observing",
     "losses",
     "lint",
     "transfer",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import faults
 import numpy as np
 from plain_bvh import PlainBvh
 
@@ -54,7 +55,7 @@ def chain(count: int = 3) -> Skeleton:
 
 def write(animation: SampledAnimation, folder: Path, **options) -> tuple[PlainBvh, list[str]]:
     path = folder / "out.bvh"
-    notes = export_animation(animation, path, "bvh", MotionOptions(**options))
+    notes = faults.lines(export_animation(animation, path, "bvh", MotionOptions(**options)))
     return PlainBvh(path), [note.replace(str(path), "PATH") for note in notes]
 
 

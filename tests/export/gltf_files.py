@@ -1,5 +1,6 @@
 """Write glTF files, and hold what a program would draw to the float64 reference."""
 
+import faults
 import numpy as np
 from numpy.testing import assert_allclose
 from plain_gltf import Gltf
@@ -16,7 +17,7 @@ AS_IS = np.eye(3)
 
 
 def write(folder, actor, name="out.glb", **skinning) -> tuple[Gltf, list[str]]:
-    notes = export(actor, folder / name, Skinning(**skinning))
+    notes = faults.lines(export(actor, folder / name, Skinning(**skinning)))
     return Gltf(folder / name), notes
 
 

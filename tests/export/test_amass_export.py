@@ -1,5 +1,6 @@
 """Motions as AMASS: what smplx makes of the file is what the figure showed."""
 
+import faults
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
@@ -44,7 +45,7 @@ def family(tmp_path_factory):
 
 def written(animation, path, **options):
     """Export an animation; return the arrays of the file and the notes."""
-    notes = export_animation(animation, path, "amass", MotionOptions(**options))
+    notes = faults.lines(export_animation(animation, path, "amass", MotionOptions(**options)))
     with np.load(path) as arrays:
         return dict(arrays), notes
 
@@ -167,7 +168,7 @@ def test_gaps_are_held_and_marked(family, tmp_path):
     expected = motion.vectors.reshape(4, 72)[rows]
     assert_allclose(arrays["poses"], expected, rtol=0, atol=ATOL)
     assert notes[1:] == [
-        "frames 10, 13 to 14 missing: the last pose is held, and the frames are marked in present"
+        "missing frames 10, 13 to 14: the last pose is held, and the frames are marked in present"
     ]
     back = read(Source.open(tmp_path / "a.npz"))
     assert (back.timing.rows >= 0).tolist() == arrays["present"].tolist()
@@ -189,15 +190,15 @@ def test_gaps_are_bridged(family, tmp_path):
 
 def test_gaps_split_the_file(family, tmp_path):
     motion = family_motion(24, rows=GAPS)
-    notes = export_animation(
+    notes = faults.lines(export_animation(
         family_animation(family("smpl"), motion), tmp_path / "a.npz", "amass",
         MotionOptions(gaps="split"),
-    )  # fmt: skip
+    ))  # fmt: skip
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.npz", "a-2.npz"]
     assert notes == [
         f"{tmp_path}/a-1.npz: 2 frames of SMPL at 50 fps, y up",
         f"{tmp_path}/a-2.npz: 2 frames of SMPL at 50 fps, y up",
-        "frames 0, 3 to 4 missing: omitted between the files",
+        "missing frames 0, 3 to 4: omitted between the files",
     ]
     with np.load(tmp_path / "a-2.npz") as arrays:
         assert_allclose(arrays["poses"], motion.vectors[2:].reshape(2, 72), rtol=0, atol=ATOL)

@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -65,7 +66,7 @@ def written(actor, path, **settings):
     animation = sample_animation(
         actor, **{key: settings.pop(key) for key in ("rate", "frames") if key in settings}
     )
-    notes = export_animation(animation, path, "anim", MotionOptions(**settings))
+    notes = faults.lines(export_animation(animation, path, "anim", MotionOptions(**settings)))
     return read(Source.open(path)) if path.exists() else None, notes
 
 

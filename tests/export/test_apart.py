@@ -56,7 +56,7 @@ def moved(of: Body, by: Poses) -> np.ndarray:
     owners = np.repeat(np.arange(VERTICES), np.diff(of.skin.starts))
     np.add.at(dense, (owners, of.skin.joints), of.skin.weights)
     rest = np.broadcast_to(of.positions, (FRAMES, VERTICES, 3)).copy()
-    for directions, weights in ((of.shapes, by.weights), (of.correctives, by.turns)):
+    for directions, weights in ((of.shapes, by.weights), (of.correctives, by.corrective_weights)):
         if directions is not None and weights.shape[1]:
             rest += np.einsum("fs,sva->fva", weights, directions)
     points = np.concatenate([rest, np.ones((FRAMES, VERTICES, 1))], axis=2)
@@ -83,9 +83,13 @@ def pairs():
     full = body(rng, shapes=2, corrected=True)
     all_of_it = poses(rng, full)
     bare = Body(full.positions, full.skin)
-    still = replace(all_of_it, weights=np.zeros((1, 0)), turns=np.zeros((FRAMES, 0)))
+    still = replace(all_of_it, weights=np.zeros((1, 0)), corrective_weights=np.zeros((FRAMES, 0)))
     yield "rest", full, all_of_it, bare, still
-    other = replace(all_of_it, turns=all_of_it.turns + 1e-3, weights=all_of_it.weights * 0.9)
+    other = replace(
+        all_of_it,
+        corrective_weights=all_of_it.corrective_weights + 1e-3,
+        weights=all_of_it.weights * 0.9,
+    )
     yield "less", full, all_of_it, full, changed(rng, other, 0.02)
     strayed = replace(full, shapes=full.shapes * 1.01, positions=full.positions + 1e-3)
     yield "strayed", full, all_of_it, strayed, changed(rng, all_of_it, 1e-6)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from rig import hand_made
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import MotionOptions, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -22,7 +22,7 @@ from viewer.rig.skin import skin_from_lists
 TOLD = 5e-3  # three digits are told
 
 
-def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> list[str]:
+def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> list[Diagnostic]:
     return export_animation(animation, folder / name, kind, MotionOptions())
 
 
@@ -49,11 +49,18 @@ def densest(actor: Actor, rate: float) -> float:
     return float(np.max(2.0 * np.abs(np.sin(0.5 * (evaluate(turn, times) - straight)))))
 
 
-def between(notes: list[str]) -> float:
+def error_between(notes: list[Diagnostic]) -> Diagnostic:
+    """Return the only error between frames."""
+    between_frames = Phrase("motion-between-frames")
+    (note,) = [note for note in notes if note.values.get("original") == between_frames]
+    return note
+
+
+def between(notes: list[Diagnostic]) -> float:
     """Return by how many units joints differ between frames."""
-    (line,) = [note for note in notes if " between frames " in note]
-    assert "an estimate" not in line
-    return float(re.search(r"joints differ .*? by up to (\S+) units", line)[1])
+    note = error_between(notes)
+    assert note.values["estimate"] == ""
+    return note.values["joint"].values["distance"]
 
 
 @pytest.mark.parametrize(("kind", "name"), [("bvh", "a.bvh"), ("gltf", "a.glb")])
@@ -85,11 +92,12 @@ def test_vertices_between_frames_are_told_too(tmp_path):
     skin = skin_from_lists([[(0, 1.0)]] * 3, np.tile(np.eye(4), (2, 1, 1)))
     figure = replace(actor.figure, mesh=mesh, skin=skin, unit="m")
     notes = write(sample_animation(Actor(figure, clip=actor.clip), 1.0), tmp_path, "gltf", "a.glb")
-    (line,) = [note for note in notes if " between frames " in note]
-    size = 2000.0 * np.sin(4.0 / 27.0)
-    found = re.findall(r"by up to (\S+) mm \((.*?)\)", line)
-    assert [label for _, label in found] == ["j1", "vertex 0"]
-    assert [float(each) for each, _ in found] == pytest.approx([size, 3.0 * size], rel=TOLD)
+    note = error_between(notes)
+    joint, vertex = note.values["joint"].values, note.values["vertex"].values
+    size = 2.0 * np.sin(4.0 / 27.0)
+    assert (joint["joint"], vertex["vertex"]) == ("j1", 0)
+    found = [joint["distance"], vertex["distance"]]
+    assert found == pytest.approx([size, 3.0 * size], rel=TOLD)
 
 
 @pytest.mark.slow
@@ -97,7 +105,6 @@ def test_motions_too_long_to_be_sure_of_say_so(tmp_path):
     """Two minutes at 20 fps: more spans between frames than are all sampled."""
     actor = swinging(end=120.0)
     notes = write(sample_animation(actor, 20.0), tmp_path, "bvh", "a.bvh")
-    (line,) = [note for note in notes if " between frames " in note]
-    assert re.search(r"\(an estimate from \d+ times\)", line)
-    size = float(re.search(r"by up to (\S+) units", line)[1])
-    assert size == pytest.approx(densest(actor, 20.0), rel=TOLD)
+    note = error_between(notes)
+    assert note.values["estimate"].key == "estimated-times"
+    assert note.values["joint"].values["distance"] == pytest.approx(densest(actor, 20.0), rel=TOLD)

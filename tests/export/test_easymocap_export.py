@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 from export.plain_smpl import rotation
@@ -41,7 +42,7 @@ def frames_in(folder):
 
 
 def written(animation, path, **options):
-    notes = export_animation(animation, path, "easymocap", MotionOptions(**options))
+    notes = faults.lines(export_animation(animation, path, "easymocap", MotionOptions(**options)))
     return frames_in(path), notes
 
 
@@ -129,7 +130,9 @@ def test_recording_comes_back(shared_data, tmp_path):
         animation_of_clip(figure, clip_of(folder / "easymocap", figure, person))
         for person in (0, 1)
     ]
-    notes = easymocap.export_animations(animations, tmp_path / "out", MotionOptions(world_up="z"))
+    notes = faults.lines(
+        easymocap.export_animations(animations, tmp_path / "out", MotionOptions(world_up="z"))
+    )
     assert notes[0].startswith(f"{tmp_path}/out/smpl: 30 frames of 2 people, z up")
     found = frames_in(tmp_path / "out")
     wanted = frames_in(folder / "easymocap")
@@ -148,7 +151,9 @@ def test_people_and_gaps_land_in_the_same_files(family, tmp_path):
     second = family_animation(
         figure, family_motion(24, first_frame=9, shape=waves(1, 10, seed=9.0))
     )
-    notes = easymocap.export_animations([first, second], tmp_path, MotionOptions(), [7, 3])
+    notes = faults.lines(
+        easymocap.export_animations([first, second], tmp_path, MotionOptions(), [7, 3])
+    )
     frames = frames_in(tmp_path)
     assert {frame: [record["id"] for record in people] for frame, people in frames.items()} == {
         5: [7], 6: [], 7: [7], 8: [], 9: [3], 10: [3], 11: [3], 12: [3],

@@ -115,7 +115,9 @@ def test_the_same_pose_gives_the_same_bytes(tmp_path):
 
 def test_arrays_are_listed(tmp_path):
     (note,) = export(seamed_actor(), tmp_path / "out.npz")
-    assert note.startswith(f"{tmp_path / 'out.npz'}: name, up, unit, vertices, normals, triangles")
+    assert (note.key, note.path) == ("X001.arrays", tmp_path / "out.npz")
+    first = ["name", "up", "unit", "vertices", "normals", "triangles"]
+    assert note.values["names"][:6] == first
 
 
 # Captured points
@@ -134,8 +136,8 @@ def sampled_points(present=(True, False)):
 
 def test_points_of_all_frames(tmp_path):
     path = tmp_path / "two.npz"
-    (line,) = export_points(sampled_points(), path, MotionOptions(world_up="z"))
-    assert line == (
+    (note,) = export_points(sampled_points(), path, MotionOptions(world_up="z"))
+    assert str(note) == (
         f"{path}: 2 frames at 10 fps; 1 of them missing, NaN, z up: name, up, frame_rate, "
         "times, frames, present, points, confidences, joint_names, limbs, sides, layout"
     )

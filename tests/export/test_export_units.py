@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 from formats.bvh_text import PERSON_JOINTS, PERSON_TURNED, person
@@ -90,7 +91,7 @@ def test_the_error_in_millimetres_is_that_of_the_file(tmp_path):
     for unit, millimetres in (("cm", 10.0), ("mm", 1.0), ("in", 25.4)):
         animation = sample_animation(Actor(Figure("a", skeleton=skeleton, unit=unit), clip=clip))
         options = MotionOptions(unit=unit, digits=1)
-        notes = export_animation(animation, tmp_path / "a.bvh", "bvh", options)
+        notes = faults.lines(export_animation(animation, tmp_path / "a.bvh", "bvh", options))
         assert f"joints differ from the motion by up to {0.04 * millimetres:.3g} mm (" in notes[1]
 
 
@@ -122,7 +123,7 @@ def test_gltf_of_metres_that_were_asked_for_has_no_such_node(walk, tmp_path, cap
 def test_gltf_turns_and_scales_a_skinned_mesh_at_once(tmp_path):
     actor = seamed_actor(unit="in", up="z")
     actor.pose.figure_translation[:], actor.pose.figure_scale = [1, 2, 3], 2.0
-    notes = export(actor, tmp_path / "a.glb")
+    notes = faults.lines(export(actor, tmp_path / "a.glb"))
     gltf = Gltf(tmp_path / "a.glb")
     order = np.unique(np.round(gltf.vertices()[0], 6), axis=0)
     wanted = 0.0254 * (2 * POSITIONS + [1, 2, 3]) @ TO_Z  # (x, y, z) -> (x, z, -y)
@@ -154,7 +155,9 @@ def smpl_animation(unit="cm", n_frames=3):
 @pytest.mark.parametrize("up", ["", "z"])
 def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
     animation, vectors, places = smpl_animation()
-    notes = export_animation(animation, tmp_path / "a.npz", "amass", MotionOptions(up=up))
+    notes = faults.lines(
+        export_animation(animation, tmp_path / "a.npz", "amass", MotionOptions(up=up))
+    )
     turn = TO_Z if up else np.eye(3)
     with np.load(tmp_path / "a.npz") as arrays:
         for frame in range(3):
@@ -174,7 +177,9 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
 
 def test_easymocap_of_a_skeleton_turns_about_the_origin(tmp_path):
     animation, vectors, places = smpl_animation()
-    notes = export_animation(animation, tmp_path / "out", "easymocap", MotionOptions())
+    notes = faults.lines(
+        export_animation(animation, tmp_path / "out", "easymocap", MotionOptions())
+    )
     for frame in range(3):
         (record,) = json.loads((tmp_path / "out" / "smpl" / f"{frame:06}.json").read_text())
         # V = R X + T, of the pelvis X = J0.

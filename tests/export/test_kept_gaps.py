@@ -2,6 +2,7 @@
 
 import json
 
+import faults
 import numpy as np
 import pytest
 from export.plain_readers import read_obj
@@ -47,7 +48,7 @@ def moving_roof():
 )
 def test_numbered_meshes(tmp_path, gaps, places):
     name = tmp_path / "m_{frame:02}.obj"
-    notes = export_animation(moving_roof(), name, "obj", MotionOptions(gaps=gaps))
+    notes = faults.lines(export_animation(moving_roof(), name, "obj", MotionOptions(gaps=gaps)))
     files = {int(path.stem[2:]): read_obj(path).v for path in tmp_path.iterdir()}
     assert files.keys() == places.keys()
     for frame, x in places.items():
@@ -65,7 +66,7 @@ def test_numbered_meshes(tmp_path, gaps, places):
 )
 def test_arrays(tmp_path, gaps, x):
     path = tmp_path / "a.npz"
-    notes = export_animation(moving_roof(), path, "npz", MotionOptions(gaps=gaps))
+    notes = faults.lines(export_animation(moving_roof(), path, "npz", MotionOptions(gaps=gaps)))
     with np.load(path) as arrays:
         assert_allclose(arrays["vertices"][:, :, 0], np.add.outer(x, POSITIONS[:, 0]), atol=1e-12)
         assert_array_equal(arrays["present"], ~np.isnan(x))
@@ -92,7 +93,7 @@ def test_folders(tmp_path, gaps, rows, note):
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
     animation = family_animation(family_figure("smpl", tmp_path), motion)
     out = tmp_path / "out"
-    notes = export_animation(animation, out, "easymocap", MotionOptions(gaps=gaps))
+    notes = faults.lines(export_animation(animation, out, "easymocap", MotionOptions(gaps=gaps)))
     assert notes[1:] == [note]
     for frame, row in enumerate(rows, 5):
         people = json.loads((out / "smpl" / f"{frame:06}.json").read_text())

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
 from family_animations import family_animation, family_motion, waves
@@ -18,6 +18,7 @@ from rig import hand_made
 from stretched import GROWTH, JOINTS, NAMES, POSITIONS, WEIGHTS, WORST, chain_animation
 
 import viewer
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import MotionOptions, export, export_animation
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
@@ -35,21 +36,35 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
+from viewer.rig.units import METRES
 
 TOLD = 5e-3  # three digits are told
 
 
-def said(notes: list[str]) -> dict[str, tuple[float, str]]:
-    """Return what the one line of differences says: by joints and vertices, size and place."""
-    lines = [note for note in notes if " differ from " in note]
-    assert len(lines) <= 1
-    if not lines:
-        return {}
-    found = re.findall(r"(joints|vertices)[^;]*? by up to (\S+) mm \(([^)]*)\)", lines[0])
-    return {what: (float(size), place) for what, size, place in found}
+def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
+    """Return the only measured error: of joints and vertices, size in mm and place."""
+    measured = errors(notes)
+    assert len(measured) <= 1
+    found = {}
+    for note in measured:
+        for what, part in (("joints", "joint"), ("vertices", "vertex")):
+            if part in note.values:
+                far = note.values[part].values
+                place = far["joint"] if part == "joint" else f"vertex {far['vertex']}"
+                place += f", frame {far['frame']}" if "frame" in far else ""
+                found[what] = (1000.0 * METRES[far["unit"]] * far["distance"], place)
+    return found
 
 
-def write(animation: SampledAnimation, folder: Path, kind: str, name: str, **options) -> list[str]:
+def errors(notes: list[Diagnostic]) -> list[Diagnostic]:
+    """Return the measured errors of whole files."""
+    keys = ("X002.joints", "X002.vertices", "X002.both")
+    return [note for note in notes if note.key in keys]
+
+
+def write(
+    animation: SampledAnimation, folder: Path, kind: str, name: str, **options
+) -> list[Diagnostic]:
     return export_animation(animation, folder / name, kind, MotionOptions(**options))
 
 
@@ -94,12 +109,10 @@ def test_files_of_parts_tell_their_own_losses(tmp_path):
     animation = sample_animation(Actor(whole.figure, clip=clip))
     for kind, suffix in (("bvh", "bvh"), ("gltf", "glb")):
         notes = write(animation, tmp_path, kind, f"a.{suffix}", gaps="split")
-        lines = [note for note in notes if " differ from " in note]
-        assert [line.split(":")[0] for line in lines] == [
-            str(tmp_path / f"a-{number}.{suffix}") for number in (1, 2)
-        ]
-        assert said(lines[:1])["joints"] == (pytest.approx(100, rel=TOLD), "high, frame 1")
-        assert said(lines[1:])["joints"] == (pytest.approx(200, rel=TOLD), "high, frame 3")
+        found = errors(notes)
+        assert [note.path for note in found] == [tmp_path / f"a-{i}.{suffix}" for i in (1, 2)]
+        assert said(found[:1])["joints"] == (pytest.approx(100, rel=TOLD), "high, frame 1")
+        assert said(found[1:])["joints"] == (pytest.approx(200, rel=TOLD), "high, frame 3")
 
 
 def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
@@ -180,9 +193,8 @@ def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, p
     assert_allclose(drawn[2], [1.5, 0, 1], rtol=0, atol=1e-5)  # times are in single precision
     wanted = 1000 * 0.002 * np.hypot(1.5, 1.0)
     assert said(notes) == {"vertices": (pytest.approx(wanted, rel=TOLD), f"vertex 2, frame {peak}")}
-    assert [note for note in notes if "do not add up to 1" in note] == [
-        note for note in notes if " differ from " in note
-    ]
+    (note,) = errors(notes)
+    assert note.values["causes"] == [Phrase("weights-unnormalized", n=1, negative=0)]
 
 
 def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
@@ -200,10 +212,11 @@ def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path
     animation = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
     assert said(notes) == {}
-    (line,) = [note for note in notes if "JOINTS_0" in note]
-    assert line.startswith("up to 5 influences per vertex") and line.endswith("of up to 100 mm")
+    (note,) = [note for note in notes if note.key == "X002.first-influences"]
+    assert note.values["most"] == 5 and note.values["distance"] == pytest.approx(0.1, rel=TOLD)
     cut = write(animation, tmp_path, "gltf", "b.glb", skinning=Skinning(max_influences=4))
-    assert said(cut) == {} and not [note for note in cut if "JOINTS_0" in note]
+    assert said(cut) == {}
+    assert not any(note.key in ("X002.first-influences", "X005.influences") for note in cut)
 
 
 def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path):
@@ -215,15 +228,14 @@ def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path
     row = (0.3, 0.3, 0.2, 0.1, 0.05)
     animation = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
-    (line,) = [note for note in notes if "JOINTS_0" in note]
-    size = float(re.search(r"errors of up to (\S+) mm", line)[1])
-    assert size == pytest.approx(1000 * np.hypot(0.1, 0.05), rel=TOLD)
+    (note,) = [note for note in notes if note.key == "X002.first-influences"]
+    assert note.values["distance"] == pytest.approx(np.hypot(0.1, 0.05), rel=TOLD)
 
 
 def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
     animation = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
-    assert "up to 5 influences per vertex, all of them written, strongest first" in notes
+    assert ("X005.influences", {"most": 5}) in faults.told(notes)
 
 
 # Formats without a place for something
@@ -287,8 +299,9 @@ def test_bodies_at_rest_in_another_shape_lose_nothing(tmp_path, suffix):
     actor = viewer.load(tmp_path / "body.npz").actors[0]
     actor.pose.shape_weights[:3] = 2.0, -1.0, 0.5
     notes = export(actor, tmp_path / f"a.{suffix}")
-    assert said(notes) == {} and not [note for note in notes if " mm" in note]
-    assert any("pose correctives" in note for note in notes if note.startswith("not held by"))
+    assert not any(note.code == "X002" for note in notes)
+    (note,) = [note for note in notes if note.key == "X003.parts"]
+    assert Phrase("part-correctives") in note.values["parts"]
 
 
 def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
@@ -332,9 +345,10 @@ def test_a_peak_between_frames_is_told(tmp_path, at):
     size = pytest.approx(1000 * (3.0 - low), rel=TOLD)
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
         notes = write(animation, tmp_path, kind, name)
-        (line,) = [note for note in notes if " differ from " in note]
-        assert line.endswith(": written at 1 fps") and " between frames by " in line
-        found = said([line])
+        (note,) = errors(notes)
+        assert note.values["rate"] == 1.0
+        assert note.values["original"] == Phrase("motion-between-frames")
+        found = said([note])
         assert found["joints"][0] == size and found["vertices"][0] == size
 
 

@@ -1,5 +1,6 @@
 """Wavefront ``.obj``, read back by a parser of the tests."""
 
+import faults
 import numpy as np
 import pytest
 from export.plain_readers import read_mtl, read_obj
@@ -27,7 +28,7 @@ from viewer.rig.skinning import Skinning
 
 
 def write(tmp_path, actor, name="out.obj", **skinning):
-    notes = export(actor, tmp_path / name, Skinning(**skinning))
+    notes = faults.lines(export(actor, tmp_path / name, Skinning(**skinning)))
     return read_obj(tmp_path / name), notes
 
 

@@ -1,5 +1,6 @@
 """Binary ``.ply``: header and every byte behind it, read back by a parser of the tests."""
 
+import faults
 import numpy as np
 import pytest
 from export.plain_readers import columns, read_ply
@@ -26,7 +27,7 @@ FLOAT32 = 2.0**-24  # half a unit in the last place, relative
 
 
 def write(tmp_path, actor):
-    notes = export(actor, tmp_path / "out.ply")
+    notes = faults.lines(export(actor, tmp_path / "out.ply"))
     return read_ply(tmp_path / "out.ply"), notes
 
 

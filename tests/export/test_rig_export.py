@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 from formats.pig_text import write as write_pig
@@ -13,6 +14,7 @@ from rig.hand_made import skeleton
 from seamed import JOINTS, PICTURE, POSITIONS, TRIANGLES, UVS, seamed_actor, seamed_mesh
 
 import viewer
+from viewer.diagnostics import Phrase
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
 from viewer.export import export
 from viewer.rig.figure import Figure
@@ -35,13 +37,19 @@ def there_and_back(actor, folder, **skinning):
 
 
 def told_error(notes):
-    """Return how far vertices are said to be off, number and unit; 0 if nothing is said."""
-    lines = [note for note in notes if " differ from the pose by " in note]
-    if not lines:
+    """Return the largest error of the vertices, number and unit; 0 if there is none."""
+    measured = [note for note in notes if note.code == "X002"]
+    if not measured:
         return 0.0, ""
-    (line,) = lines
-    found = re.search(r"rig\.skin: (?:joints .*; )?vertices .*?by up to (\S+) (.+) \(", line)
-    return float(found[1]), found[2]
+    (note,) = measured
+    assert note.path.name == "rig.skin" and note.values["original"] == Phrase("the-original-pose")
+    number, unit = note.values["vertex"].values["length"].split(" ", 1)
+    return float(number), unit
+
+
+def parts_not_held(notes):
+    """Return the parts of the figure that the files do not hold."""
+    return [part for note in notes if note.key == "X003.parts" for part in note.values["parts"]]
 
 
 def vertices(actor):
@@ -101,9 +109,8 @@ def test_shape_is_baked_into_the_rest_mesh(tmp_path, body):
     inverse_bind = again.figure.skin.inverse_bind[place]
     assert_allclose(inverse_bind[:, :3, 3], -joints, rtol=0, atol=EXACT)
     assert again.figure.n_shapes == 0
-    (lost,) = [note for note in notes if note.startswith("not held")]
-    assert "10 blend shapes (the current shape is kept)" in lost
-    assert "pose correctives" in lost and "the joint regressor" in lost
+    shapes, correctives = Phrase("part-current-shape", n=10), Phrase("part-correctives")
+    assert parts_not_held(notes) == [shapes, correctives, Phrase("part-regressor")]
 
 
 def test_weights_follow_their_joints_into_the_new_order(tmp_path, body):
@@ -142,7 +149,7 @@ def test_several_roots_stay_roots(tmp_path):
 
 def test_skeleton_without_mesh_writes_one_file(tmp_path):
     actor = Actor(Figure("bones", skeleton=ball_skeleton(("hip",), np.array([-1]), np.eye(1, 3))))
-    notes = export(actor, tmp_path / "rig.skin")
+    notes = faults.lines(export(actor, tmp_path / "rig.skin"))
     assert names(tmp_path) == ["rig.skel"]
     assert notes == [f"{tmp_path / 'rig.skel'}: 1 joint"]
 
@@ -199,7 +206,7 @@ def test_scale_becomes_part_of_all_lengths(tmp_path):
     actor = seamed_actor(unit="m")
     actor.pose.figure_scale = 1.5
     again, notes = there_and_back(actor, tmp_path)
-    assert not [note for note in notes if "not held" in note and "scale" in note]
+    assert parts_not_held(notes) == []
     assert told_error(notes) == (0, "")
     wanted = 1.5 * actor.figure.mesh.positions
     found = viewer.deform(again.figure, again.pose)[0]
@@ -219,7 +226,7 @@ def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeyp
 
 def test_up_axis_is_said_to_be_lost(tmp_path):
     _, notes = there_and_back(seamed_actor(up="z"), tmp_path)
-    assert "not held by .skel and .skin: the up axis z" in notes
+    assert parts_not_held(notes) == [Phrase("part-up", up="z")]
 
 
 # Weights and seams
@@ -234,7 +241,7 @@ def test_raw_weights_are_kept(tmp_path):
     assert told_error(notes) == (0, "")
     sums = np.add.reduceat(again.figure.skin.weights, again.figure.skin.starts[:-1])
     assert_array_equal(sums, [0.5, 1, 1, 1, 1, 1, 0.75])  # vertices 1 and 2 are split
-    assert "5 vertices are 7 in the .skin" in " ".join(notes)
+    assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
 def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
@@ -244,9 +251,8 @@ def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
     _, notes = there_and_back(actor, tmp_path)
     # As part of the skin only half of the 5 m reach vertex 0.
     assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
-    lost = " ".join(notes)
-    for words in ("the up axis z", "body parts", "the symmetry map", "the reduced mesh"):
-        assert words in lost
+    lost = ["part-up", "part-body-parts", "part-symmetry", "part-reduced", "part-regressor"]
+    assert [part.key for part in parts_not_held(notes)] == lost
 
 
 @pytest.mark.parametrize(
@@ -279,7 +285,7 @@ def test_seams_are_split(tmp_path):
     assert_array_equal(mesh.positions[mesh.triangles], POSITIONS[TRIANGLES])
     corners = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 3]])
     assert_array_equal(mesh.uvs[mesh.triangles], UVS[corners])
-    assert "split at texture seams: 5 vertices are 7 in the .skin" in notes
+    assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
 def test_texture_goes_along(tmp_path):

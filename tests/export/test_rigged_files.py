@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
 from autorig.rigged_shapes import arm
@@ -60,7 +61,7 @@ def test_without_correctives_the_target_is_met_in_its_pose(rigged):
 
 def test_course_rig_gives_the_target_and_says_what_is_lost(rigged, tmp_path):
     target, found = rigged
-    lines = write_rigged(found, tmp_path / "arm.skel")
+    lines = faults.lines(write_rigged(found, tmp_path / "arm.skel"))
     assert lines[-1].startswith("pose correctives cannot be stored in .skel and .skin: ")
     assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
     files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
@@ -71,7 +72,7 @@ def test_course_rig_gives_the_target_and_says_what_is_lost(rigged, tmp_path):
 
 def test_npz_keeps_correctives(rigged, tmp_path):
     _, found = rigged
-    lines = write_rigged(found, tmp_path / "arm.npz")
+    lines = faults.lines(write_rigged(found, tmp_path / "arm.npz"))
     assert lines == [
         f"{tmp_path / 'arm.npz'}: the figure with its rig, the target's pose, confidence"
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from faults import Fault, warnings_of
 
+from viewer.diagnostics import Phrase
 from viewer.formats import Source, bvh
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
@@ -44,12 +45,12 @@ Frame Time: 0.0333333
 """
 
 
-def read(text: str | bytes) -> tuple[SkeletonMotion, list[Fault | str]]:
+def read(text: str | bytes) -> tuple[SkeletonMotion, list[Fault | Phrase]]:
     """Read a text; return also its warnings as (key, line, values), and what was guessed."""
     data = text if isinstance(text, bytes) else text.encode()
     source = Source("a.bvh", data)
     motion = bvh.read(source)
-    guesses = [motion.unit_note] * bool(motion.unit_note)
+    guesses = [] if motion.unit_note is None else [motion.unit_note]
     return motion, [*warnings_of(source.diagnostics), *guesses, *motion.up_notes]
 
 

@@ -10,6 +10,7 @@ from bvh_text import GOOD, one_joint, read
 from hypothesis import given
 from hypothesis import strategies as st
 
+from viewer.diagnostics import Phrase
 from viewer.formats import Source, detect
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -226,22 +227,30 @@ def test_frame_rate_is_the_usual_one_that_rounds_to_the_time(written: str, rate:
     assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-15)
 
 
+def near(number: float) -> float:
+    return pytest.approx(number, rel=1e-9)
+
+
+def of_size(unit: str, size: float, metres: float = 0.0) -> Phrase:
+    return Phrase("unit-from-size", unit=unit, size=near(size), metres=near(metres))
+
+
 @pytest.mark.parametrize(
     ("factor", "unit", "warnings"),
     [
         (1, "m", []),
-        (100, "cm", ["taken for centimetres (skeleton 170 high)"]),
-        (1000, "mm", ["taken for millimetres (skeleton 1700 high)"]),
+        (100, "cm", [of_size("centimetres", 170)]),
+        (1000, "mm", [of_size("millimetres", 1700)]),
         (
             40,
             "cm",
-            ["taken for centimetres (skeleton 68 high; inches would be 1.73 m)"],
+            [of_size("centimetres", 68, 1.7272)],
         ),
-        (10, "", ["unit unknown (skeleton 17 high)"]),
-        (1e5, "", ["unit unknown (skeleton 1.7e+05 high)"]),
+        (10, "", [Phrase("unit-unknown", size=near(17), metres=0.0)]),
+        (1e5, "", [Phrase("unit-unknown", size=near(1.7e5), metres=0.0)]),
     ],
 )
-def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[str]) -> None:
+def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[Phrase]) -> None:
     text = one_joint("Xrotation", "0").replace("0 1.7 0", f"0 {1.7 * factor:g} 0")
     motion, found = read(text)
     assert (motion.figure.unit, found) == (unit, warnings)
@@ -252,13 +261,13 @@ def test_z_is_up_where_the_head_is_above_the_feet_along_z() -> None:
     text = GOOD.replace("0.0 -0.9 0.0", "0 0 -0.9").replace("0.0 0.6 0.0", "0.0 0.0 0.6")
     motion, warnings = read(text.replace("0.0 1.0 0.0 0 0 0", "0 0 1 0 0 0"))
     assert motion.figure.up == "z"
-    assert warnings == ["z taken for up: the head is above the feet along z"]
+    assert warnings == [Phrase("up-of-head", up="z")]
 
 
 def test_z_is_up_where_a_nameless_skeleton_is_longest_along_z() -> None:
     motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
     assert motion.figure.up == "z"
-    assert warnings == ["z taken for up: the rest skeleton is longest along z"]
+    assert warnings == [Phrase("up-of-longest", up="z")]
 
 
 def test_frames_that_stand_along_another_axis_are_announced() -> None:
@@ -266,7 +275,7 @@ def test_frames_that_stand_along_another_axis_are_announced() -> None:
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
     assert motion.figure.up == "y"
-    assert warnings == ["y taken for up, but in its frames it stands along +z"]
+    assert warnings == [Phrase("up-against-frames", up="y", axis="+z")]
 
 
 def test_content_tells_the_format() -> None:

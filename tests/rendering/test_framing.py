@@ -13,7 +13,7 @@ from viewer.errors import RigError
 from viewer.rendering.camera import Camera, fit
 from viewer.rendering.framing import (
     find_follow,
-    fit_turning,
+    fit_turntable,
     follow_candidates,
     frame_motion,
     outermost,
@@ -110,7 +110,7 @@ def test_following_camera_fits_what_stays_around_it():
 def test_turning_camera_sees_all_the_way_round(up, orthographic):
     points = np.random.default_rng(1).uniform(-1, 1, (500, 3)) * [8.0, 1.0, 0.5]
     camera = Camera(up=up, azimuth=90.0, orthographic=orthographic)
-    fit_turning(camera, points, ASPECT, 360.0)
+    fit_turntable(camera, points, ASPECT, 360.0)
     assert camera.azimuth == 90.0
     for azimuth in np.arange(0.0, 360.0, 7.0):
         turned = camera.copy()
@@ -121,7 +121,7 @@ def test_turning_camera_sees_all_the_way_round(up, orthographic):
 def test_camera_that_does_not_turn_is_fitted_as_ever():
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
     camera, plain = Camera(), Camera()
-    fit_turning(camera, points, ASPECT, 0.0)
+    fit_turntable(camera, points, ASPECT, 0.0)
     fit(plain, points, ASPECT)
     assert camera.distance == plain.distance and (camera.target == plain.target).all()
 

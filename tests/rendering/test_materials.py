@@ -10,13 +10,14 @@ import pytest
 from rendering.drawn_figures import scene_of, sphere, square
 from rendering.front_view import PIXELS, alone, front_view, pixel
 
+from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
-from viewer.rendering.options import Light, Lights
+from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.resources import resource
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Scene, scene_box
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 FLAT = (128, 128, 255)
@@ -352,3 +353,21 @@ def test_the_studio_stands_upright_behind_the_scene(offscreen):
         ray /= np.linalg.norm(ray)
         blurred = 0.8 * sampled(light[4], ray) + 0.2 * sampled(light[5], ray)
         assert np.allclose(pixel(shown, x, y)[:3], encoded(toned(blurred))[0], atol=3)
+
+
+def test_transparent_pictures_catch_the_shadow_in_their_alpha(offscreen):
+    """Black of some opacity under the ball where the light is hidden, nothing far from it."""
+    camera = Camera(azimuth=0.0, inclination=40.0, distance=6.0)
+    pictures = []
+    for quality in ("draft", "normal"):
+        options = DisplayOptions(background="transparent", grid=False, samples=1, quality=quality)
+        scene = alone(Figure("ball", sphere()))
+        pictures.append(
+            offscreen.render(scene, (PIXELS, PIXELS), camera, options, scene_box(scene))
+        )
+    plain, shadowed = pictures
+    ground = plain[..., 3] == 0
+    shadow = ground & (shadowed[..., 3] > 0)
+    assert shadow.sum() > 50
+    assert (shadowed[shadow][:, :3] == 0).all() and shadowed[shadow][:, 3].max() < 200
+    assert (shadowed[0] == 0).all()

@@ -137,7 +137,7 @@ def test_still_scene_keeps_its_pose(offscreen, scene):
 
 def test_turntable_is_a_seamless_loop(offscreen):
     scene = Scene([Actor(arm(3))])
-    recording = recording_of(scene, moves=False, turn=360.0)
+    recording = recording_of(scene, moves=False, turntable=360.0)
     recording.times, recording.camera.azimuth = np.zeros(8), 170.0
     sink = Kept()
     run(offscreen, recording, sink)

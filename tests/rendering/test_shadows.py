@@ -14,7 +14,7 @@ from viewer.rendering.bounds import Bounds
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rendering.software_limits import limit_passes
+from viewer.rendering.quality_limits import limit_passes
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skinning import deform
@@ -183,7 +183,7 @@ def test_software_draws_fewer_passes_of_large_pictures(offscreen):
     """8.3 megapixels take 0.85 s a pass by the estimate: 2 of 8 passes are too few."""
     scene = Scene([])
     found = {}
-    for size in ((640, 480), (2400, 1800), (3840, 2160)):
+    for size in ((640, 480), (2400, 1800), (3840, 2160), (8000, 8000)):
         options = DisplayOptions(quality="final")
         notes = limit_passes(options, scene, size, offscreen.context)
         found[size] = options.quality, options.passes, len(notes)
@@ -193,4 +193,5 @@ def test_software_draws_fewer_passes_of_large_pictures(offscreen):
         (640, 480): ("final", 8, 0),
         (2400, 1800): ("final", 4, 1),
         (3840, 2160): ("normal", 8, 1),
+        (8000, 8000): ("normal", 8, 1),
     }

@@ -265,10 +265,10 @@ MOUSE = (
     ("Alt click", "explain this vertex"),
     ("Left drag", "orbit"),
     ("Right drag, Shift drag", "pan"),
-    ("Right click", "menu of the joint, vertex, actor or background there"),
+    ("Right click", "menu of actions"),
     ("Wheel", "zoom to the pointer"),
     ("Alt drag in the timeline", "seek between whole frames"),
-    ("Axis gizmo", "a click looks along an axis, a drag orbits"),
+    ("Axis gizmo", "click for a view, drag to orbit"),
     ("Drop files", "open them"),
 )
 """Actions of the mouse, listed with the keys."""

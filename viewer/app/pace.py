@@ -73,10 +73,11 @@ class Pace:
         """Move the strength of shadows towards what it should be; return whether it changed."""
         change = min(now - self._now, _LONGEST) / _FADE
         is_first, before, self._now = self._key is None, self._strength, now
+        # A slow frame between two changes is no rest.
+        is_rest = now - self._changed >= _RESTS + 2.0 * self._cost
         if is_changed:
-            self._is_moving = now - self._changed < _RESTS
-            self._changed = now
-        elif now - self._changed >= _RESTS:
+            self._is_moving, self._changed = not is_rest, now
+        elif is_rest:
             self._is_moving = False
         wanted = 0.0 if self._is_moving and self._cost > _SLOW else 1.0
         if is_first or options.quality == "draft":

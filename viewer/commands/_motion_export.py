@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.commands._numbers import number
-from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_line, posed_actors
+from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note, posed_actors
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -113,8 +114,8 @@ def write_motions(
     output: Path,
     skinning: Skinning,
     check: Callable[[list[Path]], None],
-) -> list[str]:
-    """Write every actor's motion; return lines about what was written and what was lost.
+) -> list[Diagnostic]:
+    """Write every actor's motion; return notes about what was written and what was lost.
 
     If one pose is requested, or nothing moves, a motion of one frame is written. People absent
     from all frames are omitted, and the others keep their file names. ``check`` is called with
@@ -138,10 +139,12 @@ def write_motions(
     there = [part for part in parts if part.present.any()]
     if not there:
         raise RigError(f"nobody is present in {parts[0].span}: there is nothing to write")
-    lines = _write(there, output, key, options, check) + _untracked_lines(there, key)
-    away = [part for part in parts if not part.present.any()]
-    lines += [f"{printable(p.animation.name)}: absent in {p.span}, not written" for p in away]
-    return [*lines, *[pose_line(arguments)] * is_pose, *left_out_lines(scene, actors)]
+    notes = _write(there, output, key, options, check) + _untracked_notes(there, key)
+    for part in parts:
+        if not part.present.any():
+            values = {"figure": part.animation.name, "frames": part.span}
+            notes.append(Diagnostic("X003.absent", values=values))
+    return [*notes, *[pose_note(arguments)] * is_pose, *left_out_notes(scene, actors)]
 
 
 def _whole_animation(
@@ -176,10 +179,12 @@ class _Part:
         )
 
     @property
-    def span(self) -> str:
+    def span(self) -> Phrase:
         first = self.animation.first_frame
         last = first + len(self.present) - 1
-        return f"frame {first}" if first == last else f"frames {first} to {last}"
+        if first == last:
+            return Phrase("one-frame", frame=first)
+        return Phrase("frame-range", first=first, last=last)
 
 
 def _write(
@@ -188,24 +193,24 @@ def _write(
     key: str,
     options: MotionOptions,
     check: Callable[[list[Path]], None],
-) -> list[str]:
-    """Write the motions of the people present; return the exporters' messages."""
+) -> list[Diagnostic]:
+    """Write the motions of the people present; return the exporters' notes."""
     if key == "easymocap":
         return _write_capture(parts, output, options)
     files = [
         file for part in parts for file in animation_files(part.animation, part.path, key, options)
     ]
     check(files)
-    lines: list[str] = []
+    notes: list[Diagnostic] = []
     with all_or_none(files):
         for part in parts:
             options.world_up = part.up
             with raising():
-                lines += _write_one(part, key, options)
-    return lines
+                notes += _write_one(part, key, options)
+    return notes
 
 
-def _write_one(part: _Part, key: str, options: MotionOptions) -> list[str]:
+def _write_one(part: _Part, key: str, options: MotionOptions) -> list[Diagnostic]:
     if isinstance(part.animation, SampledAnimation):
         return export_animation(part.animation, part.path, key, options)
     from viewer.export.npz import export_points
@@ -213,7 +218,7 @@ def _write_one(part: _Part, key: str, options: MotionOptions) -> list[str]:
     return export_points(part.animation, part.path, options)
 
 
-def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[str]:
+def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[Diagnostic]:
     """Write all people into one folder."""
     from viewer.export.easymocap import export_animations
 
@@ -227,8 +232,8 @@ def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> 
     return export_animations(animations, output, options, people)
 
 
-def _untracked_lines(parts: list[_Part], key: str) -> list[str]:
-    """Return a message about files of people without a track."""
+def _untracked_notes(parts: list[_Part], key: str) -> list[Diagnostic]:
+    """Return a note about files of people without a track."""
     names = [
         printable(part.path.name) if key != "easymocap" else person_label(part.actor.person)
         for part in parts
@@ -236,21 +241,20 @@ def _untracked_lines(parts: list[_Part], key: str) -> list[str]:
     ]
     if not names:
         return []
-    return [f"{', '.join(names)}: without a track, possibly a different person in each frame"]
+    return [Diagnostic("X005.untracked", values={"names": names})]
 
 
-def left_out_lines(scene: Scene, written: list[Actor]) -> list[str]:
-    """Return messages about what is not written: still figures, and keypoints next to bodies."""
+def left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
+    """Return notes about what is not written: still figures, and keypoints next to bodies."""
     left = [actor for actor in scene.actors if actor not in written]
-    still = [printable(a.name) for a in left if a.clip is None]
-    points = [printable(a.name) for a in left if isinstance(a.clip, PointClip)]
-    why = "it has no motion" if any(a.clip is not None for a in written) else "it has no joints"
-    lines = [f"{name}: {why}, so it is not written" for name in still]
+    still = [actor.name for actor in left if actor.clip is None]
+    points = [actor.name for actor in left if isinstance(actor.clip, PointClip)]
+    moves = any(actor.clip is not None for actor in written)
+    key = "X003.no-motion" if moves else "X003.no-joints"
+    notes = [Diagnostic(key, values={"figure": name}) for name in still]
     if points:
-        names = ", ".join(points)
-        folder = "open only the keypoints3d folder"
-        lines.append(f"keypoints next to bodies are not written ({names}): {folder}")
-    return lines
+        notes.append(Diagnostic("X003.keypoints", values={"names": points}))
+    return notes
 
 
 def pose_or_point_actors(scene: Scene) -> list[Actor]:

@@ -7,13 +7,13 @@ import math
 from pathlib import Path
 
 from viewer.commands._sequence.frame_numbers import numbering_of
+from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.single_frame import upright_single_frame
-from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene
 
 
@@ -54,13 +54,13 @@ def animation_of_pose(
     return upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
 
 
-def pose_line(arguments: argparse.Namespace) -> str:
-    """Return the message that explains why there is only one frame."""
+def pose_note(arguments: argparse.Namespace) -> Diagnostic:
+    """Return the note that explains why there is only one frame."""
     if arguments.frame is not None:
-        return f"one frame: the pose at frame {arguments.frame}"
+        return Diagnostic("X001.pose-at-frame", values={"frame": arguments.frame})
     if arguments.time is not None:
-        return f"one frame: the pose at {number_text(arguments.time)} s"
-    return "one frame: nothing moves, so the current pose was written"
+        return Diagnostic("X001.pose-at-time", values={"time": float(arguments.time)})
+    return Diagnostic("X001.current-pose")
 
 
 def _at_one_time(arguments: argparse.Namespace) -> bool:

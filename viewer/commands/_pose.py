@@ -177,7 +177,9 @@ def _apply_record(
     for actor in scene.actors:
         if actor.pose is not None:
             try:
-                return apply_record(record, actor.figure, actor.pose, cut=option == "--pose")
+                return apply_record(
+                    record, actor.figure, actor.pose, drop_excess=option == "--pose"
+                )
             except RigError as found:
                 problem = problem or found
     if problem is not None and source is not None:

@@ -19,6 +19,7 @@ from viewer.rig.scalars import (
     categories,
     compute,
     find_quantity,
+    informative_quantity,
     joint_of,
     length_text,
     menu_title,
@@ -26,7 +27,6 @@ from viewer.rig.scalars import (
     quantity_title,
     shown_unit,
     split_name,
-    telling_quantity,
 )
 from viewer.rig.scene import Scene
 from viewer.rig.skeleton import joint_labels
@@ -106,7 +106,7 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
     key, about = split_name(options.scalar)
     if options.shading != "scalar" or about:
         return []
-    options.scalar = telling_quantity(key, [actor.figure for actor in scene.actors])
+    options.scalar = informative_quantity(key, [actor.figure for actor in scene.actors])
     if not SCALARS[key].takes_joint or options.scalar == key:
         return []
     joint = printable(split_name(options.scalar)[1], 60)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from viewer.autorig.rigged import Rigged, clip_for
 from viewer.commands._scene import print_warnings
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import MotionOptions, animation_for, export_animation
 from viewer.loading import MotionSettings, load
@@ -84,18 +85,18 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
     raise RigError(f"--clip: expected a motion of the template, found none in {printable(name)}")
 
 
-def write_clips(rigged: Rigged, clips: list[TransferredClip]) -> list[str]:
-    """Write the template's motions for the rigged figure; return one line per file.
+def write_clips(rigged: Rigged, clips: list[TransferredClip]) -> list[Diagnostic]:
+    """Write the template's motions for the rigged figure; return notes about the files.
 
     ``rigged``: the result of the rig transfer.
     ``clips``: from ``read_clips``.
     Raises RigError if a clip is for a different skeleton.
     Raises OutputError if a file cannot be written.
     """
-    lines = []
+    notes: list[Diagnostic] = []
     for each in clips:
         actor = Actor(rigged.figure, figure_pose(rigged.figure), clip_for(rigged, each.clip))
         key, options = each.path.suffix[1:], MotionOptions()
         animation, _ = animation_for(key, options, Scene([actor]), actor)
-        lines += export_animation(animation, each.path, key, options)
-    return lines
+        notes += export_animation(animation, each.path, key, options)
+    return notes

@@ -11,7 +11,7 @@ from viewer.commands._motion_export import (
     check_kind,
     check_numbered,
     is_motion,
-    left_out_lines,
+    left_out_notes,
     pose_or_point_actors,
     write_motions,
 )
@@ -28,6 +28,7 @@ from viewer.commands._scene import (
     open_scene,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export import EXPORTERS, export, files_written
 from viewer.export._motion_paths import motion_paths
@@ -74,8 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
-    lines = write(arguments, scene, output, skinning)
-    print("\n".join(lines), file=summary_stream(output))
+    notes = write(arguments, scene, output, skinning)
+    print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 
 
@@ -103,7 +104,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
 
 def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
-) -> list[str]:
+) -> list[Diagnostic]:
     shown = pose_or_point_actors(scene)
     places = dict(zip(shown, motion_paths(output, shown), strict=True))
     actors = [actor for actor in shown if actor.is_present]
@@ -111,19 +112,19 @@ def _write_poses(
         raise RigError("nobody is present at that time: there is nothing to write")
     files = [file for actor in actors for file in files_written(places[actor])]
     check_targets(files, inputs_of(arguments, scene), arguments.force)
-    lines = []
+    notes: list[Diagnostic] = []
     with all_or_none(files):
         for actor in actors:
             with raising():
-                lines += export(upright_actor(scene, actor), places[actor], skinning)
-    away = [actor for actor in shown if not actor.is_present]
-    lines += [f"{printable(a.name)}: absent at that time, not written" for a in away]
-    return lines + left_out_lines(scene, shown)
+                notes += export(upright_actor(scene, actor), places[actor], skinning)
+    away = [actor.name for actor in shown if not actor.is_present]
+    notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
+    return notes + left_out_notes(scene, shown)
 
 
 def _write_motions(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
-) -> list[str]:
+) -> list[Diagnostic]:
     inputs, force = inputs_of(arguments, scene), arguments.force
     if "{frame" in output.name or (arguments.frames and output.suffix.lower() == ".obj"):
         check_frame_field(output)

@@ -17,6 +17,7 @@ from viewer.commands._usage import require_files
 from viewer.diagnostics import described
 from viewer.phrases import counted, printable
 from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.number_text import number_text
@@ -140,10 +141,27 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
                 "name": material.name,
                 "texture": material.texture,
                 "pixels": None if material.image is None else list(material.image.shape[1::-1]),
+                **_describe_surface(material),
             }
             for material in mesh.materials
         ],
     }
+
+
+def _describe_surface(material: Material) -> dict[str, Any]:
+    """Return what a material has besides one opaque picture."""
+    if material.is_plain:
+        return {}
+    maps = {
+        name.removesuffix("_texture"): texture.name
+        for name, texture in material.textures.items()
+        if name != "base_texture"
+    }
+    color = None if material.base_color is None else list(material.base_color)
+    surface: dict[str, Any] = {"base_color": color, "maps": maps, "alpha": material.alpha_mode}
+    if material.is_physical:
+        surface |= {"metallic": material.metallic, "roughness": material.roughness}
+    return surface
 
 
 def _describe_skin(skin: Skin) -> dict[str, Any]:

@@ -193,12 +193,12 @@ def draw_scene(
     A quality that was not chosen is lowered where drawing it in software takes long.
     """
     from viewer.rendering.offscreen import Offscreen
-    from viewer.rendering.software_limits import limit_passes
+    from viewer.rendering.quality_limits import limit_passes
 
     with deferred(), Offscreen(device) as offscreen:
-        if not is_chosen:
-            print_warnings(limit_passes(options, scene, size, offscreen.context))
+        notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)
         pixels = offscreen.render(scene, size, camera, options, box)
+        print_warnings(notes)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:
             left_out, n_seen = offscreen.renderer.names_left_out

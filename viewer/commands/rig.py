@@ -181,8 +181,8 @@ def run(arguments: argparse.Namespace) -> int:
     _print_report(rigged, stream)
     if output is not None:
         with all_or_none(files):
-            lines = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
-        print("\n".join(lines), file=stream)
+            written = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
+        print("\n".join(map(str, written)), file=stream)
     if arguments.view:
         _show(rigged, target)
     return 0

@@ -14,7 +14,8 @@
 ``{n:#vertex|is|are}`` the same with a verb that agrees
 ``{n:#frame/{all}}``   a count of a total: ``3 of 20 frames``; a verb may follow
 ``{n:?one|many}``      the first for 1, the second for other counts
-``{near:+; {}}``       the rest of the specification unless the value is empty; ``{}`` is the value
+``{near:+; {}}``       the rest of the specification unless the value is empty; ``{}`` is the value,
+                       and a list is joined by semicolons
 =====================  ===========================================================================
 """
 
@@ -62,7 +63,8 @@ class _Formatter(Formatter):
             return one if value == 1 else many
         if kind == "+" and not _SIGNED.fullmatch(format_spec):
             # ``{}`` inside the specification has been replaced by the placeholder by now.
-            return rest.replace(_PLACE, printable(value, 300)) if value else ""
+            text = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
+            return rest.replace(_PLACE, printable(text, _LONGEST)) if value else ""
         if not format_spec and isinstance(value, str) and value != _PLACE:
             return printable(value, _LONGEST)
         if format_spec.startswith("list"):

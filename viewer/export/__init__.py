@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
 from viewer.rig.figure import Figure
@@ -101,7 +102,7 @@ def exporter_for(path: str | Path) -> str:
     raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {known}')
 
 
-def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> list[str]:
+def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> list[Diagnostic]:
     """Write an actor in its current pose; its placement in the scene is omitted.
 
     Parameters
@@ -115,8 +116,9 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
 
     Returns
     -------
-    list of str
-        Messages: the written files, then the data that the format cannot hold, with errors.
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot hold, with errors. ``str`` of
+        each is its text.
 
     Raises
     ------
@@ -128,7 +130,7 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
         If a file cannot be written.
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
-    notes: list[str] = module.export(actor, Path(path), skinning or Skinning())
+    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning())
     return notes
 
 
@@ -169,7 +171,7 @@ def suited_exporter(path: str | Path, figure: Figure) -> str:
 
 def export_animation(
     animation: SampledAnimation, path: str | Path, key: str, options: MotionOptions
-) -> list[str]:
+) -> list[Diagnostic]:
     """Write a motion; the actor's placement in the scene is omitted.
 
     Parameters
@@ -185,8 +187,9 @@ def export_animation(
 
     Returns
     -------
-    list of str
-        Messages: the written files, then the data that the format cannot hold, with errors.
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot hold, with errors. ``str`` of
+        each is its text.
 
     Raises
     ------
@@ -196,7 +199,7 @@ def export_animation(
         If a file cannot be written.
     """
     module = import_module(f"{__name__}.{key}")
-    notes: list[str] = module.export_animation(animation, Path(path), options)
+    notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
     return notes
 
 
@@ -258,7 +261,7 @@ class _CallableModule(ModuleType):
 
     def __call__(
         self, actor: Actor, path: str | Path, skinning: Skinning | None = None
-    ) -> list[str]:
+    ) -> list[Diagnostic]:
         return export(actor, path, skinning)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
@@ -15,7 +16,6 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.body_motion import root_positions
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.number_text import number_text
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, UNIT_NAMES
 
@@ -111,7 +111,7 @@ def up_axis(options: MotionOptions) -> str:
 
 def family_frames(
     animation: SampledAnimation, frames: Frames, member: Member, options: MotionOptions
-) -> tuple[FamilyFrames, list[str]]:
+) -> tuple[FamilyFrames, list[Diagnostic]]:
     """Return an animation as parameters of the family.
 
     The root joint is at t + J0, so t is its displacement from the rest position. For a different up
@@ -122,7 +122,7 @@ def family_frames(
     ``member``: from ``member_of_figure``.
     ``options``: options, of which only the up axes are used.
     Returns ``frames``: one row per frame.
-    Returns ``notes``: messages about data without a parameter in the family, with its size.
+    Returns ``notes``: notes about data without a parameter in the family, with its size.
     Raises RigError if a value of a present frame is not finite.
     """
     figure, skeleton = animation.figure, animation.figure.require_skeleton()
@@ -174,38 +174,33 @@ def _vectors(quaternions: Floats) -> Floats:
     )
 
 
-def _own_shapes(figure: Figure) -> list[str]:
-    """Return a message if the figure is the bundled body, which is not an SMPL model."""
+def _own_shapes(figure: Figure) -> list[Diagnostic]:
+    """Return a note if the figure is the bundled body, which is not an SMPL model."""
     if figure.blend_shapes is None or _OWN_SHAPE not in figure.blend_shapes.names:
         return []
-    return [
-        f"shape and translation are those of {figure.name}, which is not an SMPL model: other "
-        "models are offset by the distance between the rest positions of the pelvis"
-    ]
+    return [Diagnostic("X005.own-shape", values={"figure": figure.name})]
 
 
-def _bare_skeleton(figure: Figure, root: Floats) -> list[str]:
-    """Return messages about a skeleton's unit, and a rest root that differs from a model's."""
+def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
+    """Return notes about a skeleton's unit, and a rest root that differs from a model's."""
     notes = []
     if figure.unit != "m":
-        notes.append(f"lengths were converted from {UNIT_NAMES[figure.unit]} to metres")
+        unit = UNIT_NAMES[figure.unit]
+        notes.append(Diagnostic("X005.unit-converted", values={"unit": unit}))
     if figure.mesh is None:
-        place = ", ".join(number_text(number, ".4g") for number in root.tolist())
-        notes.append(
-            f"translations are relative to the skeleton's root at rest, ({place}) m: a model with "
-            "another rest root is offset by the difference (use --model for exact translations)"
-        )
+        place = dict(zip("xyz", root.tolist(), strict=True))
+        notes.append(Diagnostic("X005.own-root", values=place))
     return notes
 
 
-def _losses(frames: Frames, moved: Floats) -> list[str]:
+def _losses(frames: Frames, moved: Floats) -> list[Diagnostic]:
     notes = []
     present = frames.present
     farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
     if farthest > _NEGLIGIBLE:
-        notes.append(f"translations of joints are omitted (up to {farthest:.3g} m)")
+        notes.append(Diagnostic("X003.body-translations", values={"distance": float(farthest)}))
     scales = frames.figure_scales[present]
     if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
-        low, high = scales.min(), scales.max()
-        notes.append(f"the figure's scale is omitted ({low:.6g} to {high:.6g})")
+        values = {"low": float(scales.min()), "high": float(scales.max())}
+        notes.append(Diagnostic("X003.body-scale", values=values))
     return notes

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._options import GAPS
 from viewer.rig.arrays import Bools, Floats
@@ -15,11 +16,7 @@ from viewer.rig.motion.evaluation import Frames
 
 Indices = NDArray[np.intp]
 
-_LISTED = 6  # maximum number of gaps listed in a message
-_FILLING = {
-    "hold": "the last pose is held",
-    "interpolate": "interpolated, held at both ends",
-}
+_CLOSED = {"hold": "pose-held", "interpolate": "interpolated-and-held", "split": "file-per-run"}
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:
@@ -28,15 +25,40 @@ def runs(flags: Bools) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def gaps_text(present: Bools, first_frame: int) -> str:
-    """Return the missing frames as text: ``"frames 3 to 5, 9"``."""
+def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> list[Diagnostic]:
+    """Return a note about missing frames and what is written in their place, if there are any.
+
+    ``present`` (F,): whether each frame is present.
+    ``first_frame``: number of the first frame.
+    ``closing``: a key of ``GAPS``.
+    ``how``: phrases by key of ``GAPS``, where they differ from the usual ones.
+    """
+    if present.all():
+        return []
+    done = Phrase({**_CLOSED, **how}[closing])
+    return [Diagnostic("X004.closed", values={**_gaps(present, first_frame), "how": done})]
+
+
+def frames_phrase(first: int, count: int) -> Phrase:
+    """Return the numbers of consecutive frames."""
+    if count == 1:
+        return Phrase("written-frame", first=first)
+    return Phrase("written-frames", n=count, first=first, last=first + count - 1)
+
+
+def kept_note(present: Bools, first_frame: int) -> list[Diagnostic]:
+    """Return a note about frames that are missing in the file too, if there are any."""
+    return [] if present.all() else [Diagnostic("X004.kept", values=_gaps(present, first_frame))]
+
+
+def _gaps(present: Bools, first_frame: int) -> dict[str, object]:
     found = [
-        f"{a + first_frame}" if b == a + 1 else f"{a + first_frame} to {b - 1 + first_frame}"
-        for a, b in runs(~present)
+        Phrase("missing-frame", frame=start)
+        if stop == start + 1
+        else Phrase("missing-frames", first=start, last=stop - 1)
+        for start, stop in (np.array(runs(~present)) + first_frame).tolist()
     ]
-    more = f" and {len(found) - _LISTED} more gaps" * (len(found) > _LISTED)
-    plural = "s" if int((~present).sum()) > 1 else ""
-    return f"frame{plural} {', '.join(found[:_LISTED])}{more}"
+    return {"n": int((~present).sum()), "gaps": found}
 
 
 def filled(frames: Frames, interpolate: bool) -> Frames:
@@ -75,7 +97,7 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
     )
 
 
-def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]:
+def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, list[Diagnostic]]:
     """Return the frames for formats that allow gaps: interpolated or held only on request.
 
     ``frames``: frames with or without gaps.
@@ -83,17 +105,15 @@ def kept_gaps(frames: Frames, gaps: str, first_frame: int) -> tuple[Frames, str]
       gaps.
     ``first_frame``: number of the first frame.
     Returns ``frames``: unchanged if the gaps are kept.
-    Returns ``note``: a message such as ``"missing frames 3 to 5: the last pose is held"``, or an
-      empty string.
+    Returns ``notes``: a note about closed gaps, if there are any.
     Raises RigError if ``gaps`` is not a key of ``GAPS``.
     """
     if gaps not in ("", *GAPS):
         raise RigError(f'handling of gaps: expected one of {", ".join(GAPS)}, found "{gaps}"')
     present = frames.present
-    if gaps not in _FILLING or present.all() or not present.any():
-        return frames, ""
-    note = f"missing {gaps_text(present, first_frame)}: {_FILLING[gaps]}"
-    return filled(frames, gaps == "interpolate"), note
+    if gaps in ("", "split") or present.all() or not present.any():
+        return frames, []
+    return filled(frames, gaps == "interpolate"), gaps_note(present, first_frame, gaps)
 
 
 def _line(rows: Floats, before: Indices, after: Indices, fraction: Floats) -> Floats:

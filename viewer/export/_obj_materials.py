@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Phrase
 from viewer.formats import free_path
 from viewer.media.image import encode_png
 from viewer.rig.arrays import Bytes
@@ -112,20 +113,20 @@ def _options(texture: Texture, clamps: bool) -> str:
     return options + "-clamp on " * (clamps and "clamp" in texture.wrap)
 
 
-def library_losses(mesh: Mesh) -> list[str]:
-    """Return what a material library cannot hold of a mesh's materials, in words."""
+def library_losses(mesh: Mesh) -> list[Phrase]:
+    """Return the material properties of a mesh that a material library cannot hold."""
     materials = mesh.materials
     placed = [texture for material in materials for texture in material.textures.values()]
     lost = {
-        "occlusion maps": any(material.occlusion_texture is not None for material in materials),
-        "cutoffs of opacity": any(material.alpha_mode == "mask" for material in materials),
-        "unlit surfaces": any(material.unlit for material in materials),
-        "single-sided surfaces": any(not material.double_sided for material in materials),
-        "second texture coordinates": any(texture.uv_set for texture in placed),
-        "rotated or mirrored textures": any(
+        "part-occlusion": any(material.occlusion_texture is not None for material in materials),
+        "part-alpha-cutoff": any(material.alpha_mode == "mask" for material in materials),
+        "part-unlit": any(material.unlit for material in materials),
+        "part-single-sided": any(not material.double_sided for material in materials),
+        "part-second-uvs": any(texture.uv_set for texture in placed),
+        "part-texture-rotation": any(
             "mirror" in texture.wrap or texture.matrix[0, 1] or texture.matrix[1, 0]
             for texture in placed
         ),
-        "unfiltered textures": any(not texture.is_smooth for texture in placed),
+        "part-unfiltered": any(not texture.is_smooth for texture in placed),
     }
-    return [what for what, is_lost in lost.items() if is_lost]
+    return [Phrase(key) for key, is_lost in lost.items() if is_lost]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.autorig.rigged import Rigged
+from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export import export
 from viewer.formats import all_or_none
-from viewer.phrases import printable
 from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
@@ -42,14 +42,14 @@ def files_of(output: Path) -> list[Path]:
     )
 
 
-def write_rigged(rigged: Rigged, output: Path) -> list[str]:
+def write_rigged(rigged: Rigged, output: Path) -> list[Diagnostic]:
     """Write all files of a rigged mesh, or none.
 
     ``rigged``: the result of the rig transfer.
     ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
       coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives, see
       ``without_correctives``. ``.npz``: everything in one file.
-    Returns: messages about what was written, and about what a format cannot hold.
+    Returns: notes about the written files, and about data that a format cannot hold.
     Raises RigError if ``.skel`` cannot hold the skeleton.
     Raises UnsupportedFormatError as ``files_of``.
     Raises OutputError if a file cannot be written.
@@ -59,21 +59,18 @@ def write_rigged(rigged: Rigged, output: Path) -> list[str]:
         from viewer.formats.rigged import save
 
         save(rigged.figure, output, _arrays(rigged))
-        return [f"{printable(output, 300)}: the figure with its rig, the target's pose, confidence"]
+        return [Diagnostic("X001.rigged", output)]
     skel, _, obj, json = files
     figure = without_correctives(rigged)
-    lines: list[str] = []
+    notes: list[Diagnostic] = []
     with all_or_none(files):
-        lines += export(Actor(figure, figure_pose(figure)), skel)
-        lines += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
-        lines += export(Actor(figure, rigged.pose), json)
-    lines[-1] += ", the target's pose"
+        notes += export(Actor(figure, figure_pose(figure)), skel)
+        notes += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
+        notes += export(Actor(figure, rigged.pose), json)
+    notes[-1] = replace(notes[-1], key="X001.target-pose")
     if rigged.figure.correctives is not None:
-        lines.append(
-            "pose correctives cannot be stored in .skel and .skin: the rest mesh is adjusted to "
-            "match the target without them"
-        )
-    return lines
+        notes.append(Diagnostic("X003.rigged-correctives"))
+    return notes
 
 
 def without_correctives(rigged: Rigged) -> Figure:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._family_frames import (
     FamilyFrames,
@@ -26,24 +27,30 @@ from viewer.export._family_frames import (
     up_axis,
 )
 from viewer.export._family_reading import read_frames
-from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._gaps import filled, gaps_note, runs
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
-from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
 __all__ = ["export_animation"]
 
 _FEWEST = 16  # shape coefficients that readers of AMASS require
+_CLOSED = {
+    "hold": "pose-held-and-marked",
+    "interpolate": "interpolated-and-marked",
+    "split": "omitted-between-files",
+}
 _TYPES = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write a motion in its own world unless another up axis is requested.
 
     Parameters
@@ -57,8 +64,8 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
 
     Returns
     -------
-    list of str
-        Messages: the written files, then the data that the format cannot hold.
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot hold.
 
     Raises
     ------
@@ -90,11 +97,13 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             if not is_split and not present.all():
                 arrays["present"] = present
             save_arrays(file, arrays)
-            length = "1 frame" if stop - start == 1 else f"{stop - start} frames"
-            written.append(
-                f"{printable(file, 300)}: {length} of {member.title} at "
-                f"{animation.frame_rate:g} fps, {up} up"
-            )
+            values = {
+                "n": stop - start,
+                "model": member.title,
+                "rate": animation.frame_rate,
+                "up": up,
+            }
+            written.append(Diagnostic("X001.amass", file, values=values))
     lost = []
     for file, span in zip(paths, spans, strict=True):
         again = read_frames(read(Source(file, saved[file])), animation, options)
@@ -134,16 +143,8 @@ def _padded(shape: Floats) -> Floats:
 
 def _remarks(
     body: FamilyFrames, animation: SampledAnimation, present: Bools, options: MotionOptions
-) -> list[str]:
+) -> list[Diagnostic]:
     notes = []
     if len(body.shape) > 1:
-        notes.append("the shape changes: betas has one row per frame, which few programs support")
-    if not present.all():
-        missing = gaps_text(present, animation.first_frame)
-        how = {
-            "hold": "the last pose is held, and the frames are marked in present",
-            "interpolate": "interpolated along the shorter arc, and marked in present",
-            "split": "omitted between the files",
-        }[options.closing]
-        notes.append(f"{missing} missing: {how}")
-    return notes
+        notes.append(Diagnostic("X005.shape-rows"))
+    return notes + gaps_note(present, animation.first_frame, options.closing, **_CLOSED)

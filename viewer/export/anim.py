@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._bvh.angles import euler_angles, unrolled
-from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._gaps import filled, gaps_note, runs
 from viewer.export._losses.between import between_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, read, write
-from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -24,7 +24,6 @@ from viewer.rig.motion.clip_edit import clip_from_frames
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.evaluation import Frames, frames_between, frames_of, world_frames
 from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
-from viewer.rig.number_text import number_text
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import Skeleton
 
@@ -35,7 +34,9 @@ _BLOCK = 4096  # frames measured at a time
 _SAME = 1e-9  # tolerance, in frames or length units
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write a motion as a clip of keys, see ``viewer.export.export_animation``.
 
     A keyframed clip that is requested as a whole is written exactly, with its own keys. Any other
@@ -53,8 +54,8 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
 
     Returns
     -------
-    list of str
-        Messages: the written files, joint errors, and the data that the format cannot hold.
+    list of Diagnostic
+        Notes: the written files, joint errors, and the data that the format cannot hold.
 
     Raises
     ------
@@ -79,18 +80,18 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     if isinstance(animation.motion, Clip) and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
             write(animation.motion, path)
-        own = ", the clip's own" if animation.motion.end > animation.motion.start else ""
-        notes = [f"{_summary(path, animation.motion)}{own}"]
+        has_keys = animation.motion.end > animation.motion.start
+        notes = [_summary(path, animation.motion, Phrase("own-keys") if has_keys else "")]
         notes += _losses(animation, Source(path, saved[path]), (0, frames.n_frames), options)
         if frames.figure_translations.any():
-            notes.append("the placement of the whole figure is not part of its clip and is omitted")
+            notes.append(Diagnostic("X003.clip-placement"))
         return notes + _left_out(figure, frames)
     return _export_frames(animation, skeleton, path, options)
 
 
 def _export_frames(
     animation: SampledAnimation, skeleton: Skeleton, path: Path, options: MotionOptions
-) -> list[str]:
+) -> list[Diagnostic]:
     """Write a key per frame, in one file or one for each run of frames."""
     frames = animation.frames
     whole = filled(frames, options.closing == "interpolate")
@@ -113,7 +114,7 @@ def _export_frames(
         for file, clip in zip(paths, clips, strict=True):
             write(clip, file)
     notes = [
-        f"{_summary(file, clip)}, {rule} tangents"
+        _summary(file, clip, Phrase("tangents", rule=rule))
         for file, clip, rule in zip(paths, clips, rules, strict=True)
     ]
     for file, span in zip(paths, spans, strict=True):
@@ -123,8 +124,8 @@ def _export_frames(
 
 def _losses(
     animation: SampledAnimation, source: Source, span: tuple[int, int], options: MotionOptions
-) -> list[str]:
-    """Read a file back and return messages about its errors on and between the frames.
+) -> list[Diagnostic]:
+    """Read a file back and return notes about its errors on and between the frames.
 
     Between frames, captures are compared at the midpoints and on their own frames.
     """
@@ -145,14 +146,9 @@ def _middles(times: Floats) -> Floats:
     return 0.5 * (times[1:] + times[:-1])
 
 
-def _remarks(animation: SampledAnimation, options: MotionOptions) -> list[str]:
-    notes, frames = [], animation.frames
-    if not frames.present.all():
-        done = {"hold": "the last pose is held", "interpolate": "interpolated"}
-        text = gaps_text(frames.present, animation.first_frame)
-        notes.append(
-            f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
-        )
+def _remarks(animation: SampledAnimation, options: MotionOptions) -> list[Diagnostic]:
+    frames, first = animation.frames, animation.first_frame
+    notes = gaps_note(frames.present, first, options.closing, interpolate="interpolated")
     return notes + _left_out(animation.figure, frames)
 
 
@@ -204,27 +200,28 @@ def _distance(animation: SampledAnimation, clip: Clip, times: Floats) -> float:
     return worst
 
 
-def _summary(path: Path, clip: Clip) -> str:
-    keys = sum(len(channel.times) for channel in clip.channels)
-    return (
-        f"{printable(path, 300)}: {counted(len(clip.channels), 'channel')} with "
-        f"{counted(keys, 'key')}, "
-        f"{number_text(clip.start)} to {number_text(clip.end)} s"
-    )
+def _summary(path: Path, clip: Clip, how: Phrase | str) -> Diagnostic:
+    values = {
+        "channels": len(clip.channels),
+        "keys": sum(len(channel.times) for channel in clip.channels),
+        "start": float(clip.start),
+        "end": float(clip.end),
+        "how": how,
+    }
+    return Diagnostic("X001.anim", path, values=values)
 
 
-def _left_out(figure: Figure, frames: Frames) -> list[str]:
-    """Return messages about everything that a clip cannot hold."""
+def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
+    """Return notes about everything that a clip cannot hold."""
     notes, there = [], frames.present
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:
-        notes.append(f".anim cannot hold the figure's scale of {scales.max():g}, which is omitted")
+        notes.append(Diagnostic("X003.clip-scale", values={"scale": float(scales.max())}))
     moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
     if moved > _SAME:
-        notes.append(
-            ".anim translates only the root: translations of other joints, up to "
-            f"{length_text(figure, float(moved))}, are omitted"
-        )
+        length = length_text(figure, float(moved))
+        values = {"length": length, "distance": float(moved), "unit": figure.unit}
+        notes.append(Diagnostic("X003.clip-translations", values=values))
     if frames.shape_weights.any():
-        notes.append(".anim holds no shape: the weights of blend shapes are omitted")
+        notes.append(Diagnostic("X003.clip-shape"))
     return notes

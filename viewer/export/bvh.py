@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._bvh.angles import unrolled
 from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh.ends import end_offsets
 from viewer.export._bvh.reading import BvhFile, read_back
 from viewer.export._bvh.text import bvh_text
-from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
-from viewer.phrases import counted, printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
@@ -35,10 +35,11 @@ __all__ = ["export_animation"]
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
 _MOST_DIGITS = 15
-_LISTED = 8  # maximum number of joints listed in a message
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write a motion, read it back, and report the errors of its joints and of a skin on them.
 
     Offsets are those of the shape in the first present frame. The root has offset 0 and its
@@ -60,8 +61,8 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
 
     Returns
     -------
-    list of str
-        Messages: the written files, the largest errors if any, and the data that the format cannot
+    list of Diagnostic
+        Notes: the written files, the largest errors if any, and the data that the format cannot
         hold.
 
     Raises
@@ -219,8 +220,10 @@ class _Writer:
             self.options.digits,
         ).encode("ascii")
 
-    def losses(self, path: Path, text: bytes, reference: int, span: tuple[int, int]) -> list[str]:
-        """Read a file's text back, and return messages about its differences from the motion."""
+    def losses(
+        self, path: Path, text: bytes, reference: int, span: tuple[int, int]
+    ) -> list[Diagnostic]:
+        """Read a file's text back, and return notes about its differences from the motion."""
         animation, how = self.animation, self.options.skinning
         names = self.names[-animation.figure.require_skeleton().n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
@@ -229,54 +232,44 @@ class _Writer:
         shape = shape_at(animation.frames, reference)[0]
         return driven_losses(path, animation, written, how, span, shape)
 
-    def summary(self, path: Path, start: int, stop: int) -> str:
-        """Return a message about the contents of a file."""
-        unit = UNIT_NAMES[self.options.unit or _DEFAULT_UNIT]
-        unit = unit if self.figure.unit in METRES else "the figure's unit"
-        first = self.animation.first_frame + start
-        rest = "the rest pose and " * self.options.rest_frame
-        span = f"{stop - start} frames ({first} to {first + stop - start - 1})"
-        span = span if stop - start > 1 else f"1 frame ({first})"
-        return (
-            f"{printable(path, 300)}: {counted(len(self.names), 'joint')}, {rest}{span} at "
-            f"{self.animation.frame_rate:g} fps, "
-            f"{unit}, {self.options.up or 'y'} up, channels {self.options.rotation_order.upper()}"
-        )
+    def summary(self, path: Path, start: int, stop: int) -> Diagnostic:
+        """Return a note about the contents of a file."""
+        is_known = self.figure.unit in METRES
+        values = {
+            "joints": len(self.names),
+            "rest": Phrase("rest-pose") if self.options.rest_frame else "",
+            "frames": frames_phrase(self.animation.first_frame + start, stop - start),
+            "rate": self.animation.frame_rate,
+            "unit": UNIT_NAMES[self.options.unit or _DEFAULT_UNIT]
+            if is_known
+            else Phrase("figure-unit"),
+            "up": self.options.up or "y",
+            "order": self.options.rotation_order.upper(),
+        }
+        return Diagnostic("X001.bvh", path, values=values)
 
 
 def _remarks(
     animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
-) -> list[str]:
-    """Return messages about changed or omitted data."""
-    frames, notes = animation.frames, []
+) -> list[Diagnostic]:
+    """Return notes about changed or omitted data."""
+    frames, notes = animation.frames, list[Diagnostic]()
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:
-        notes.append(f"several roots: a common parent joint {skeleton.names[0]} was added")
-    if not frames.present.all():
-        done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
-        text = gaps_text(frames.present, animation.first_frame)
-        notes.append(
-            f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
-        )
+        notes.append(Diagnostic("X005.common-root", values={"joint": skeleton.names[0]}))
+    notes += gaps_note(frames.present, animation.first_frame, options.closing)
     if figure.unit not in METRES and options.unit:
-        notes.append(f"lengths are unchanged: the unit of {animation.figure.name} is unknown")
+        notes.append(Diagnostic("X005.unit-unknown", values={"figure": figure.name}))
     moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
     if moving:
-        more = f" and {len(moving) - _LISTED} more" * (len(moving) > _LISTED)
-        moved = counted(
-            len(moving),
-            "joint",
-            "below the root translates and has position channels",
-            "below the root translate and have position channels",
-        )
-        notes.append(f"{moved}: {', '.join(moving[:_LISTED])}{more}")
+        values = {"n": len(moving), "names": moving}
+        notes.append(Diagnostic("X005.position-channels", values=values))
     if shape_changes(frames):
         first = reference + animation.first_frame
-        notes.append(f"the shape changes over time: bone lengths are those of frame {first}")
+        notes.append(Diagnostic("X005.shape-changes", values={"frame": first}))
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:
-        notes.append(
-            f"the figure's scale changes from {scales.min():g} to {scales.max():g}: bone lengths "
-            f"are written with {scales[0]:g}"
-        )
+        low, high, first_scale = map(float, (scales.min(), scales.max(), scales[0]))
+        sizes = {"low": low, "high": high, "first": first_scale}
+        notes.append(Diagnostic("X005.scale-changes", values=sizes))
     return notes

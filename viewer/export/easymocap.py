@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import OutputError, RigError
 from viewer.export._family_frames import (
     FamilyFrames,
@@ -31,7 +32,7 @@ from viewer.export._family_frames import (
     up_axis,
 )
 from viewer.export._family_reading import Records, read_frames
-from viewer.export._gaps import gaps_text, kept_gaps
+from viewer.export._gaps import kept_gaps, kept_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
@@ -50,7 +51,9 @@ _DIGITS = 7  # decimals, as in EasyMocap's newer writer
 _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write one person with the number 0; see ``export_animations``."""
     return export_animations([animation], path, options)
 
@@ -60,7 +63,7 @@ def export_animations(
     path: Path,
     options: MotionOptions,
     persons: Sequence[int] | None = None,
-) -> list[str]:
+) -> list[Diagnostic]:
     """Write several people into one folder, with seven decimals.
 
     Frames keep the numbers of the animations. Frames without people hold an empty list.
@@ -79,8 +82,8 @@ def export_animations(
 
     Returns
     -------
-    list of str
-        Messages: the written folder, then the data that the format cannot hold.
+    list of Diagnostic
+        Notes: the written folder, then the data that the format cannot hold.
 
     Raises
     ------
@@ -93,20 +96,16 @@ def export_animations(
     persons = range(len(animations)) if persons is None else persons
     check_unit(options, "EasyMocap")
     _check(animations, persons)
-    people, notes = [], []
+    people: list[_Person] = []
+    notes: list[Diagnostic] = []
     for taken, person in zip(animations, persons, strict=True):
         frames, filling = kept_gaps(taken.frames, options.gaps, taken.first_frame)
         animation = replace(taken, frames=frames)
         member = member_of_figure(animation.figure, "an EasyMocap folder", ("pelvis", "wrist"))
         body, losses = family_frames(animation, frames, member, options)
         people.append(_Person(taken, animation, _Records(person, body), Records(member)))
-        who = f"{person_label(person)}: " if len(animations) > 1 else ""
-        notes += [f"{who}{loss}" for loss in losses]
-        if filling:
-            notes.append(f"{who}{filling}")
-        if not animation.frames.present.all():
-            missing = gaps_text(animation.frames.present, animation.first_frame)
-            notes.append(f"{who}{missing} missing, as in the original motion")
+        own = [*losses, *filling, *kept_note(frames.present, taken.first_frame)]
+        notes += own if len(animations) == 1 else [_of_person(person, note) for note in own]
     first = min(animation.first_frame for animation in animations)
     stop = max(animation.first_frame + animation.frames.n_frames for animation in animations)
     with _new_folder(path) as folder:
@@ -115,14 +114,22 @@ def export_animations(
             rows = [person.text(frame) for person in people if person.is_there(frame)]
             text = "[\n" + ",\n".join(rows) + "\n]\n"
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
-    who = "1 person" if len(animations) == 1 else f"{len(animations)} people"
-    count = "1 frame" if stop - first == 1 else f"{stop - first} frames"
+    values = {
+        "n": stop - first,
+        "people": len(animations),
+        "up": up_axis(options),
+        "rate": animations[0].frame_rate,
+    }
     return [
-        f"{printable(path / _FOLDER, 300)}: {count} of {who}, {up_axis(options)} up; "
-        f"EasyMocap stores no frame rate: it is {animations[0].frame_rate:g} fps",
+        Diagnostic("X001.easymocap", path / _FOLDER, values=values),
         *(line for person in people for line in person.losses(path / _FOLDER, options)),
         *notes,
     ]
+
+
+def _of_person(person: int, note: Diagnostic) -> Diagnostic:
+    values = {"person": person_label(person), "remark": note}
+    return Diagnostic(f"{note.code}.of-person", values=values)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,8 +152,8 @@ class _Person:
         self.again.add(text)
         return text
 
-    def losses(self, path: Path, options: MotionOptions) -> list[str]:
-        """Return messages with the largest errors, if there are any."""
+    def losses(self, path: Path, options: MotionOptions) -> list[Diagnostic]:
+        """Return notes with the largest errors, if there are any."""
         place = np.maximum(np.cumsum(self.animation.frames.present) - 1, 0)
         found = read_frames(self.again.motion(self.animation.frame_rate), self.original, options)
         how = options.skinning

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
-from viewer.export._gaps import filled, gaps_text, runs
+from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._gltf.document import Document, text_of
-from viewer.export._gltf.losses import Written, gltf_losses, not_held, vertices_text
+from viewer.export._gltf.losses import Written, gltf_losses, not_held
 from viewer.export._gltf.materials import Color, material_losses
 from viewer.export._gltf.mesh import add_mesh
 from viewer.export._gltf.motion import add_animation, moving, still_locals
@@ -28,7 +29,6 @@ from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
-from viewer.phrases import counted, printable
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
@@ -41,10 +41,8 @@ from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["export", "export_animation"]
 
-_LISTED = 8  # maximum number of joints listed in a message
 
-
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write a figure in its current pose; see ``viewer.export.export``."""
     figure, pose = actor.figure, actor.pose
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
@@ -55,7 +53,8 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     document = Document(figure.name)
     built = _add_body(document, body, figure.up, pose, still, actor.color)
     (data,) = _files([(path, document)])
-    notes = [f"{printable(path, 300)}: {built.counts}, {len(data[path])} bytes"]
+    written = {"counts": built.counts, "size": len(data[path])}
+    notes = [Diagnostic("X001.gltf", path, values=written)]
     notes += _beside(data, path) + _remarks(body, figure.up)
     file = Written(path, parsed([*data.values()]), built.tree, built.mesh_node)
     figure, frames = pose_frames(figure, pose)
@@ -64,7 +63,9 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     return notes + not_held(figure, body.shape)
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write a figure at rest and its motion; see ``viewer.export.export_animation``.
 
     A changing shape that has to be baked into the mesh is that of the first present frame.
@@ -80,8 +81,8 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
 
     Returns
     -------
-    list of str
-        Messages: the written files, then the data that the format cannot hold, with errors.
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot hold, with errors.
 
     Raises
     ------
@@ -107,14 +108,16 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             _add_animation(document, animation, body, frames, (start, stop), options.world_up)
         )
         documents.append(document)
-    notes, lost = [], []
+    notes, lost = list[Diagnostic](), list[Diagnostic]()
     saved = _files(list(zip(paths, documents, strict=True)))
     for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
-        motion = _frames_text(animation.first_frame + start, stop - start)
-        rate = f"at {animation.frame_rate:g} fps"
-        size = f"{len(data[file])} bytes"
-        notes += [f"{printable(file, 300)}: {made.counts}, {motion} {rate}, {size}"]
-        notes += _beside(data, file)
+        values = {
+            "counts": made.counts,
+            "frames": frames_phrase(animation.first_frame + start, stop - start),
+            "rate": animation.frame_rate,
+            "size": len(data[file]),
+        }
+        notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
         written = Written(file, parsed([*data.values()]), made.tree, made.mesh_node, start)
         rows = start + np.flatnonzero(present[start:stop])
         lost += gltf_losses(
@@ -130,10 +133,6 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     notes += _remarks(body, options.world_up) + _motion_remarks(animation, body, frames, options)
     lost += resampling_losses(path, animation, options.skinning)
     return notes + lost + not_held(animation.figure, shape)
-
-
-def _frames_text(first: int, count: int) -> str:
-    return f"{count} frames ({first} to {first + count - 1})" if count > 1 else f"1 frame ({first})"
 
 
 def _check(animation: SampledAnimation, options: MotionOptions) -> None:
@@ -170,7 +169,7 @@ class _Built:
 
     tree: Tree
     mesh_node: int | None
-    counts: str
+    counts: list[Phrase]
 
 
 def _body_of(figure: Figure, shape: Shape, skinning: Skinning) -> _Body:
@@ -193,7 +192,7 @@ def _add_body(
     figure, influences = body.figure, body.influences
     fixes = influences is not None and influences.n_fixed > 0
     tree = add_nodes(document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes)
-    scene, counts, node = [tree.root], [], None
+    scene, counts, node = [tree.root], list[Phrase](), None
     if figure.mesh is not None and figure.mesh.n_vertices:
         mesh, written = add_mesh(document, figure.name, body.shape, influences, color)
         item: dict[str, Any] = {"name": text_of(f"{figure.name} mesh"), "mesh": mesh}
@@ -207,13 +206,14 @@ def _add_body(
             scene.append(node)  # glTF ignores the transform of a skinned mesh's own node
         else:
             document.root["nodes"][tree.place].setdefault("children", []).append(node)
-        split = f" ({figure.mesh.n_vertices} before they were split along texture seams)"
-        counts = [f"{counted(written, 'vertex')}{split * (written != figure.mesh.n_vertices)}"]
-        counts += [counted(figure.mesh.n_triangles, "triangle")]
+        before = figure.mesh.n_vertices
+        key = "written-vertices" if written == before else "split-vertices"
+        counts = [Phrase(key, n=written, before=before)]
+        counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
     if figure.skeleton is not None:
-        counts += [counted(figure.skeleton.n_joints, "joint")]
+        counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
     document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return _Built(tree, node, ", ".join(counts))
+    return _Built(tree, node, counts)
 
 
 def _add_animation(
@@ -261,66 +261,51 @@ def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
     return saved
 
 
-def _beside(data: dict[Path, bytes], path: Path) -> list[str]:
+def _beside(data: dict[Path, bytes], path: Path) -> list[Diagnostic]:
     others = {file: len(content) for file, content in data.items() if file != path}
-    return [f"{printable(file, 300)}: array data, {n} bytes" for file, n in others.items()]
+    return [
+        Diagnostic("X001.gltf-arrays", file, values={"size": size}) for file, size in others.items()
+    ]
 
 
-def _remarks(body: _Body, up: str) -> list[str]:
-    """Return messages about coordinate space and shape for users of the file."""
-    figure, notes = body.figure, []
+def _remarks(body: _Body, up: str) -> list[Diagnostic]:
+    """Return notes about coordinate space and shape for users of the file."""
+    figure, notes = body.figure, list[Diagnostic]()
     if up == "z":
-        notes.append("z is up: a node above the figure rotates it by -90 degrees about x")
+        notes.append(Diagnostic("X005.z-up"))
     if METRES.get(figure.unit, 1.0) != 1.0:
-        notes.append(
-            f"lengths are in {UNIT_NAMES[figure.unit]}: a node above the figure scales them to "
-            f"metres by {METRES[figure.unit]:g}"
-        )
+        values = {"unit": UNIT_NAMES[figure.unit], "factor": METRES[figure.unit]}
+        notes.append(Diagnostic("X005.unit-scaled", values=values))
     elif figure.unit not in METRES:
-        notes.append(
-            f"lengths are unchanged: the unit of {printable(figure.name, 100)} is unknown, and "
-            "programs interpret glTF lengths as metres"
-        )
+        notes.append(Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name}))
     if figure.mesh is not None:
-        notes += [printable(note, 200) for note in material_losses(figure.mesh)]
+        notes += material_losses(figure.mesh)
     if figure.mesh is not None and figure.mesh.n_vertices == 0:
-        notes.append("the mesh has no vertices and is omitted")
+        notes.append(Diagnostic("X003.empty-mesh"))
     if body.shape.baked is not None:
-        notes.append("the shape is baked into mesh and joints")
+        notes.append(Diagnostic("X005.shape-baked"))
     if len(body.shape.targets):
-        notes.append(f"{len(body.shape.targets)} blend shapes are morph targets")
+        count = len(body.shape.targets)
+        notes.append(Diagnostic("X005.morph-targets", values={"n": count}))
         shapes = figure.blend_shapes
         if shapes is not None and shapes.normal_offsets is None:
-            notes.append("normals are not affected by these: glTF does not define it")
+            notes.append(Diagnostic("X005.morph-normals"))
     if body.influences is not None and body.influences.n_fixed:
-        notes.append(
-            f"{vertices_text(body.influences.n_fixed)} without influence: bound to the node "
-            '"fixed", which never moves'
-        )
+        unbound = int(body.influences.n_fixed)
+        notes.append(Diagnostic("X005.no-influence", values={"n": unbound}))
     return notes
 
 
 def _motion_remarks(
     animation: SampledAnimation, body: _Body, frames: Frames, options: MotionOptions
-) -> list[str]:
-    """Return messages about gaps, and about joints with translations."""
-    notes, skeleton = [], animation.figure.require_skeleton()
-    if not animation.frames.present.all():
-        done = {"hold": "the last pose is held", "interpolate": "interpolated, held at both ends"}
-        text = gaps_text(animation.frames.present, animation.first_frame)
-        notes.append(
-            f"missing {text}: {done.get(options.closing, 'one file for each run of frames')}"
-        )
+) -> list[Diagnostic]:
+    """Return notes about gaps, and about joints with translations."""
+    skeleton = animation.figure.require_skeleton()
+    notes = gaps_note(animation.frames.present, animation.first_frame, options.closing)
     own = body.figure.require_skeleton()
     moves = np.flatnonzero(moving(own, frames) & (skeleton.parents >= 0))
     if len(moves):
-        names = ", ".join(joint_label(skeleton, int(joint)) for joint in moves[:_LISTED])
-        more = f" and {len(moves) - _LISTED} more" * (len(moves) > _LISTED)
-        moved = counted(
-            len(moves),
-            "joint",
-            "below the root translates",
-            "below the root translate",
-        )
-        notes.append(f"{moved}: {printable(names, 300)}{more}")
+        names = [joint_label(skeleton, int(joint)) for joint in moves]
+        values = {"n": len(names), "names": names}
+        notes.append(Diagnostic("X005.joints-translate", values=values))
     return notes

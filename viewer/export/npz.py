@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
 from viewer.formats import save_arrays
-from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
@@ -41,7 +41,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 __all__ = ["export", "export_animation", "export_points"]
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write float64 arrays in the figure's own space and unit; see ``viewer.export.export``."""
     figure, pose, mesh = actor.figure, actor.pose, actor.figure.mesh
     arrays = {
@@ -70,10 +70,12 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         places = np.where(confidences[:, None] > 0.0, actor.points[:, :3], np.nan)
         arrays |= _point_arrays(figure.points, places, confidences)
     save_arrays(path, arrays)
-    return [f"{printable(path, 300)}: {', '.join(arrays)}"]
+    return [Diagnostic("X001.arrays", path, values={"names": [*arrays]})]
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write float64 arrays of all frames; see ``viewer.export.export_animation``."""
     figure = animation.figure
     _check(animation.name, animation.frames.present, figure.unit, options)
@@ -108,11 +110,11 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
             vertices[frame] = deform(figure, pose, options.skinning)[0]
         arrays["vertices"] = vertices
     save_arrays(path, arrays)
-    count = _count(frames.present, animation.frame_rate)
-    return [f"{printable(path, 300)}: {count}: {', '.join(arrays)}", *[filling] * bool(filling)]
+    values = {**_counts(frames.present, animation.frame_rate), "names": [*arrays]}
+    return [Diagnostic("X001.motion-arrays", path, values=values), *filling]
 
 
-def export_points(animation: SampledPoints, path: Path, options: MotionOptions) -> list[str]:
+def export_points(animation: SampledPoints, path: Path, options: MotionOptions) -> list[Diagnostic]:
     """Write captured points of all frames as float64 arrays.
 
     Parameters
@@ -126,8 +128,8 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
 
     Returns
     -------
-    list of str
-        Messages about the written file.
+    list of Diagnostic
+        A note about the written file.
 
     Raises
     ------
@@ -147,8 +149,12 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
     }
     arrays |= _point_arrays(animation.layout, animation.points, animation.confidences)
     save_arrays(path, arrays)
-    count = _count(animation.present, animation.frame_rate)
-    return [f"{printable(path, 300)}: {count}, {options.world_up} up: {', '.join(arrays)}"]
+    values = {
+        **_counts(animation.present, animation.frame_rate),
+        "up": options.world_up,
+        "names": [*arrays],
+    }
+    return [Diagnostic("X001.point-arrays", path, values=values)]
 
 
 def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None:
@@ -178,7 +184,5 @@ def _point_arrays(
     }
 
 
-def _count(present: Bools, rate: float) -> str:
-    missing = int((~present).sum())
-    gaps = f"; {missing} of them missing, NaN" if missing else ""
-    return f"{len(present)} frames at {rate:g} fps{gaps}"
+def _counts(present: Bools, rate: float) -> dict[str, object]:
+    return {"n": len(present), "rate": rate, "missing": int((~present).sum())}

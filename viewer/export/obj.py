@@ -10,12 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
+from viewer.export._left_out import not_held_note
 from viewer.export._motion_paths import numbered_paths
 from viewer.export._obj_materials import PLAIN, library_losses, material_library
 from viewer.formats import all_or_none, save_bytes, save_text
-from viewer.phrases import counted, printable
+from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.evaluation import pose_of
@@ -27,7 +29,7 @@ from viewer.rig.units import UNIT_NAMES
 __all__ = ["export", "export_animation"]
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write ``v``, ``vt``, ``vn`` and triangles; see ``viewer.export.export``."""
     require_mesh(actor, ".obj")
     mesh = actor.figure.require_mesh()
@@ -49,15 +51,15 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         for file in missing:
             save_bytes(file, beside[file])
         save_text(path, "".join(parts))
-    counts = f"{counted(mesh.n_vertices, 'vertex')}, {counted(mesh.n_triangles, 'triangle')}"
-    notes = [f"{printable(file, 300)}: its texture" for file in beside if file.suffix == ".png"]
-    lost = library_losses(mesh)
-    if lost:
-        notes.append(f"not in the .mtl: {', '.join(lost)}")
-    return [f"{printable(path, 300)}: {counts}", *notes]
+    counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
+    textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
+    lost = not_held_note(".mtl", library_losses(mesh))
+    return [Diagnostic("X001.mesh", path, values=counts), *textures, *lost]
 
 
-def export_animation(animation: SampledAnimation, path: Path, options: MotionOptions) -> list[str]:
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
     """Write one numbered file per frame; see ``viewer.export.export_animation``.
 
     ``{frame}`` in the name stands for the frame's number, as in ``walk_{frame:05}.obj``. Missing
@@ -66,21 +68,20 @@ def export_animation(animation: SampledAnimation, path: Path, options: MotionOpt
     poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     frames = np.flatnonzero(poses.present)
     files = numbered_paths(path, animation.first_frame + frames)
-    written: list[str] = []
     with all_or_none(files):
         for frame, file in zip(frames, files, strict=True):
             pose = pose_of(animation.figure, poses, int(frame))
-            written += export(Actor(animation.figure, pose), file, options.skinning)
-    missing = poses.n_frames - len(files)
+            export(Actor(animation.figure, pose), file, options.skinning)
     if not files:
-        return [
-            f"{printable(path, 300)}: no person is present in these frames, nothing was written"
-        ]
-    name = printable(path, 300)
-    gaps = f"; {missing} frames are missing in the motion and have no file" if missing else ""
-    span = f"{len(files)} files, {files[0].name} to {files[-1].name}"
-    span = span if len(files) > 1 else f"1 file, {files[0].name}"
-    return [f"{name}: {span}{gaps}", *[filling] * bool(filling)]
+        return [Diagnostic("X001.no-meshes", path)]
+    values = {
+        "n": len(files),
+        "first": files[0].name,
+        "last": files[-1].name,
+        "missing": poses.n_frames - len(files),
+    }
+    key = "X001.meshes" if len(files) > 1 else "X001.one-mesh"
+    return [Diagnostic(key, path, values=values), *filling]
 
 
 def _rows(keyword: str, rows: Floats) -> str:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.export import require_mesh
 from viewer.formats import save_bytes
-from viewer.phrases import counted, printable
+from viewer.phrases import printable
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
@@ -16,7 +17,7 @@ from viewer.rig.skinning import Skinning, deform
 __all__ = ["export"]
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write positions and normals as float32, and triangles; see ``viewer.export.export``."""
     require_mesh(actor, ".ply")
     mesh = actor.figure.require_mesh()
@@ -36,10 +37,8 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     ]
     text = "\n".join(header).encode("ascii", "backslashreplace")
     save_bytes(path, text + vertices.tobytes() + faces.tobytes())
-    return [
-        f"{printable(path, 300)}: {counted(mesh.n_vertices, 'vertex')}, "
-        f"{counted(mesh.n_triangles, 'triangle')}",
-    ]
+    counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
+    return [Diagnostic("X001.mesh", path, values=counts)]
 
 
 def _faces(mesh: Mesh) -> np.ndarray:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._course_rig import course_skeleton
-from viewer.export._losses.apart import Apart, Farthest, apart_lines, negligible
+from viewer.export._left_out import extra_parts, not_held_note
+from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
 from viewer.formats import Source, all_or_none, keeping_written, read, write
-from viewer.phrases import counted, printable
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import world_matrices
@@ -26,7 +27,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices, skin_used
 __all__ = ["export"]
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
+def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write skeleton and skin, read them back, and report the error of the posed mesh.
 
     The shape is applied to the rest mesh, the pose becomes the file's pose, and the figure's
@@ -38,7 +39,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
     whole = scaled(shaped(figure, pose.shape_weights), pose.figure_scale)
     rig, sources = _as_rig(whole, pose, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
-    notes = [f"{printable(skel, 300)}: {counted(figure.skeleton.n_joints, 'joint')}"]
+    notes = [Diagnostic("X001.skel", skel, values={"n": figure.skeleton.n_joints})]
     with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
         write(rig, skel)
         if rig.mesh is not None:
@@ -46,13 +47,11 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[str]:
         files = [Source(file, saved[file]) for file in (skel, skin) if file in saved]
         error = _error(actor, files, sources, skinning)
     if rig.mesh is not None:
-        notes.append(f"{printable(skin, 300)}: {counted(rig.mesh.n_vertices, 'vertex')}")
+        notes.append(Diagnostic("X001.skin", skin, values={"n": rig.mesh.n_vertices}))
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
-            notes.append(
-                f"split at texture seams: {figure.mesh.n_vertices} vertices are "
-                f"{rig.mesh.n_vertices} in the .skin"
-            )
-    return notes + _lost(figure, pose) + error
+            counts = {"before": figure.mesh.n_vertices, "after": rig.mesh.n_vertices}
+            notes.append(Diagnostic("X005.seams", values=counts))
+    return notes + _lost(figure) + error
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
@@ -104,29 +103,23 @@ def scaled(figure: Figure, factor: float) -> Figure:
     return replace(figure, mesh=mesh, skeleton=skeleton, skin=skin, blend_shapes=None)
 
 
-def _lost(figure: Figure, pose: Pose) -> list[str]:
-    """Return a message that lists the data that the formats cannot hold."""
+def _lost(figure: Figure) -> list[Diagnostic]:
+    """Return a note that lists the data that the formats cannot hold."""
     lost = []
     if figure.blend_shapes is not None:
-        lost.append(f"{figure.n_shapes} blend shapes (the current shape is kept)")
+        lost.append(Phrase("part-current-shape", n=figure.n_shapes))
     if figure.correctives is not None:
-        lost.append("pose correctives")
+        lost.append(Phrase("part-correctives"))
+    if figure.mesh is not None and not all(one.is_plain for one in figure.mesh.materials):
+        lost.append(Phrase("part-materials"))
     if figure.up != "y":
-        lost.append(f"the up axis {figure.up}")
-    extras = {
-        "body parts": figure.body_parts,
-        "keypoints": figure.keypoints,
-        "the symmetry map": figure.symmetry,
-        "the reduced mesh": figure.reduced,
-        "the joint regressor": figure.joint_regressor,
-    }
-    lost += [name for name, part in extras.items() if part is not None]
-    return [f"not held by .skel and .skin: {', '.join(lost)}"] if lost else []
+        lost.append(Phrase("part-up", up=figure.up))
+    return not_held_note(".skel and .skin", [*lost, *extra_parts(figure)])
 
 
 def _error(
     actor: Actor, files: list[Source], sources: np.ndarray | None, skinning: Skinning
-) -> list[str]:
+) -> list[Diagnostic]:
     """Read the files back and compare their pose with the posed figure."""
     figure, pose = actor.figure, actor.require_pose()
     skeleton = read(files[0])
@@ -139,7 +132,7 @@ def _error(
     least = negligible(one, first, np.zeros(1, dtype=np.intp))
     joints = Farthest(float(off[joint]), int(order[joint]), 0) if off[joint] > least else None
     if sources is None:
-        return apart_lines(files[0].path, figure, Apart(joints, None, 1, 1), None)
+        return apart_notes(files[0].path, figure, Apart(joints, None, 1, 1), None)
     mesh = read(files[1])
     assert isinstance(mesh, Figure)
     again = Figure("again", mesh.mesh, skeleton.skeleton, mesh.skin)
@@ -148,4 +141,4 @@ def _error(
     vertex = int(apart.argmax()) if len(apart) else -1
     far = len(apart) > 0 and apart[vertex] > least
     vertices = Farthest(float(apart[vertex]), int(sources[vertex]), 0) if far else None
-    return apart_lines(files[1].path, figure, Apart(joints, vertices, 1, 1), None)
+    return apart_notes(files[1].path, figure, Apart(joints, vertices, 1, 1), None)

@@ -12,7 +12,8 @@
 
 ``joint_turns`` are rotations as quaternions in the figure's axes, for figures with other DOFs than
 ``dof_layout`` names. Figures with the same DOFs use ``dofs``, edited or not, and the transforms
-below them: rotations and shifts of joints relative to their parents, written only if not at rest.
+below them, ``joint_rotations`` and ``joint_shifts``: rotations and shifts of joints relative to
+their parents, written only if not at rest.
 
 Both kinds of named values may instead contain one frame of smplx's parameters: ``global_orient``,
 ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,

@@ -68,7 +68,7 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]
     """
     assert actor.pose is not None  # checked by the callers
     try:
-        notes = apply_record(record, actor.figure, actor.pose, cut=True)
+        notes = apply_record(record, actor.figure, actor.pose, drop_excess=True)
         return [replace(note, path=path) for note in notes]
     except RigError as problem:
         raise pose_error(path, record, problem) from None

@@ -117,7 +117,7 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
     facts = dict(motion.figure.facts)
     facts["unit"] = f"{fact}; scaled to metres" if unit != "m" else fact
     kept = tuple(facts.items())
-    return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note="")
+    return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note=None)
 
 
 def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
@@ -160,7 +160,7 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
             cast.actors[place] = replace(
                 one.actor, figure=scaled.figure, clip=scaled.clip, pose=None
             )
-        if one.motion.unit_note:
+        if one.motion.unit_note is not None:
             key = "F007.unit-taken-and-scaled" if one in chosen else "F007.unit-taken"
             cast.note(key, one.path, note=one.motion.unit_note)
 

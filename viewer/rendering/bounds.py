@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
@@ -9,7 +11,7 @@ from viewer.rendering.shown import placement_of, shows_mesh, shows_skeleton
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.mesh import bounding_box
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
@@ -18,7 +20,7 @@ from viewer.rig.skin import Skin, bind_positions, owners
 __all__ = ["Bounds", "stretch"]
 
 _MARGIN = 1.03  # for pose correctives and skinning methods that do not blend linearly
-_MOST = 32  # figures whose radii are kept
+_BONE = 0.05  # greatest half width of a bone, in sizes of the skeleton
 
 
 class Bounds:
@@ -29,7 +31,7 @@ class Bounds:
     """
 
     def __init__(self) -> None:
-        self._radii: dict[int, tuple[Figure, Floats, Floats]] = {}
+        self._reaches: WeakKeyDictionary[Figure, tuple[Floats, Floats]] = WeakKeyDictionary()
 
     def spheres(self, actor: Actor, options: DisplayOptions) -> Floats:
         """Return spheres around what is drawn of an actor.
@@ -68,13 +70,11 @@ class Bounds:
         return self._of_skin(figure, figure.require_skin(), pose)
 
     def _of_skin(self, figure: Figure, skin: Skin, pose: Pose) -> Floats:
-        if id(figure) not in self._radii:
-            if len(self._radii) >= _MOST:
-                self._radii.pop(next(iter(self._radii)))
+        if figure not in self._reaches:
             centers = bind_positions(skin)
             radii = _reaches(centers, skin, figure.require_mesh().positions)
-            self._radii[id(figure)] = figure, centers, radii
-        _, centers, radii = self._radii[id(figure)]
+            self._reaches[figure] = centers, radii
+        centers, radii = self._reaches[figure]
         palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
         used = radii >= 0.0
         palette = palette[used]
@@ -113,15 +113,19 @@ def _reaches(centers: Floats, skin: Skin, positions: Floats) -> Floats:
 
 
 def _of_joints(actor: Actor) -> Floats:
-    """Return spheres around an actor's joint boxes, figure space."""
+    """Return spheres around an actor's bones and joint boxes, figure space."""
     pose = actor.require_pose()
     skeleton = shaped(actor.figure, pose.shape_weights).require_skeleton()
     world = posed_skeleton(skeleton, pose).world
+    places = world[:, :3, 3]
+    thick = np.full(len(places), _BONE * box_size(bounding_box(places)))
+    bones = np.column_stack([places, thick])
     if skeleton.boxes is None:
-        return np.pad(world[:, :3, 3], ((0, 0), (0, 1)))
+        return bones
     middles, halves = skeleton.boxes.mean(axis=1), 0.5 * np.ptp(skeleton.boxes, axis=1)
     centers = np.einsum("jik,jk->ji", world[:, :3, :3], middles) + world[:, :3, 3]
-    return np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch(world)])
+    boxes = np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch(world)])
+    return np.concatenate([bones, boxes])
 
 
 def _of_box(box: Floats) -> Floats:

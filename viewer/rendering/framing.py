@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = [
     "find_follow",
-    "fit_turning",
+    "fit_turntable",
     "follow_candidates",
     "frame_motion",
     "frames_looked_at",
@@ -170,7 +170,7 @@ def _directions(count: int) -> Floats:
     return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=1)
 
 
-def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> None:
+def fit_turntable(camera: Camera, points: Floats, aspect: float, angle: float) -> None:
     """Fit a rotating camera so that all points stay visible; see ``viewer.rendering.camera``.
 
     Parameters
@@ -181,12 +181,12 @@ def fit_turning(camera: Camera, points: Floats, aspect: float, turn: float) -> N
         Points to frame, scene space.
     aspect : float
         Width / height of the picture.
-    turn : float
+    angle : float
         Rotation about the target in degrees.
     """
     first, widest = camera.azimuth, 0.0
-    for fraction in np.linspace(0.0, 1.0, _N_VIEWS + 1) if turn else (0.0,):
-        camera.azimuth = first + turn * float(fraction)
+    for fraction in np.linspace(0.0, 1.0, _N_VIEWS + 1) if angle else (0.0,):
+        camera.azimuth = first + angle * float(fraction)
         fit(camera, points, aspect)
         widest = max(widest, camera.distance)
     camera.azimuth, camera.distance = first, widest

@@ -127,7 +127,7 @@ class Recording:
         Whether clips pose the actors; False keeps their poses, for a turntable of a still pose.
     interpolate : bool
         Interpolate across gaps of captures.
-    turn : float
+    turntable : float
         Rotation of the camera about its target, degrees, from the first frame to the one after
         the last: 360 gives a seamless loop.
     follow : Follow or None
@@ -149,7 +149,7 @@ class Recording:
     box: Floats | None = None
     moves: bool = True
     interpolate: bool = False
-    turn: float = 0.0
+    turntable: float = 0.0
     follow: Follow | None = None
     shifts: Floats | None = None
     selected: tuple[int, int] = (0, -1)
@@ -354,8 +354,8 @@ class _Cameras:
     def at(self, frame: int, scene: Scene) -> Camera:
         recording = self._recording
         camera, follow = recording.camera.copy(), recording.follow
-        if recording.turn:
-            rotated = camera.azimuth + recording.turn * frame / recording.n_frames
+        if recording.turntable:
+            rotated = camera.azimuth + recording.turntable * frame / recording.n_frames
             camera.azimuth = (rotated + 180.0) % 360.0 - 180.0
         if follow is not None:
             place = followed_point(scene.actors[follow.actor], follow.joint)

@@ -219,10 +219,11 @@ class Renderer:
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
         draw_translucent(self.mesh_pass, meshes, view, options)
+        self._draw_blended(meshes, view, options)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
-        self._draw_motion_paths(scene, view, options, target.size)
+        self.late.draw_motion_paths(scene, view, options, target.size)
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
@@ -310,6 +311,11 @@ class Renderer:
         drawn += [instances.mesh for _, instances in meshes.instanced]
         self.late.use_pictures(drawn, options)
         self._draw_layer(meshes, view, options, blended=False)
+
+    def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
+        """Draw translucent surfaces, over all that is opaque and the ground."""
+        drawn = [mesh.mesh for _, mesh in meshes.singles]
+        drawn += [instances.mesh for _, instances in meshes.instanced]
         if any(mesh.is_blended for mesh in drawn):
             with without_depth_writes(self.context):
                 self._draw_layer(far_first(meshes, options, view), view, options, blended=True)
@@ -364,22 +370,6 @@ class Renderer:
         # Marker positions already include the placement of the pose.
         at = actor.placement
         self.late.keypoint_pass.draw(markers, at, view, options, actor.opacity)
-
-    def _draw_motion_paths(
-        self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
-    ) -> None:
-        if not options.path_joints:
-            return
-        from viewer.rendering.passes.motion_path_pass import Moment
-
-        at = Moment(scene.time or 0.0, options.path_seconds)
-        for index, actor in enumerate(scene.actors):
-            joints = tuple(joint for owner, joint in options.path_joints if owner == index)
-            # Paths are drawn across gaps: they show past and future positions of absent actors.
-            if joints and actor.visible and actor.clip is not None:
-                paths = self.buffers.motion_path(actor)
-                paths.update(actor, joints, options.min_confidence)
-                self.late.motion_path_pass.draw(paths, actor.placement, view, size, at)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed mesh, created on first use; its figure must have a mesh."""

@@ -154,6 +154,19 @@ class Material:
         return {name: texture for name, texture in named.items() if texture is not None}
 
     @property
+    def is_plain(self) -> bool:
+        """Whether the name and one opaque picture describe the material in full."""
+        base = self.base_texture
+        return (
+            not set(self.textures) - {"base_texture"}
+            and (base is None or (base.is_placed_plainly and base.uv_set == 0))
+            and self.base_color is None
+            and self.alpha_mode == "opaque"
+            and self.double_sided
+            and not (self.is_physical or self.unlit or any(self.emissive))
+        )
+
+    @property
     def texture(self) -> str | None:
         """File name of the base colour's picture, if there is one."""
         return None if self.base_texture is None else self.base_texture.name

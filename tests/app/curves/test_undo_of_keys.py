@@ -16,11 +16,11 @@ from viewer.app.core.undo_actions import undo
 from viewer.app.curves.clip_actions import key_present_pose, new_clip
 from viewer.app.curves.editing import (
     add_key_at,
+    change_tangent,
     delete_chosen,
     extrapolate,
     place_key,
     set_clip_range,
-    turn_tangent,
 )
 from viewer.app.curves.state import Curves
 from viewer.app.playback.frame_rate import set_rate
@@ -47,8 +47,8 @@ def assert_follows_its_clip(hand, time):
 EDITS = {
     "value": lambda state: place_key(state, KEY, value=-0.5),
     "time": lambda state: place_key(state, KEY, time=1.6),
-    "tangent": lambda state: turn_tangent(state, [KEY], 0, 3.0),
-    "interpolation": lambda state: turn_tangent(state, [KEY], 0, "linear"),
+    "tangent": lambda state: change_tangent(state, [KEY], 0, 3.0),
+    "interpolation": lambda state: change_tangent(state, [KEY], 0, "linear"),
     "added key": lambda state: (
         add_key_at(state, [ARM_X + 1], 0.25),
         place_key(state, (ARM_X + 1, 1), value=0.4),

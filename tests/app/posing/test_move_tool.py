@@ -11,8 +11,8 @@ from viewer.app.core.view_frame import ViewFrame
 from viewer.app.posing.move_tool import (
     LENGTH,
     Arrow,
+    MoveHandle,
     ReachHandle,
-    ShiftHandle,
     arrows,
     grab_arrow,
     longest_chain,
@@ -146,7 +146,7 @@ def test_arrow_shifts_the_figure_along_its_axis_alone() -> None:
     posed = posed_joint(actor, 0)
     ends = [view.place(np.array([x, 0.0, 0.0])) for x in (0.3, 0.8)]
     arrow = Arrow(np.array([1.0, 0, 0]), 0)
-    outcome = ShiftHandle(posed, actor.pose, ends[0], arrow).follow(view, ends[1], False)
+    outcome = MoveHandle(posed, actor.pose, ends[0], arrow).follow(view, ends[1], False)
     # Half a unit of the scene is a quarter of the figure's, which is drawn at twice its size.
     assert_allclose(outcome.pose.figure_translation, [0.25, 0, 0], atol=1e-9)
     assert outcome.text == "figure   +0.5 +0 +0"
@@ -157,7 +157,7 @@ def test_root_with_translations_moves_by_its_dofs_within_their_limits() -> None:
     view = frame()
     posed = posed_joint(actor, 0)
     end = view.place(np.array([0.4, 0.6, 0.0]))
-    outcome = ShiftHandle(posed, actor.pose, view.place(np.zeros(3))).follow(view, end, False)
+    outcome = MoveHandle(posed, actor.pose, view.place(np.zeros(3))).follow(view, end, False)
     assert_allclose(outcome.pose.dofs[:3], [0.4, 0.1, 0], atol=1e-9)
     assert outcome.limited == (1,) and not outcome.pose.figure_translation.any()
     assert not actor.pose.dofs.any()

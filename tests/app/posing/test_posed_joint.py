@@ -60,7 +60,7 @@ def test_turning_axis_is_what_points_are_seen_to_turn_about(name, axis) -> None:
     actor.placement[:3, :3] = PLACEMENTS[name]
     joint = posed_joint(actor, 0)
     inside = rotation_vector_to_matrix(1e-6 * np.array(axis, float))
-    seen = joint.turning_axis(np.array(axis, float))
+    seen = joint.rotation_axis(np.array(axis, float))
     # However points move, they do not move along the axis, and by the right-hand rule about it.
     for point in np.eye(3):
         step = PLACEMENTS[name] @ (inside - np.eye(3)) @ np.linalg.solve(PLACEMENTS[name], point)

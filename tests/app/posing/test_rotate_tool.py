@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from viewer.app.core.view_frame import ViewFrame
 from viewer.app.posing.posed_joint import posed_joint
-from viewer.app.posing.rotate_tool import RADIUS, TurnHandle, circle, grab_ring, limit_text, rings
+from viewer.app.posing.rotate_tool import RADIUS, RotateHandle, circle, grab_ring, limit_text, rings
 from viewer.rendering.camera import Camera
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.pose import joint_rotations
@@ -27,7 +27,7 @@ def frame(azimuth=0.0, inclination=0.0, parallel=True) -> ViewFrame:
 def grabbed(actor, joint, view, place, orientation="local"):
     posed = posed_joint(actor, joint)
     ring, held = grab_ring(rings(posed, actor.pose, orientation, view), posed.center, view, place)
-    return TurnHandle(posed, actor.pose, ring, held, place)
+    return RotateHandle(posed, actor.pose, ring, held, place)
 
 
 def spot(angle, radius=RADIUS):

@@ -78,7 +78,7 @@ def test_outlines_are_seen_in_the_window_but_not_in_pictures(bones):
 
 def test_actor_is_outlined_once_it_was_chosen_among_several(pair):
     assert not keys(pair)
-    pair.state.choose_actor(1)
+    pair.state.select_actor(1)
     pair.step()
     assert keys(pair) == [Outlined(1).key()]
     pair.key("escape")

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from viewer.rendering.camera import VIEWS
-from viewer.rendering.gpu.program import SHADING
-from viewer.rendering.options import BONES, SHOWN, Lights
+from viewer.rendering.gpu.program import SHADING_CHOICES
+from viewer.rendering.options import BACKGROUNDS, BONES, MATCAPS, SHOWN, Lights
 from viewer.rig.scene import Actor
 
 
@@ -76,15 +76,29 @@ def test_bones_are_chosen_from_a_list(tall):
 
 
 def test_shading_is_chosen_from_a_list(tall):
-    for number, name in enumerate(SHADING):
+    for number, name in enumerate(SHADING_CHOICES):
         tall.pick("Shading", number)
         assert tall.state.options.shading == name
 
 
+def test_shadings_show_what_they_need(tall):
+    tall.pick("Shading", list(SHADING_CHOICES).index("matcap"))
+    assert "Roughness" not in tall.state.item_rects
+    tall.pick("Matcap", list(MATCAPS).index("chrome"))
+    assert tall.state.options.matcap == "chrome"
+    tall.pick("Shading", list(SHADING_CHOICES).index("pbr"))
+    before = tall.scene_picture()
+    tall.drag("Metallic", 1.3, "Metallic")
+    assert tall.state.options.metallic == 1.0
+    assert (tall.scene_picture() != before).any()
+    assert "Matcap" not in tall.state.item_rects
+
+
 def test_background_is_chosen_from_a_list(tall):
-    tall.pick("Background", 1)
-    assert tall.state.options.background == "transparent"
-    tall.pick("Background", 2)
+    for number, name in enumerate(BACKGROUNDS):
+        tall.pick("Background", number)
+        assert tall.state.options.background == name
+    tall.pick("Background", len(BACKGROUNDS))
     assert tall.state.options.background == "#ffffff"
     assert "Colour" in tall.state.item_rects
     tall.click(tall.place("Colour", 0.35), held="ctrl")

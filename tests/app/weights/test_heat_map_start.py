@@ -10,7 +10,7 @@ from app.tiny import SKEL, skin_text
 
 from viewer.app.weights.actions import start_heat_map, toggle_weights
 from viewer.rig.annotations import VertexField
-from viewer.rig.scalars import joint_influences, most_influential, telling_quantity
+from viewer.rig.scalars import informative_quantity, joint_influences, most_influential
 from viewer.rig.scene import Actor
 
 TIP = "balljoint arm {\n        balljoint tip { }"
@@ -36,7 +36,7 @@ def test_influence_of_a_joint_is_the_sum_of_its_weights(tipped):
     # Four vertices have the root alone, four the arm, four both.
     np.testing.assert_allclose(joint_influences(figure), [5.0, 7.0, 0.0])
     assert most_influential(figure) == 1
-    assert telling_quantity("weight", [figure]) == "weight:arm"
+    assert informative_quantity("weight", [figure]) == "weight:arm"
     assert most_influential(replace(figure, skin=None)) == -1
 
 

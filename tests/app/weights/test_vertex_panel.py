@@ -192,7 +192,7 @@ def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
     explanation, actor = pinned.state.of(Weights).explanation, pinned.state.actor
     actor.placement[:3, 3] = 10.0, 0.0, 0.0
     found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
-    assert found.manner.on_top
+    assert found.style.on_top
     # Weakest first: a dark line, a line, a dark dot, a dot; at last the vertex, dark and white.
     shift = np.array([10.0, 0, 0])
     starts, ends = found.segments.starts - shift, found.segments.ends - shift
@@ -206,7 +206,7 @@ def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
     assert_allclose(explanation.weights, 0.5)
     assert_allclose(found.segments.widths, [5, 3, 11, 8, 5, 3, 11, 8, 12, 8])
     assert_allclose(found.segments.colors[[1, 5], 3], 0.35 + 0.65 * 0.5)
-    assert found.labels.words == tuple(f"{name}  0.500" for name in explanation.names)
+    assert found.labels.texts == tuple(f"{name}  0.500" for name in explanation.names)
     assert_allclose(found.labels.points - shift, explanation.images)
     assert found.labels.ranks.tolist() == [1, 2]  # the name of the selected joint comes first
     alone = vertex_annotation(explanation, actor, False, (960, 720))

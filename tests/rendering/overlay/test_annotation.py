@@ -38,21 +38,21 @@ def test_letters_grow_with_the_picture():
 
 def test_low_ranks_come_first_and_then_the_nearer(lettering):
     same_place = [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0], [0, 0, 0.5]]
-    assert placed(lettering, same_place, [1, 1, 0, 1]).words == ("c", "b", "d", "a")
-    assert placed(lettering, same_place, [1, 1, 1, 1]).words == ("b", "d", "a", "c")
-    assert placed(lettering, same_place, [0, 1, 2, 3]).words == ("a", "b", "c", "d")
+    assert placed(lettering, same_place, [1, 1, 0, 1]).texts == ("c", "b", "d", "a")
+    assert placed(lettering, same_place, [1, 1, 1, 1]).texts == ("b", "d", "a", "c")
+    assert placed(lettering, same_place, [0, 1, 2, 3]).texts == ("a", "b", "c", "d")
 
 
 def test_colours_go_with_their_words(lettering):
     found = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [9, 0, -1.0]], [2, 1, 0])
-    assert found.words == ("b", "a")
+    assert found.texts == ("b", "a")
     assert_allclose(found.colors, [[0.03, 0.04, 0.05], [0.0, 0.01, 0.02]])
     assert (found.n_seen, found.n_left_out) == ((2,), (0,))
 
 
 def test_no_words_are_none(lettering):
     found = placed(lettering, np.zeros((0, 3)), np.zeros(0, int), ())
-    assert found.words == () and found.corners.shape == (0, 2) and found.n_left_out == (0,)
+    assert found.texts == () and found.corners.shape == (0, 2) and found.n_left_out == (0,)
 
 
 def test_words_of_several_are_placed_together(lettering):
@@ -61,9 +61,9 @@ def test_words_of_several_are_placed_together(lettering):
     many = Labels(("a",) * 6, np.repeat(place, 6, axis=0), np.full(6, 7), np.ones((6, 3)))
     one = Labels(("b",), place, np.array([3]), white)
     found = place_labels([many, one], view, SIZE, lettering)
-    assert found.words[0] == "b" and found.owners.tolist() == [1] + [0] * (len(found.words) - 1)
-    assert found.n_seen == (6, 1) and found.n_left_out == (7 - len(found.words), 0)
-    sizes = lettering.sizes(found.words)
+    assert found.texts[0] == "b" and found.owners.tolist() == [1] + [0] * (len(found.texts) - 1)
+    assert found.n_seen == (6, 1) and found.n_left_out == (7 - len(found.texts), 0)
+    sizes = lettering.sizes(found.texts)
     cover = np.zeros(SIZE[::-1], dtype=int)
     for (left, top), (width, height) in zip(found.corners, sizes, strict=True):
         cover[top : top + height, left : left + width] += 1

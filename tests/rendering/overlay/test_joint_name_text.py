@@ -36,36 +36,36 @@ def placed(lettering, offsets, selected=(0, -1)):
 
 def test_joints_apart_have_all_their_names(lettering):
     names = placed(lettering, [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
-    assert sorted(names.words) == ["j0", "j1", "j2"]
+    assert sorted(names.texts) == ["j0", "j1", "j2"]
     assert (names.n_seen, names.n_left_out) == ((3,), (0,))
     # 180 pixels a unit: joint 0 is at (220, 360), its name right of it, at its height.
-    left, top = names.corners[names.words.index("j0")].tolist()
+    left, top = names.corners[names.texts.index("j0")].tolist()
     assert 222 < left < 230 and 345 < top < 360
 
 
 def test_nearest_joints_have_names_where_there_is_no_room_for_all(lettering):
     names = placed(lettering, [[0, 0, z] for z in (0.0, 1.0, -1.0, 0.5, -0.5)])
     # Right and left of the place, above and below it.
-    assert names.words == ("j1", "j3", "j0", "j4")
+    assert names.texts == ("j1", "j3", "j0", "j4")
     assert (names.n_seen, names.n_left_out) == ((5,), (1,))
 
 
 def test_selected_joint_comes_first_in_its_own_colour(lettering):
     names = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0]], selected=(0, 2))
-    assert names.words == ("j2", "j1", "j0")
+    assert names.texts == ("j2", "j1", "j0")
     assert_allclose(names.colors[0], HIGHLIGHT[:3])
     assert (names.colors[1] > 0.9).all()
     other = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0]], selected=(1, 2))
-    assert other.words == ("j1", "j0", "j2")
+    assert other.texts == ("j1", "j0", "j2")
 
 
 def test_joints_beside_the_picture_do_not_count(lettering):
     names = placed(lettering, [[0, 0, 0], [9, 0, 0], [0, -9, 0]])
-    assert names.words == ("j0",) and names.n_seen == (1,)
+    assert names.texts == ("j0",) and names.n_seen == (1,)
 
 
 def test_nobody_has_no_names(lettering):
     camera = Camera()
     view = view_of(camera, SIZE, BOX)
     names = place_labels([name_labels([], (0, -1))], view, SIZE, lettering)
-    assert names.words == () and names.n_left_out == (0,)
+    assert names.texts == () and names.n_left_out == (0,)

@@ -9,7 +9,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.overlay.segments import HIDDEN, Manner, SegmentPass, Segments, dots, joined
+from viewer.rendering.overlay.segments import (
+    HIDDEN,
+    SegmentPass,
+    Segments,
+    SegmentStyle,
+    dots,
+    joined,
+)
 from viewer.rendering.projection import project
 from viewer.rendering.view import view_of
 
@@ -28,7 +35,7 @@ def picture(ctx):
     passes = SegmentPass(ctx, programs)
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
 
-    def draw(segments, depth=1.0, target_point=(0.0, 0.0, 0.0), **manner):
+    def draw(segments, depth=1.0, target_point=(0.0, 0.0, 0.0), **style):
         camera.target = np.array(target_point)
         target.use()
         ctx.viewport = (0, 0, SIDE, SIDE)
@@ -37,7 +44,7 @@ def picture(ctx):
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         ctx.depth_func = "<"
         view = view_of(camera, (SIDE, SIDE), BOX + camera.target)
-        passes.draw(segments, view, (SIDE, SIDE), Manner(**manner))
+        passes.draw(segments, view, (SIDE, SIDE), SegmentStyle(**style))
         rows = np.frombuffer(target.read(components=4, dtype="f4"), dtype="f4")
         return rows.reshape(SIDE, SIDE, 4)[::-1]
 

@@ -9,7 +9,7 @@ from rendering.front_view import PIXELS, drawn, front_view, pixel
 
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.overlay.annotation import Annotation, Labels
-from viewer.rendering.overlay.segments import Manner, dots
+from viewer.rendering.overlay.segments import SegmentStyle, dots
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
 
@@ -29,7 +29,7 @@ def dot(place, color, width=12.0, words=(), on_top=True):
         tuple(words), np.repeat(points, count, axis=0), np.arange(count), np.ones((count, 3))
     )
     segments = dots(points, np.array(color), width)
-    return Annotation(segments, Manner(on_top=on_top), labels if words else None)
+    return Annotation(segments, SegmentStyle(on_top=on_top), labels if words else None)
 
 
 def picture(offscreen, *annotations, scene=None):

@@ -182,7 +182,7 @@ def test_stretch_of_a_joint_that_scales_comes_first():
         (
             lambda: Figure("bare", mesh(POINTS)),
             0,
-            "figure bare has no skin that follows a skeleton",
+            "figure bare has no skin attached to a skeleton",
         ),
     ],
 )

@@ -328,7 +328,7 @@ def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
-    assert lines(apply_record(record, figure, pose, cut=True)) == [
+    assert lines(apply_record(record, figure, pose, drop_excess=True)) == [
         f"shape coefficients 11 to 16 omitted (largest value 3): {figure.name} has 10",
         f"expression coefficient 1 omitted (largest value 2): {figure.name} has 0",
     ]
@@ -338,7 +338,7 @@ def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
 def test_shapes_for_a_figure_without_any_are_refused_all_the_same():
     rig = Figure("bones", skeleton=skeleton((-1,)))
     with pytest.raises(RigError) as caught:
-        apply_record(PoseRecord(shape=np.ones(3)), rig, figure_pose(rig), cut=True)
+        apply_record(PoseRecord(shape=np.ones(3)), rig, figure_pose(rig), drop_excess=True)
     assert str(caught.value) == "bones has 0 shape coefficients, found 3"
 
 

@@ -74,7 +74,7 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
     absent = "" if actor.is_present else "  (absent)"
     text = f"{printable(actor.name, 60)}{absent}"
     if imgui.selectable(text, index == state.chosen_actor)[0]:
-        state.choose_actor(index)
+        state.select_actor(index)
     note_item(state, f"actor {index}")
 
 

@@ -209,7 +209,7 @@ def _draw_following(state: AppState, text: str, actor: int, joint: int) -> None:
 def _choose_actor(state: AppState, index: int) -> None:
     if index != state.chosen_actor or not state.is_actor_selected:
         joint = state.selected_joint if index == state.chosen_actor else -1
-        state.choose_actor(index)
+        state.select_actor(index)
         state.selected_joint = joint
 
 

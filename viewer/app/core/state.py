@@ -52,7 +52,7 @@ class AppState:
     chosen_actor : int
         Index of the actor that panels act on.
     is_actor_selected : bool
-        Whether the user chose that actor, so that it is outlined among several.
+        Whether the user selected that actor, so that it has an outline among several.
     n_choices : int
         Number of times that an actor was chosen: features compare it to detect outdated state.
     selected_joint : int
@@ -136,11 +136,15 @@ class AppState:
 
     def choose_actor(self, index: int) -> None:
         """Choose the actor that panels act on."""
-        self.chosen_actor = index
-        self.is_actor_selected = True
+        self.chosen_actor, self.is_actor_selected = index, False
         self.n_choices += 1
         self.clock.follow(self.actor)  # stepping uses its frames
         self.selected_joint = -1
+
+    def select_actor(self, index: int) -> None:
+        """Choose an actor as the user's selection, which has an outline among several."""
+        self.choose_actor(index)
+        self.is_actor_selected = True
 
     @property
     def aspect(self) -> float:
@@ -166,7 +170,6 @@ class AppState:
         self.options.hidden_parts, self.options.reduced = (), False
         self.options.path_joints = ()
         self.choose_actor(0)
-        self.is_actor_selected = False
         self._begin()
 
     def _begin(self) -> None:

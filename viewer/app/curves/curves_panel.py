@@ -20,13 +20,13 @@ from viewer.app.curves.clip_actions import ask_for_clip, can_have_keys, key_pres
 from viewer.app.curves.data import Curve, channel_of, curves_of
 from viewer.app.curves.editing import (
     add_key_at,
+    change_tangent,
     clip_of,
     delete_chosen,
     drop_missing,
     extrapolate,
     focused_rows,
     place_key,
-    turn_tangent,
 )
 from viewer.app.curves.plot import draw_plot
 from viewer.app.curves.state import Curves, KeyPlace
@@ -281,10 +281,10 @@ def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, te
     new = choice(state, text, now, _TANGENTS)
     if new == "number" != now:
         # The slope computed by the rule keeps the curve unchanged.
-        turn_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
+        change_tangent(state, [place], side, float(slopes(channel)[place[1], side]))
     for rule in TANGENT_RULES:
         if new == rule != now:
-            turn_tangent(state, state.of(Curves).keys, side, rule)
+            change_tangent(state, state.of(Curves).keys, side, rule)
 
 
 def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
@@ -296,4 +296,4 @@ def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: flo
             same_line_if_room(_WIDE)
         typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
         if typed is not None:
-            turn_tangent(state, [place], side, typed / factor)
+            change_tangent(state, [place], side, typed / factor)

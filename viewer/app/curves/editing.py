@@ -24,6 +24,7 @@ from viewer.rig.motion.clip_edit import (
 
 __all__ = [
     "add_key_at",
+    "change_tangent",
     "clip_of",
     "delete_chosen",
     "drop_missing",
@@ -33,7 +34,6 @@ __all__ = [
     "nearest_row",
     "place_key",
     "set_clip_range",
-    "turn_tangent",
 ]
 
 _GAP = 1e-3  # smallest distance of keys when dragging, seconds
@@ -116,7 +116,7 @@ def delete_chosen(state: AppState) -> None:
     curves.keys = frozenset()
 
 
-def turn_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
+def change_tangent(state: AppState, places: Iterable[KeyPlace], side: int, to: Tangent) -> None:
     """Set the tangent on one side of keys: 0 incoming, 1 outgoing."""
     for row, key in places:
         _change(state, [row], partial(set_tangent, key=key, side=side, tangent=to))

@@ -11,11 +11,11 @@ from viewer.app.curves.axes import Plot
 from viewer.app.curves.data import channel_of
 from viewer.app.curves.editing import (
     add_key_at,
+    change_tangent,
     clip_of,
     delete_chosen,
     move_chosen,
     nearest_row,
-    turn_tangent,
 )
 from viewer.app.curves.state import KeyPlace
 from viewer.app.files.state import Files
@@ -157,7 +157,7 @@ def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bo
         # The knob stays at least a pixel away on its side of the key: no tangent is vertical.
         run = sign * max(sign * (x - time), 1.0 / across)
         for each in (0, 1) if imgui.get_io().key_shift else (side,):
-            turn_tangent(plot.state, [place], each, (y - value) / run / factor)
+            change_tangent(plot.state, [place], each, (y - value) / run / factor)
     return bool(hovered or held)
 
 

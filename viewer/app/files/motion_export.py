@@ -8,6 +8,7 @@ from pathlib import Path
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -98,7 +99,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         one.
     """
     try:
-        parts, lines = _parts(state, path, everyone)
+        parts, left_out = _parts(state, path, everyone)
         key = suited_exporter(path, parts[0].actor.figure)
         files = motion_files(state, path, everyone)
         # The dialog has already asked whether to replace existing files.
@@ -116,22 +117,22 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
 
     def write() -> list[str]:
         if key == "easymocap":
-            return [*_write_capture(scene, parts, path, options), *lines]
+            return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
         with all_or_none(files):
-            return [*_write(scene, parts, key, options), *lines]
+            return [*map(str, [*_write(scene, parts, key, options), *left_out])]
 
     state.job = ThreadJob(title, write)
 
 
-def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[str]]:
-    """Return the parts to write, and messages about omitted actors."""
+def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
+    """Return the parts to write, and notes about omitted actors."""
     actors = moving_actors(state) if everyone else [state.actor]
     paths = motion_paths(path, actors) if path.suffix else [path] * len(actors)
-    parts, lines = [], []
+    parts, notes = list[_Part](), list[Diagnostic]()
     for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
-            lines.append(f"{printable(actor.name)}: absent throughout the range, not exported")
+            notes.append(Diagnostic("X003.absent-in-range", values={"figure": actor.name}))
             continue
         # Edits made during the export must not change what is written.
         copied = actor.copy()
@@ -141,22 +142,24 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
         raise RigError("all actors are absent in the playback range: nothing to export")
     points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
     if everyone and points:
-        names = ", ".join(printable(actor.name, 60) for actor in points)
-        lines.append(f"captured points are not exported: {names}")
-    return parts, lines
+        names = [actor.name for actor in points]
+        notes.append(Diagnostic("X003.points", values={"names": names}))
+    return parts, notes
 
 
-def _write(scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions) -> list[str]:
-    lines: list[str] = []
+def _write(
+    scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions
+) -> list[Diagnostic]:
+    notes: list[Diagnostic] = []
     for part in parts:
         animation, up = animation_for(key, options, scene, part.actor, part.rate, part.frames)
-        lines += export_animation(animation, part.path, key, replace(options, world_up=up))
-    return lines
+        notes += export_animation(animation, part.path, key, replace(options, world_up=up))
+    return notes
 
 
 def _write_capture(
     scene: Scene, parts: Sequence[_Part], path: Path, options: MotionOptions
-) -> list[str]:
+) -> list[Diagnostic]:
     """Write all actors into one folder."""
     from viewer.export.easymocap import export_animations
 

@@ -119,5 +119,5 @@ def _figures(state: AppState) -> Iterator[Entry]:
 
 
 def _choose(state: AppState, index: int) -> None:
-    state.choose_actor(index)
+    state.select_actor(index)
     state.say_status(printable(state.actor.name, _LONGEST))

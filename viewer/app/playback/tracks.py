@@ -76,7 +76,7 @@ def _draw_names(state: AppState, moving: list[int], height: float) -> None:
         if not actor.is_drawn:
             imgui.push_style_color(imgui.Col_.text, _TEXT)
         if imgui.selectable(text, index == state.chosen_actor, 0, (width, 0.0))[0]:
-            state.choose_actor(index)
+            state.select_actor(index)
         if not actor.is_drawn:
             imgui.pop_style_color()
         note_item(state, f"track {index}")

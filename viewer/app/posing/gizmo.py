@@ -14,15 +14,15 @@ from viewer.app.core.view_frame import Place, ViewFrame, view_frame
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.move_tool import (
+    MoveHandle,
     ReachHandle,
-    ShiftHandle,
     arrows,
     grab_arrow,
     shifts,
     used_chain,
 )
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
-from viewer.app.posing.rotate_tool import TurnHandle, grab_ring, rings
+from viewer.app.posing.rotate_tool import RotateHandle, grab_ring, rings
 from viewer.app.posing.state import Drag, Handle, Outcome, Posing
 from viewer.app.posing.tool_actions import cancel_drag, no_tool, selected
 from viewer.rig.arrays import Floats
@@ -163,12 +163,12 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     if posing.tool == "rotate":
         found = rings(posed, pose, posing.orientation, frame)
         held = grab_ring(found, posed.center, frame, place)
-        return None if held is None else TurnHandle(posed, pose, *held, place, state.in_degrees)
+        return None if held is None else RotateHandle(posed, pose, *held, place, state.in_degrees)
     if posing.tool != "move":
         return None
     arrow = grab_arrow(arrows(posed, posing.orientation), posed.center, frame, place)
     if arrow is not None:
-        return ShiftHandle(posed, pose, place, arrow)
+        return MoveHandle(posed, pose, place, arrow)
     center = frame.place(posed.center)
     if center is None or _apart(center, place) > DOT_REACH:
         return None
@@ -182,7 +182,7 @@ def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
     if length:
         return ReachHandle(posed, pose, place, length)
     if shifts(skeleton, posed.joint):
-        return ShiftHandle(posed, pose, place)
+        return MoveHandle(posed, pose, place)
     state.say_status(f"No joint above {joint_label(skeleton, posed.joint)} can rotate")
     return None
 

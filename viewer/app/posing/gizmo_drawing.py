@@ -17,12 +17,12 @@ from viewer.app.core.state import AppState
 from viewer.app.core.view_frame import ViewFrame, view_frame
 from viewer.app.posing.gizmo import handle_at, joint_at, joint_places
 from viewer.app.posing.limit_arcs import LimitArc, arc_points, limit_arcs
-from viewer.app.posing.move_tool import LENGTH, Arrow, ReachHandle, ShiftHandle, arrows, used_chain
+from viewer.app.posing.move_tool import LENGTH, Arrow, MoveHandle, ReachHandle, arrows, used_chain
 from viewer.app.posing.posed_joint import PosedJoint
 from viewer.app.posing.rotate_tool import (
     RADIUS,
     Ring,
-    TurnHandle,
+    RotateHandle,
     circle,
     limit_text,
     rings,
@@ -161,11 +161,11 @@ def _draw_arc(pen: _Pen, center: Floats, arc: LimitArc, radius: float) -> None:
 def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
     """Draw the rings of the joint; during a drag only the grabbed ring and the angle."""
     drag, pose = _drag(state), state.actor.pose
-    if drag is not None and isinstance(drag.handle, TurnHandle):
-        _draw_turn(pen, posed, drag.handle, drag.outcome.angle or 0.0)
+    if drag is not None and isinstance(drag.handle, RotateHandle):
+        _draw_rotation(pen, posed, drag.handle, drag.outcome.angle or 0.0)
         return
     assert pose is not None  # limits imply a posed joint
-    under = hot.ring if isinstance(hot, TurnHandle) else None
+    under = hot.ring if isinstance(hot, RotateHandle) else None
     for ring in rings(posed, pose, state.of(Posing).orientation, pen.frame):
         is_hot = under is not None and (ring.color, ring.dof) == (under.color, under.dof)
         _draw_ring(pen, posed.center, ring, is_hot)
@@ -192,7 +192,7 @@ def _runs(flags: np.ndarray) -> list[list[int]]:
     return [list(range(first, min(last + 1, len(flags)))) for first, last in pairs]
 
 
-def _draw_turn(pen: _Pen, posed: PosedJoint, handle: TurnHandle, angle: float) -> None:
+def _draw_rotation(pen: _Pen, posed: PosedJoint, handle: RotateHandle, angle: float) -> None:
     """Draw the ring that is held, and the sector of its rotation."""
     unit = pen.frame.unit_length(posed.center)
     ring, radius = handle.ring, handle.ring.size * unit
@@ -235,8 +235,8 @@ def _draw_arrows(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | No
     """Draw the handle at the joint, and the arrows along which it is translated."""
     drag = _drag(state)
     held = drag.handle if drag is not None else hot
-    arrow = held.arrow if isinstance(held, ShiftHandle) else None
-    is_middle = isinstance(held, ReachHandle) or (isinstance(held, ShiftHandle) and arrow is None)
+    arrow = held.arrow if isinstance(held, MoveHandle) else None
+    is_middle = isinstance(held, ReachHandle) or (isinstance(held, MoveHandle) and arrow is None)
     pen.dot(posed.center, 8.0, (*(_HOT if is_middle else _AXES[3]), 1.0), filled=False)
     for one in arrows(posed, state.of(Posing).orientation):
         is_hot = arrow is not None and arrow.color == one.color

@@ -116,7 +116,7 @@ def _draw_actor_choice(state: AppState) -> None:
     changed, index = imgui.combo("##actor", state.chosen_actor, names)
     note_item(state, "Actor")
     if changed:
-        state.choose_actor(index)
+        state.select_actor(index)
 
 
 def _draw_head(state: AppState) -> None:

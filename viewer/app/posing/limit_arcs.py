@@ -70,7 +70,7 @@ def limit_arcs(joint: PosedJoint, pose: Pose) -> list[LimitArc]:
         low, high = skeleton.dof_limits[dof]
         if not np.isfinite([low, high]).all():
             continue
-        axis = joint.turning_axis(axes[dof])
+        axis = joint.rotation_axis(axes[dof])
         value = min(max(float(pose.dofs[dof]), float(low)), float(high))
         below, above = float(low) - value, float(high) - value
         is_limited = min(-below, above) <= _ROUNDING

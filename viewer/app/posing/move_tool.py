@@ -24,8 +24,8 @@ from viewer.rig.skeleton import Skeleton, joint_label
 __all__ = [
     "LENGTH",
     "Arrow",
+    "MoveHandle",
     "ReachHandle",
-    "ShiftHandle",
     "arrows",
     "grab_arrow",
     "longest_chain",
@@ -190,7 +190,7 @@ class ReachHandle:
         return Outcome(pose, f"{name}   {left:.3g} away", limited, target)
 
 
-class ShiftHandle:
+class MoveHandle:
     """Handle of a root, or of a joint with translation DOFs.
 
     Parameters

@@ -55,7 +55,7 @@ class PosedJoint:
         """The parent's axes in the scene, orthonormalised: (3, 3)."""
         return _axes(self.parent_linear)
 
-    def turning_axis(self, axis: Floats) -> Floats:
+    def rotation_axis(self, axis: Floats) -> Floats:
         """Return the axis of a rotation in the scene: cof(A) axis, with the parent's axes A.
 
         Cofactors transform rotation axes correctly through reflected and stretched frames too.

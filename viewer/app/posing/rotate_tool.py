@@ -27,7 +27,7 @@ from viewer.rig.skeleton import Skeleton, dof_label, joint_label
 __all__ = [
     "RADIUS",
     "Ring",
-    "TurnHandle",
+    "RotateHandle",
     "circle",
     "grab_ring",
     "limit_text",
@@ -89,7 +89,7 @@ def rings(joint: PosedJoint, pose: Pose, orientation: str, frame: ViewFrame) -> 
     axes_of = rotation_axes(skeleton, pose, joint.joint)
     found = []
     for dof in rotation_dofs(skeleton, joint.joint, free=True).tolist():
-        axis = joint.turning_axis(axes_of[dof])
+        axis = joint.rotation_axis(axes_of[dof])
         found.append(Ring(axis, int(skeleton.dof_kinds[dof]) - 3, RADIUS, dof))
     return found
 
@@ -172,7 +172,7 @@ def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
     return np.linalg.norm(starts + fractions[:, None] * steps - place, axis=1), fractions
 
 
-class TurnHandle:
+class RotateHandle:
     """Handle of a ring.
 
     Parameters

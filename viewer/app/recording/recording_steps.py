@@ -113,7 +113,7 @@ def _recording(
         box=state.box.copy(),
         moves=state.clock.has_motion,
         interpolate=state.clock.interpolate_gaps,
-        turn=_FULL if settings.turntable else 0.0,
+        turntable=_FULL if settings.turntable else 0.0,
         follow=follow,
         selected=(state.chosen_actor, state.selected_joint),
         annotations=RecordedMarks(state).at,

@@ -256,5 +256,6 @@ def save_rigged(state: AppState, result: Result, path: Path) -> None:
         return
     saved = f"Saved {', '.join(printable(file, 200) for file in files)}"
     state.job = ThreadJob(
-        f"Writing {printable(path.name, 60)}", lambda: [*write_rigged(result.rigged, path), saved]
+        f"Writing {printable(path.name, 60)}",
+        lambda: [*map(str, write_rigged(result.rigged, path)), saved],
     )

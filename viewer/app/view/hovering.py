@@ -20,6 +20,7 @@ from viewer.rig.skeleton import joint_label
 __all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are looked for
+_MOST = 16  # actors among which one is looked for: crowds take long to search in software
 _AWAY = 14.0  # points between the pointer and the name
 
 
@@ -58,7 +59,7 @@ def hover_joint(state: AppState) -> None:
 
 
 def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scale: float) -> None:
-    """Find the actor under a pointer that rests, where there are several.
+    """Find the actor under a pointer that rests, where there are several but no crowd.
 
     Parameters
     ----------
@@ -73,8 +74,8 @@ def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scal
     """
     hovered, mouse, now = state.of(Hovered), imgui.get_io().mouse_pos, imgui.get_time()
     place = (mouse.x, mouse.y)
-    is_alone = len(state.scene.actors) < 2 or state.of(Posing).is_on
-    if is_alone or state.clock.playing or not _is_free(state):
+    is_told = 2 <= len(state.scene.actors) <= _MOST and not state.of(Posing).is_on
+    if not is_told or state.clock.playing or not _is_free(state):
         hovered.actor, hovered.is_waiting = -1, False
         return
     if place != hovered.place:

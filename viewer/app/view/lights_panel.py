@@ -33,8 +33,6 @@ def draw(state: AppState) -> None:
     lights.ambient = slider(state, "Ambient", lights.ambient, 0.0, 1.0, flags=_CLAMP)
     lights.specular = slider(state, "Specular", lights.specular, 0.0, 2.0, flags=_CLAMP)
     lights.shininess = slider(state, "Shininess", lights.shininess, 1.0, 512.0, "%.0f", _LOG)
-    lights.studio = slider(state, "Studio", lights.studio, 0.0, 2.0, flags=_CLAMP)
-    explain("Light of metallic-roughness surfaces")
     lights.follow_camera = checkbox(state, "Follow the camera", lights.follow_camera)
     imgui.same_line()
     if button(state, "Reset lights"):
@@ -42,6 +40,8 @@ def draw(state: AppState) -> None:
     lights.sky = _color(state, "Light from above", lights.sky)
     same_line_if_room("Light from below")
     lights.ground = _color(state, "Light from below", lights.ground)
+    lights.studio = slider(state, "Studio", lights.studio, 0.0, 2.0, flags=_CLAMP)
+    explain("Light of metallic-roughness surfaces")
 
 
 def _draw_light(state: AppState, name: str, light: Light) -> None:

@@ -17,7 +17,7 @@ from viewer.app.posing.tool_actions import no_tool
 from viewer.app.view.hovering import hover_actor, joint_near
 from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
-from viewer.app.weights.hover_text import tells_vertices
+from viewer.app.weights.hover_text import shows_vertex_info
 from viewer.app.weights.state import Hover, Weights, wants_vertex
 from viewer.errors import ViewerError
 from viewer.phrases import printable
@@ -177,9 +177,10 @@ def _pick(
 
 def take_pick(state: AppState, found: Pick, aims: bool) -> None:
     """Choose the actor and joint that were clicked; a double click aims the camera there."""
-    if found.actor != state.chosen_actor or not state.is_actor_selected:
-        state.choose_actor(found.actor)
+    if found.actor != state.chosen_actor:
+        state.select_actor(found.actor)
         state.say_status(printable(state.actor.name, 60))
+    state.is_actor_selected = True
     if found.joint >= 0:
         select_joint(state, found.joint)
     if aims:
@@ -252,7 +253,7 @@ def _look_under_mouse(
     place = (io.mouse_pos.x, io.mouse_pos.y)
     is_inside = x <= place[0] < x + width and y <= place[1] < y + height
     view.is_waiting = False
-    if not tells_vertices(state) or not is_inside:
+    if not shows_vertex_info(state) or not is_inside:
         view.hover = Hover()
         return
     now, hover = imgui.get_time(), view.hover

@@ -26,7 +26,7 @@ from viewer.app.view.outlines import Outlines, toggle_outlines
 from viewer.app.weights.actions import (
     no_view,
     toggle_picking,
-    toggle_telling,
+    toggle_vertex_info,
     toggle_weights,
     unpin,
 )
@@ -133,8 +133,8 @@ def _draw_vertices(state: AppState) -> None:
     if menu_item(state, text, "V", shows, "" if shows else no_view(state, "weight")):
         toggle_weights(state)
     why = no_mesh(state)
-    if menu_item(state, "Vertex under the mouse", "", view.tells_always, why):
-        toggle_telling(state)
+    if menu_item(state, "Vertex under the mouse", "", view.always_shows_info, why):
+        toggle_vertex_info(state)
     if menu_item(state, "Pick vertices", "", view.picks_vertices, why):
         toggle_picking(state)
     why = "" if view.pinned is not None else "no vertex is pinned: Alt+click one"

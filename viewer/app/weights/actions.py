@@ -11,12 +11,12 @@ from viewer.rig.inspection.explanation import Explanation, explain
 from viewer.rig.pose import pose_key
 from viewer.rig.scalars import (
     SCALARS,
+    informative_quantity,
     joint_influences,
     joint_text,
     missing_part,
     most_influential,
     split_name,
-    telling_quantity,
 )
 
 __all__ = [
@@ -27,7 +27,7 @@ __all__ = [
     "shown_joint",
     "start_heat_map",
     "toggle_picking",
-    "toggle_telling",
+    "toggle_vertex_info",
     "toggle_weights",
     "unpin",
 ]
@@ -72,7 +72,7 @@ def start_heat_map(state: AppState) -> None:
     if SCALARS[key].takes_joint:
         _start_with_joint(state, key)
     elif SCALARS[key].about:
-        options.scalar = telling_quantity(key, [actor.figure for actor in state.scene.actors])
+        options.scalar = informative_quantity(key, [actor.figure for actor in state.scene.actors])
 
 
 def _start_with_joint(state: AppState, key: str) -> None:
@@ -83,7 +83,9 @@ def _start_with_joint(state: AppState, key: str) -> None:
         return
     most = most_influential(figure)
     if most < 0:  # the chosen actor has no weights, but another actor may have some
-        state.options.scalar = telling_quantity(key, [actor.figure for actor in state.scene.actors])
+        state.options.scalar = informative_quantity(
+            key, [actor.figure for actor in state.scene.actors]
+        )
         return
     if joint >= 0:
         names = (printable(joint_text(figure, one), 60) for one in (joint, most))
@@ -126,11 +128,11 @@ def toggle_weights(state: AppState) -> None:
     state.say_status(f"Weights of {printable(joint, 60)}" if joint else "No joint has influence")
 
 
-def toggle_telling(state: AppState) -> None:
+def toggle_vertex_info(state: AppState) -> None:
     """Choose whether hover text is shown always or only while the Weights panel is visible."""
     view = state.of(Weights)
-    view.tells_always = not view.tells_always
-    state.say_status(f"Vertex under the mouse {'on' if view.tells_always else 'off'}")
+    view.always_shows_info = not view.always_shows_info
+    state.say_status(f"Vertex under the mouse {'on' if view.always_shows_info else 'off'}")
 
 
 def toggle_picking(state: AppState) -> None:

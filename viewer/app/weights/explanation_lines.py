@@ -11,7 +11,7 @@ from viewer.app.weights.state import Weights
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
-from viewer.rendering.overlay.segments import Manner, Segments, dots, joined
+from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined
 from viewer.rendering.palettes import joint_palette
 from viewer.rendering.projection import picture_scale, project
 from viewer.rendering.view import view_of
@@ -98,7 +98,7 @@ def vertex_annotation(
     rim = dots(vertex[None], np.array(_DARK), scale * (_DOT + _RIM + 1.0))
     parts = [rim, dots(vertex[None], np.array(_LIGHT), scale * _DOT)]
     if not draws_lines or not len(explanation.joints):
-        return Annotation(joined(parts), Manner(on_top=True))
+        return Annotation(joined(parts), SegmentStyle(on_top=True))
     skeleton = actor.figure.skeleton
     assert skeleton is not None  # influences imply a skeleton
     images = apply_transform(actor.placement @ explanation.placement, explanation.images)
@@ -111,7 +111,7 @@ def vertex_annotation(
     white = np.broadcast_to(LABEL_COLOR, (len(texts), 3))
     # Priorities after the name of the selected joint, before those of all other joints.
     labels = Labels(texts, images, np.arange(1, len(texts) + 1, dtype=np.int32), white)
-    return Annotation(joined([lines, *parts]), Manner(on_top=True), labels)
+    return Annotation(joined([lines, *parts]), SegmentStyle(on_top=True), labels)
 
 
 def _image_lines(

@@ -9,7 +9,7 @@ from viewer.app.core.widgets import begin_overlay, overlay_rect
 from viewer.app.files.state import Files
 from viewer.app.weights.state import Weights
 
-__all__ = ["draw_hover_text", "tells_vertices"]
+__all__ = ["draw_hover_text", "shows_vertex_info"]
 
 _AWAY = 16.0  # points between the mouse and the text
 
@@ -18,7 +18,7 @@ def draw_hover_text(state: AppState) -> None:
     """Draw the hover text as long as the mouse does not move."""
     hover = state.of(Weights).hover
     mouse = imgui.get_io().mouse_pos
-    if not hover.lines or hover.place != (mouse.x, mouse.y) or not tells_vertices(state):
+    if not hover.lines or hover.place != (mouse.x, mouse.y) or not shows_vertex_info(state):
         return
     x, y, width, height = state.view_rect
     is_right, is_low = mouse.x > x + 0.6 * width, mouse.y > y + 0.6 * height
@@ -31,10 +31,10 @@ def draw_hover_text(state: AppState) -> None:
     imgui.end()
 
 
-def tells_vertices(state: AppState) -> bool:
+def shows_vertex_info(state: AppState) -> bool:
     """Return whether hover text is shown at present."""
     view, io = state.of(Weights), imgui.get_io()
     shows_panel = view.panel_frame == imgui.get_frame_count()
     is_covered = bool(state.error) or state.of(Files).dialog is not None or io.want_capture_mouse
     is_held = any(io.mouse_down[button] for button in range(3))
-    return (view.tells_always or shows_panel) and not is_covered and not is_held
+    return (view.always_shows_info or shows_panel) and not is_covered and not is_held

@@ -70,7 +70,7 @@ class Weights:
     ----------
     panel_frame : int
         ImGui's number of the last frame in which the Weights panel was drawn.
-    tells_always : bool
+    always_shows_info : bool
         Whether hover text is shown even if the Weights panel is not visible.
     picks_vertices : bool
         Whether clicks pin vertices instead of selecting actors and joints.
@@ -93,7 +93,7 @@ class Weights:
     """
 
     panel_frame: int = -1
-    tells_always: bool = False
+    always_shows_info: bool = False
     picks_vertices: bool = False
     hover: Hover = field(default_factory=Hover)
     is_waiting: bool = False

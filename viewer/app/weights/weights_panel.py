@@ -187,7 +187,7 @@ def _draw_vertex_tools(state: AppState) -> None:
     view, why = state.of(Weights), no_mesh(state)
     imgui.text_wrapped("Hover over a surface to see the properties of a vertex.")
     text = "Even without this panel"
-    view.tells_always = checkbox(state, text, view.tells_always, why)
+    view.always_shows_info = checkbox(state, text, view.always_shows_info, why)
     view.picks_vertices = checkbox(state, "Pick vertices", view.picks_vertices, why)
     explain("click to explain a vertex; Alt+click does so at any time")
     if view.pinned is not None:

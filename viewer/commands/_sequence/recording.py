@@ -196,7 +196,7 @@ def draw_sequence(
     Raises OutputError if a file exists already, or cannot be written.
     """
     from viewer.rendering.camera_views import with_cameras
-    from viewer.rendering.framing import fit_turning, frame_motion, seen_aspect
+    from viewer.rendering.framing import fit_turntable, frame_motion, seen_aspect
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record
@@ -213,7 +213,7 @@ def draw_sequence(
     recording.size = frame_size = getattr(sink, "cell", size)
     recording.camera = camera_of(arguments, scene, points, frame_size)
     if arguments.distance is None:
-        fit_turning(recording.camera, points, frame_size[0] / frame_size[1], shots.turn)
+        fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
     title = f"drawing {printable(outputs[0].name)}"
     hold()
     with Offscreen(arguments.gpu) as offscreen, offscreen.context:
@@ -282,7 +282,7 @@ def _recording(
         options,
         moves=shots.moves,
         interpolate=arguments.interpolate_gaps,
-        turn=shots.turn,
+        turntable=shots.turntable,
         follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
     )
     is_free = arguments.follow is None and arguments.view is None

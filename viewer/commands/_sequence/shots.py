@@ -69,7 +69,7 @@ class Shots:
         Frames per second of the result.
     moves : bool
         Whether the figures are posed by motions.
-    turn : float
+    turntable : float
         Rotation of the camera over all frames, in degrees.
     seconds : float
         Duration of all frames.
@@ -83,7 +83,7 @@ class Shots:
     numbers: list[int]
     rate: float
     moves: bool
-    turn: float
+    turntable: float
     seconds: float
     remark: str = ""
     notes: list[str] = field(default_factory=list)
@@ -142,10 +142,10 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
     is_counted = moves and (request.turntable is None or request.turntable.seconds is None)
     first = numbering.first if is_counted else 0
     numbers = np.rint(places).astype(int) if is_counted else np.arange(len(places))
-    turn = 0.0 if request.turntable is None else request.turntable.degrees
+    turntable = 0.0 if request.turntable is None else request.turntable.degrees
     times = (numbering.start if moves else 0.0) + places / numbering.rate
     called = (first + numbers).tolist()
-    return Shots(times, called, rates.drawn, moves, turn, seconds, rates.remark, notes)
+    return Shots(times, called, rates.drawn, moves, turntable, seconds, rates.remark, notes)
 
 
 @dataclass(frozen=True, slots=True)

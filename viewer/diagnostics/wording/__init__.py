@@ -16,6 +16,7 @@ from viewer.diagnostics.wording import (
     clips,
     comparison,
     easymocap,
+    export,
     joints,
     kinds,
     loading,
@@ -37,9 +38,9 @@ from viewer.diagnostics.wording import (
 TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
     *(archives, body_models, easymocap, poses, pictures),
-    *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison),
+    *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
-_CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging, comparison)
+_CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging, comparison, export)
 
 CODES: dict[str, Code] = {
     code: row for table in _CODED for code, row in sorted(table.CODES.items())

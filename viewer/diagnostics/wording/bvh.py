@@ -26,4 +26,13 @@ PHRASES = {
     "bvh-position": "frame {frame}: {axis}position of joint {joint:name}",
     "bvh-frames": "{n:#frame}",
     "bvh-part": "{n} of {width} numbers of the next",
+    # Estimates of unit and up axis; in inches, 0 if that would be no likely size
+    "unit-from-size": "taken for {unit} (skeleton {size:.4g} high{metres:+; inches would be "
+    "{metres:.3g} m})",
+    "unit-unknown": "unit unknown (skeleton {size:.4g} high{metres:+; inches would be "
+    "{metres:.3g} m})",
+    "up-of-longest": "{up} taken for up: the rest skeleton is longest along {up}",
+    "up-of-head": "{up} taken for up: the head is above the feet along {up}",
+    "up-against-rest": "{up} taken for up, though the rest skeleton stands along {axis}",
+    "up-against-frames": "{up} taken for up, but in its frames it stands along {axis}",
 }

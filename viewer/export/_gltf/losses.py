@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.reading import GltfFile, read_back
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import PER_SET, Influences
-from viewer.export._losses.apart import apart, apart_lines, negligible, shared_extent
+from viewer.export._left_out import extra_parts, not_held_note
+from viewer.export._losses.apart import apart, apart_notes, extent_of, negligible, with_values
 from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figure_side
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
@@ -55,8 +57,8 @@ def gltf_losses(
     shape: Shape,
     influences: Influences | None,
     first_frame: int | None,
-) -> list[str]:
-    """Return messages with the largest distances between the posed figure and a file.
+) -> list[Diagnostic]:
+    """Return notes with the largest distances between the posed figure and a file.
 
     ``written``: the file.
     ``figure``: the original, without its shape applied.
@@ -80,14 +82,14 @@ def gltf_losses(
     targets = np.flatnonzero(np.isin(shape.targets, columns))
     place = (written.file, written.tree, written.mesh_node, targets, written.start)
     found = apart(expected, read_back(*place), rows, least)
-    why = []
+    causes = []
     if found.vertices is not None:
-        why = _reasons(figure, frames, rows, how, shape, influences, least)
-    lines = apart_lines(written.path, figure, found, first_frame, sources)
-    lines = [line + f": {'; '.join(why)}" * bool(why) for line in lines]
+        causes = _causes(figure, frames, rows, how, shape, influences, least)
+    notes = apart_notes(written.path, figure, found, first_frame, sources)
+    notes = with_values(notes, causes=causes)
     if influences is not None and influences.most > PER_SET and sources is not None:
-        lines += _first_set(expected, read_back(*place, 1), figure, rows, least, influences)
-    return lines
+        notes += _first_set(expected, read_back(*place, 1), figure, rows, least, influences)
+    return notes
 
 
 def _split(side: Side, sources: Ints) -> Side:
@@ -102,18 +104,23 @@ def _split(side: Side, sources: Ints) -> Side:
 
 def _first_set(
     expected: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
-) -> list[str]:
-    """Return a message about the error of programs that read four influences per vertex."""
+) -> list[Diagnostic]:
+    """Return a note about the error of programs that read four influences per vertex."""
     found = apart(expected, cut, rows, least)
-    text = f"up to {influences.most} influences per vertex, all of them written, strongest first"
-    if found.vertices is None:
-        return [text]
-    off = length_text(figure, found.vertices.distance)
-    extent = shared_extent(found)
-    return [f"{text}: programs that read only JOINTS_0 have errors of up to {off}{extent}"]
+    most, worst = int(influences.most), found.vertices
+    if worst is None:
+        return [Diagnostic("X005.influences", values={"most": most})]
+    values = {
+        "most": most,
+        "length": length_text(figure, worst.distance),
+        "distance": worst.distance,
+        "unit": figure.unit,
+        "extent": extent_of(found),
+    }
+    return [Diagnostic("X002.first-influences", values=values)]
 
 
-def _reasons(
+def _causes(
     figure: Figure,
     frames: Frames,
     rows: Rows,
@@ -121,57 +128,43 @@ def _reasons(
     shape: Shape,
     influences: Influences | None,
     least: float,
-) -> list[str]:
+) -> list[Phrase]:
     """Return the causes of vertex errors."""
     found = []
     if influences is not None and (influences.n_scaled or influences.n_negative):
-        found.append(_weights_text(influences))
+        found.append(_weights_phrase(influences))
     if influences is not None and how.method != "lbs":
-        found.append(
-            f"{METHODS[how.method].title} skinning is not supported, glTF uses linear blending"
-        )
+        found.append(Phrase("nonlinear-skinning", method=METHODS[how.method].title))
     if influences is not None and figure.correctives is not None and how.correctives:
-        found.append("pose correctives are not supported")
+        found.append(Phrase("unsupported-correctives"))
     weights = frames.shape_weights
     weights = weights if len(weights) == 1 else weights[rows]
     if shape.baked is not None and np.ptp(weights, axis=0).any():
-        found.append("the shape changes over time, which is not supported")
+        found.append(Phrase("unsupported-shape-change"))
     mesh = shape.figure.require_mesh()
     coarse = np.abs(mesh.positions - mesh.positions.astype(np.float32)).max(initial=0.0)
     if coarse > least:
-        found.append("the mesh is far from its origin for glTF's single precision")
+        found.append(Phrase("single-precision"))
     return found
 
 
-def _weights_text(influences: Influences) -> str:
-    parts = []
-    if influences.n_scaled:
-        parts.append(f"weights of {vertices_text(influences.n_scaled)} do not add up to 1")
-    if influences.n_negative:
-        parts.append(f"weights of {vertices_text(influences.n_negative)} are negative")
-    done = "omitted and the others scaled" if influences.n_negative else "scaled"
-    return f"{' and '.join(parts)}: {done}, as glTF requires"
+def _weights_phrase(influences: Influences) -> Phrase:
+    n, negative = int(influences.n_scaled), int(influences.n_negative)
+    key = "weights-both" if n and negative else "weights-unnormalized" if n else "weights-negative"
+    return Phrase(key, n=n, negative=negative)
 
 
-def vertices_text(count: int) -> str:
-    """Return a number of vertices as text."""
-    return "1 vertex" if count == 1 else f"{count} vertices"
-
-
-def not_held(figure: Figure, shape: Shape) -> list[str]:
-    """Return a message that lists the parts of a figure that the file does not hold."""
+def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
+    """Return a note that lists the parts of a figure that the file does not hold."""
     unused = figure.n_shapes - len(shape.targets)
-    parts = {
-        f"{unused} blend shapes": unused > 0 and shape.baked is None,
-        f"{figure.n_shapes} blend shapes as such": shape.baked is not None,
-        "pose correctives": figure.correctives is not None,
-        "body parts": figure.body_parts is not None,
-        "keypoints": figure.keypoints is not None,
-        "the symmetry map": figure.symmetry is not None,
-        "the reduced mesh": figure.reduced is not None,
-        "the joint regressor": figure.joint_regressor is not None,
-        "limits of joints": figure.skeleton is not None
-        and bool(np.isfinite(figure.skeleton.dof_limits).any()),
-    }
-    lost = [name for name, is_lost in parts.items() if is_lost]
-    return [f"not held by glTF: {', '.join(lost)}"] if lost else []
+    skeleton, lost = figure.skeleton, []
+    if shape.baked is not None:
+        lost.append(Phrase("part-baked-shapes", n=figure.n_shapes))
+    elif unused > 0:
+        lost.append(Phrase("part-blend-shapes", n=unused))
+    if figure.correctives is not None:
+        lost.append(Phrase("part-correctives"))
+    lost += extra_parts(figure)
+    if skeleton is not None and np.isfinite(skeleton.dof_limits).any():
+        lost.append(Phrase("part-limits"))
+    return not_held_note("glTF", lost)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.export._gltf.document import Document, text_of
 from viewer.media.image import encode_png
 from viewer.rig.arrays import Bytes, Floats
@@ -142,16 +143,16 @@ class Materials:
         used += [name for name in extensions if name not in used]
 
 
-def material_losses(mesh: Mesh) -> list[str]:
-    """Return what glTF cannot hold of a mesh's materials, in words."""
+def material_losses(mesh: Mesh) -> list[Diagnostic]:
+    """Return notes about material properties of a mesh that glTF cannot hold."""
     lost = []
     for material in mesh.materials:
-        name = material.name or "a material"
+        values = {"material": material.name or "unnamed"}
         metallic, roughness = material.metallic_texture, material.roughness_texture
         if metallic and roughness and not _same_place(metallic, roughness):
-            lost.append(f"{name}: its metallic map is placed as its roughness map")
+            lost.append(Diagnostic("X005.metallic-placement", values=values))
         if any(_placement(one.matrix)[1] > _SHEAR for one in material.textures.values()):
-            lost.append(f"{name}: the shear of its textures is left out")
+            lost.append(Diagnostic("X003.texture-shear", values=values))
     return lost
 
 

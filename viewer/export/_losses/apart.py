@@ -1,4 +1,4 @@
-"""Largest distances between a figure and the file written from it, as text."""
+"""Largest distances between a figure and the file written from it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._losses.bounds import Bounds
 from viewer.export._losses.estimates import Estimator
 from viewer.export._losses.skinned import Body, Poses, Rows, Side, body_rows, poses_of, vertices
-from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
@@ -29,6 +29,7 @@ _ROUNDING = 2e-6  # relative to the size: single precision through a chain of jo
 _EPSILON = 2.0**-22  # relative to a coordinate: two steps of single precision
 _SIZED = 256  # frames used to measure the distance of a motion from the origin
 _FAR = 5.0  # maximum factor on the tolerance far from the origin
+_NO_REASONS: dict[str, object] = {"causes": [], "estimate": "", "rate": 0.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,49 +196,56 @@ def _vertices(side: Side, row: int) -> Floats:
     return vertices(side.body, poses)[0]
 
 
-def shared_extent(found: Apart) -> str:
-    """Return the number of compared frames as text; empty if all were compared."""
+def extent_of(found: Apart) -> Phrase | str:
+    """Return the number of compared frames; empty if all were compared."""
     if found.looked == found.frames:
         return ""
-    return f" (vertices compared in {found.looked} of {found.frames} frames)"
+    return Phrase("compared-frames", n=found.looked, all=found.frames)
 
 
-def apart_lines(
+def apart_notes(
     path: Path,
     figure: Figure,
     found: Apart,
     first_frame: int | None,
     sources: Sequence[int] | NDArray[np.integer] | None = None,
-    meshes: str = "vertices",
-    versus: str = "",
-) -> list[str]:
-    """Return a message about the errors of a file, or an empty list if there are none.
+    vertices: str = "mesh-vertices",
+    original: str = "",
+) -> list[Diagnostic]:
+    """Return a note about the errors of a file, or an empty list if there are none.
 
     ``path``: the file.
     ``figure``: the original.
     ``found``: the measured distances.
     ``first_frame``: number of the first frame; None for a single pose.
     ``sources`` (V,): vertex of the figure for each compared vertex.
-    ``meshes``: description of these vertices.
-    ``versus``: description of the original; the motion or pose if empty.
+    ``vertices``: phrase for these vertices.
+    ``original``: phrase for the original; the motion or pose if empty.
     """
 
-    def place(far: Farthest, label: str) -> str:
-        frame = "" if first_frame is None else f", frame {first_frame + far.frame}"
-        return f"up to {length_text(figure, far.distance)} ({label}{frame})"
+    def farthest(kind: str, far: Farthest, **place: object) -> Phrase:
+        values = {"distance": far.distance, "unit": figure.unit, **place}
+        if first_frame is not None:
+            kind, values = f"{kind}-in-frame", values | {"frame": first_frame + far.frame}
+        return Phrase(kind, length=length_text(figure, far.distance), **values)
 
-    parts = []
+    parts: dict[str, object] = {}
     if found.joints is not None and figure.skeleton is not None:
-        name = printable(joint_label(figure.skeleton, found.joints.index), 60)
-        parts.append(("joints", place(found.joints, name)))
+        name = joint_label(figure.skeleton, found.joints.index)
+        parts["joint"] = farthest("farthest-joint", found.joints, joint=name)
     if found.vertices is not None:
         index = found.vertices.index
         vertex = index if sources is None else int(sources[index])
-        parts.append((meshes, place(found.vertices, f"vertex {vertex}")))
+        parts["vertices"] = Phrase(vertices)
+        parts["vertex"] = farthest("farthest-vertex", found.vertices, vertex=vertex)
     if not parts:
         return []
-    versus = versus or ("the pose" if first_frame is None else "the motion")
-    (what, amount), *rest = parts
-    more = "".join(f"; {each} by {text}" for each, text in rest)
-    extent = shared_extent(found)
-    return [f"{printable(path, 300)}: {what} differ from {versus} by {amount}{more}{extent}"]
+    whole = "the-original-pose" if first_frame is None else "the-original-motion"
+    key = "both" if len(parts) == 3 else "joints" if "joint" in parts else "vertices"
+    values = {"original": Phrase(original or whole), **parts, "extent": extent_of(found)}
+    return [Diagnostic("X002." + key, path, values={**values, **_NO_REASONS})]
+
+
+def with_values(notes: list[Diagnostic], **values: object) -> list[Diagnostic]:
+    """Return notes with other values."""
+    return [replace(note, values={**note.values, **values}) for note in notes]

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.export._losses.apart import with_values
 from viewer.export._losses.lines import frames_losses
 from viewer.export._losses.worst_times import Sampler, key_times, worst_times
 from viewer.rig.arrays import Floats
@@ -17,12 +19,11 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import Skinning
 
-_PLACES = "between frames"
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
 
 
-def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[str]:
-    """Return a message about the error of sampling a motion at a fixed rate, if there is one.
+def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) -> list[Diagnostic]:
+    """Return a note about the error of sampling a motion at a fixed rate, if there is one.
 
     Between written frames, rotations are interpolated along the shorter arc and everything else
     linearly.
@@ -46,8 +47,7 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
     def found(times: Floats) -> Frames:
         return frames_of(animation.figure, written, np.maximum(times - first, 0.0))
 
-    lines = between_losses(path, animation, found, how)
-    return [f"{line}: written at {rate:g} fps" for line in lines]
+    return with_values(between_losses(path, animation, found, how), rate=rate)
 
 
 def between_losses(
@@ -56,8 +56,8 @@ def between_losses(
     found: Sampler,
     how: Skinning,
     also: Floats | None = None,
-) -> list[str]:
-    """Return a message with the largest errors between an animation's frames, if there are any.
+) -> list[Diagnostic]:
+    """Return a note with the largest errors between an animation's frames, if there are any.
 
     Keyframed curves are searched for the times of the largest error. A capture is defined only on
     its own frames, and is compared there.
@@ -68,7 +68,7 @@ def between_losses(
     ``how``: skinning of the mesh.
     ``also`` (T,): additional times at which captures are compared, seconds.
     """
-    note = ""
+    estimate: Phrase | str = ""
     if isinstance(animation.motion, Clip):
         edges = np.union1d(
             animation.frames.times,
@@ -84,7 +84,7 @@ def between_losses(
         )
         times = worst.times
         if worst.is_estimate:
-            note = f" (an estimate from {worst.looked} times)"
+            estimate = Phrase("estimated-times", n=worst.looked)
     else:
         times = _own_times(animation, animation.motion)
         times = times if also is None else np.union1d(times, also)
@@ -94,8 +94,8 @@ def between_losses(
     wanted = replace(wanted, present=wanted.present & read.present)
     if not wanted.present.any():
         return []
-    lines = frames_losses(path, replace(animation, frames=wanted), read, how, places=_PLACES)
-    return [line + note for line in lines]
+    notes = frames_losses(path, replace(animation, frames=wanted), read, how, is_between=True)
+    return with_values(notes, estimate=estimate)
 
 
 def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:

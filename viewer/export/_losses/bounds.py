@@ -77,8 +77,8 @@ class Bounds:
         far = np.zeros(len(poses.palette))
         if self._other_shapes is not None:
             far = far + np.abs(poses.weights) @ _lengths(self._other_shapes)
-        if poses.turns.shape[1]:
-            far = far + _norms(poses.turns) @ self._stretches
+        if poses.corrective_weights.shape[1]:
+            far = far + _norms(poses.corrective_weights) @ self._stretches
         return far
 
     def _rest(self, first: Poses, second: Poses) -> Floats:
@@ -90,9 +90,11 @@ class Bounds:
             found = found + np.abs(change) @ self._lengths
             if both:
                 found = found + np.abs(second.weights) @ self._strayed
-        if first.turns.shape[1]:
-            turns = first.turns - second.turns if second.turns.shape[1] else first.turns
-            found = found + _norms(turns) @ self._stretches
+        if first.corrective_weights.shape[1]:
+            change = first.corrective_weights
+            if second.corrective_weights.shape[1]:
+                change = change - second.corrective_weights
+            found = found + _norms(change) @ self._stretches
         return found
 
 
@@ -135,9 +137,9 @@ def _lengths(directions: Floats | None) -> Floats:
     return np.sqrt(np.einsum("sva,sva->sv", directions, directions).max(axis=1, initial=0.0))
 
 
-def _norms(turns: Floats) -> Floats:
+def _norms(weights: Floats) -> Floats:
     """Return the norm of the nine numbers of each joint: (F, J)."""
-    return np.asarray(np.linalg.norm(turns.reshape(len(turns), -1, _NUMBERS), axis=2))
+    return np.asarray(np.linalg.norm(weights.reshape(len(weights), -1, _NUMBERS), axis=2))
 
 
 def _stretches(correctives: Floats | None) -> Floats:

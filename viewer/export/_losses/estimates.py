@@ -38,13 +38,13 @@ class Estimator:
 
     def of_rest(self, first: Poses, second: Poses) -> Single:
         """Return upper bounds of the distances between the rest meshes: (F, V)."""
-        turns = first.turns
-        if second.turns.shape[1]:
-            turns = turns - second.turns
+        corrective_weights = first.corrective_weights
+        if second.corrective_weights.shape[1]:
+            corrective_weights = corrective_weights - second.corrective_weights
         change = first.weights
         if self._second.shapes is not None:
             change = change - second.weights
-        gap = replace(first, turns=turns, weights=change)
+        gap = replace(first, corrective_weights=corrective_weights, weights=change)
         off = self._first.moves(gap) + self._gap
         if self._strayed is not None:
             off = off + second.weights.astype(np.float32) @ self._strayed
@@ -91,7 +91,7 @@ class _Rest:
         found = np.zeros((1, self.positions.size), np.float32)
         for directions, weights in (
             (self.shapes, poses.weights),
-            (self.correctives, poses.turns),
+            (self.correctives, poses.corrective_weights),
         ):
             if directions is not None and weights.any():
                 found = found + weights.astype(np.float32) @ directions

@@ -1,4 +1,4 @@
-"""Messages about a motion that was read back: largest errors of joints and vertices."""
+"""Notes about a motion that was read back: largest errors of joints and vertices."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.export._losses.apart import apart, apart_lines, negligible
+from viewer.diagnostics import Diagnostic
+from viewer.export._losses.apart import apart, apart_notes, negligible
 from viewer.export._losses.skinned import Side, changing, figure_side
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.evaluation import Frames
@@ -29,8 +30,8 @@ def driven_losses(
     how: Skinning,
     span: tuple[int, int],
     shape: Floats,
-) -> list[str]:
-    """Return a message with the largest errors of a file without a mesh, if there are any.
+) -> list[Diagnostic]:
+    """Return a note with the largest errors of a file without a mesh, if there are any.
 
     ``path``: the written file.
     ``animation``: the original; missing frames are not compared.
@@ -42,8 +43,8 @@ def driven_losses(
     rows = span[0] + np.flatnonzero(animation.frames.present[slice(*span)])
     expected = figure_side(animation.figure, animation.frames, replace(how, method="lbs"), shape)
     found = apart(expected, written, rows, negligible(animation.figure, animation.frames, rows))
-    meshes = "vertices of a skin driven by it"
-    return apart_lines(path, animation.figure, found, animation.first_frame, meshes=meshes)
+    first = animation.first_frame
+    return apart_notes(path, animation.figure, found, first, vertices="driven-vertices")
 
 
 def frames_losses(
@@ -52,9 +53,9 @@ def frames_losses(
     written: Frames,
     how: Skinning,
     span: tuple[int, int] | None = None,
-    places: str = "",
-) -> list[str]:
-    """Return a message with the largest errors of poses that were read back, if there are any.
+    is_between: bool = False,
+) -> list[Diagnostic]:
+    """Return a note with the largest errors of poses that were read back, if there are any.
 
     ``path``: the written file.
     ``animation``: the original; missing frames are not compared.
@@ -62,7 +63,7 @@ def frames_losses(
     ``how``: skinning of the mesh; for both motions LBS replaces its method.
     ``span``: half-open range of frames in the file; all if
       omitted.
-    ``places``: description of the times of these poses if they are not frames.
+    ``is_between``: whether the times of these poses lie between the frames.
     """
     figure, frames = animation.figure, animation.frames
     first, stop = (0, frames.n_frames) if span is None else span
@@ -74,7 +75,6 @@ def frames_losses(
     found_side = figure_side(figure, written, linear, still, columns)
     least = negligible(figure, frames, rows)
     found = apart(expected, found_side, rows, least, rows - first)
-    versus = f"the motion {places}" if places else ""
-    return apart_lines(
-        path, figure, found, None if places else animation.first_frame, versus=versus
-    )
+    if is_between:
+        return apart_notes(path, figure, found, None, original="motion-between-frames")
+    return apart_notes(path, figure, found, animation.first_frame)

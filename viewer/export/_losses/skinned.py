@@ -63,7 +63,7 @@ class Poses:
         Translations added to the vertices after skinning, without weights.
     weights : (F, S) or (1, S)
         Weights of the blend shapes, relative to the reference shape.
-    turns : (F, P)
+    corrective_weights : (F, P)
         Weights of the correctives; no columns if there are none.
     """
 
@@ -71,7 +71,7 @@ class Poses:
     palette: Floats
     shifts: Floats
     weights: Floats
-    turns: Floats
+    corrective_weights: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,12 +119,13 @@ def figure_side(
         if figure.skeleton is not None:
             world = world_frames(figure, replace(part, figure_translations=np.zeros_like(shifts)))
         weights = part.shape_weights[:, chosen] - reference[chosen]
-        turns = np.zeros((len(rows), 0))
+        corrective_weights = np.zeros((len(rows), 0))
         if corrects:
-            turned = quaternion_to_matrix(part.rotations[:, 1:]) - np.eye(3)
-            turns = turned.reshape(len(rows), -1)
+            differences = quaternion_to_matrix(part.rotations[:, 1:]) - np.eye(3)
+            corrective_weights = differences.reshape(len(rows), -1)
         palette = anchored(_skinning(figure, part, world), part.figure_scales)
-        return Poses(world[..., :3, 3] + shifts[:, None], palette, shifts, weights, turns)
+        places = world[..., :3, 3] + shifts[:, None]
+        return Poses(places, palette, shifts, weights, corrective_weights)
 
     def exact(row: int) -> Floats:
         return deform(figure, pose_of(figure, frames, row), how)[0]
@@ -215,7 +216,11 @@ def poses_of(poses: Poses, rows: Rows) -> Poses:
     """Return a selection of the poses."""
     weights = poses.weights if len(poses.weights) == 1 else poses.weights[rows]
     return Poses(
-        poses.places[rows], poses.palette[rows], poses.shifts[rows], weights, poses.turns[rows]
+        poses.places[rows],
+        poses.palette[rows],
+        poses.shifts[rows],
+        weights,
+        poses.corrective_weights[rows],
     )
 
 
@@ -223,7 +228,10 @@ def vertices(body: Body, poses: Poses) -> Floats:
     """Return the vertices of all poses: (F, V, 3)."""
     count, shape = len(poses.palette), body.positions.shape
     rest = np.broadcast_to(body.positions, (count, *shape))
-    for directions, weights in ((body.shapes, poses.weights), (body.correctives, poses.turns)):
+    for directions, weights in (
+        (body.shapes, poses.weights),
+        (body.correctives, poses.corrective_weights),
+    ):
         if directions is not None and weights.any():
             moved = weights @ directions.reshape(len(directions), -1)
             rest = rest + moved.reshape(-1, *shape)

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from viewer.diagnostics import Phrase
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -55,7 +56,7 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
     return nearest if abs(nearest * seconds - 1.0) <= rounding * (1.0 + 1e-9) else exact
 
 
-def guess_unit(points: Floats) -> tuple[str, Facts, str]:
+def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     """Return the figure's unit, facts and a note about it.
 
     Parameters
@@ -70,25 +71,27 @@ def guess_unit(points: Floats) -> tuple[str, Facts, str]:
         between that of a child and that of a giant; empty if none does.
     facts : tuple of (str, str)
         As in ``Figure.facts``: ``("unit", "cm, taken from …")``.
-    note : str
-        As in ``SkeletonMotion.unit_note``; empty if the unit is metres.
+    note : Phrase or None
+        As in ``SkeletonMotion.unit_note``; None if the unit is metres.
     """
     size = float(np.ptp(points, axis=0).max())
     metres = size * METRES["in"]
-    inches = f"; inches would be {metres:.3g} m" if _INCHES[0] < size < _INCHES[1] else ""
+    is_near = _INCHES[0] < size < _INCHES[1]
+    inches = f"; inches would be {metres:.3g} m" if is_near else ""
+    values = {"size": size, "metres": metres if is_near else 0.0}
     for unit, (low, high) in SIZES.items():
         if low <= size <= high:
             fact = f"{unit}, taken from the skeleton's size of {size:.4g}{inches}"
-            note = f"taken for {UNIT_NAMES[unit]} (skeleton {size:.4g} high{inches})"
-            return unit, (("unit", fact),), note * (unit != "m")
+            note = Phrase("unit-from-size", unit=UNIT_NAMES[unit], **values)
+            return unit, (("unit", fact),), None if unit == "m" else note
     fact = f"unknown, the skeleton's size is {size:.4g}{inches}"
-    note = f"unit unknown (skeleton {size:.4g} high{inches})"
-    return "", (("unit", fact),), note * (size > 0.0)
+    note = Phrase("unit-unknown", **values)
+    return "", (("unit", fact),), note if size > 0.0 else None
 
 
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
-) -> tuple[Literal["y", "z"], Facts, tuple[str, ...]]:
+) -> tuple[Literal["y", "z"], Facts, tuple[Phrase, ...]]:
     """Return the up axis of the rest skeleton: from feet to head, else along its longest side.
 
     Parameters
@@ -104,7 +107,7 @@ def guess_up(
         As in ``Figure.up``.
     facts : tuple of (str, str)
         As in ``Figure.facts``.
-    notes : tuple of str
+    notes : tuple of Phrase
         As in ``SkeletonMotion.up_notes``; empty if y is up in the rest pose and in the frames.
     """
     skeleton = figure.skeleton
@@ -116,7 +119,7 @@ def guess_up(
     if not upper or not lower:
         _, deep, high = np.ptp(points, axis=0)[[0, 1, 2]]
         if high > _LONG * deep:
-            note = "z taken for up: the rest skeleton is longest along z"
+            note = Phrase("up-of-longest", up="z")
             return "z", (("up", "z, along which the rest skeleton is longest"),), (note,)
         return "y", (), ()
     joints = points[: skeleton.n_joints]
@@ -124,16 +127,16 @@ def guess_up(
     up: Literal["y", "z"] = "z" if rest == "+z" else "y"
     notes = []
     if up == "z":
-        notes.append("z taken for up: the head is above the feet along z")
+        notes.append(Phrase("up-of-head", up="z"))
     elif rest not in ("+y", ""):
-        notes.append(f"y taken for up, though the rest skeleton stands along {rest}")
+        notes.append(Phrase("up-against-rest", up="y", axis=rest))
     every = (
         np.linspace(0, clip.n_rows - 1, min(_LOOKS, clip.n_rows)).round() / clip.timing.frame_rate
     )
     posed = world_frames(figure, frames_of(figure, clip, every))[:, :, :3, 3]
     stands = _axis((posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)).mean(axis=0))
     if stands in ("+y", "+z") and stands[1] != up:
-        notes.append(f"{up} taken for up, but in its frames it stands along {stands}")
+        notes.append(Phrase("up-against-frames", up=up, axis=stands))
     return up, (("up", f"{up}, from the rest skeleton"),), tuple(notes)
 
 

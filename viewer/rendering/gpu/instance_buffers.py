@@ -30,7 +30,7 @@ from viewer.rendering.gpu.upload import (
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
-from viewer.rendering.passes.skin_pass import skinning_words
+from viewer.rendering.passes.skin_pass import skinning_options_key
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
@@ -113,7 +113,7 @@ class InstanceBuffers:
             If there is not enough graphics memory.
         """
         figure = shaped(self.mesh.figure, poses[0].shape_weights)
-        skinning_key = (*skinning_words(how), poses[0].shape_weights.tobytes())
+        skinning_key = (*skinning_options_key(how), poses[0].shape_weights.tobytes())
         keys = [pose.skinning_key for pose in poses]
         old = self._keys if skinning_key == self._skinning_key else []
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]

@@ -79,17 +79,10 @@ class Surface:
 def needs_materials(materials: Sequence[Material]) -> bool:
     """Return whether materials have more than a plainly placed picture each, see ``MATERIALS``."""
     return any(
-        set(material.textures) - {"base_texture"}
-        or material.base_color is not None
-        or material.alpha_mode != "opaque"
-        or any(material.emissive)
-        or (material.base_texture is not None and not _is_plain(material.base_texture))
+        not material.is_plain
+        or (material.base_texture is not None and "mirror" in material.base_texture.wrap)
         for material in materials
     )
-
-
-def _is_plain(texture: Texture) -> bool:
-    return texture.uv_set == 0 and texture.is_placed_plainly and "mirror" not in texture.wrap
 
 
 def upload_surfaces(

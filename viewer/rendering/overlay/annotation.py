@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.rendering.overlay.label_layout import lay_out
 from viewer.rendering.overlay.lettering import Lettering
-from viewer.rendering.overlay.segments import Manner, Segments
+from viewer.rendering.overlay.segments import Segments, SegmentStyle
 from viewer.rendering.projection import picture_scale, project, unproject
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -41,7 +41,7 @@ class Labels:
 
     Attributes
     ----------
-    words : tuple of N str
+    texts : tuple of N str
         Their texts.
     points : (N, 3)
         Labelled points, scene space.
@@ -52,7 +52,7 @@ class Labels:
         Colours of the text, sRGB, 0 to 1.
     """
 
-    words: tuple[str, ...]
+    texts: tuple[str, ...]
     points: Floats
     ranks: Ints
     colors: Floats
@@ -66,14 +66,14 @@ class Annotation:
     ----------
     segments : Segments
         In drawing order.
-    manner : Manner
+    style : SegmentStyle
         Style of the segments.
     labels : Labels or None
         Labels, which are never hidden.
     """
 
     segments: Segments
-    manner: Manner
+    style: SegmentStyle
     labels: Labels | None = None
 
 
@@ -83,7 +83,7 @@ class PlacedLabels:
 
     Attributes
     ----------
-    words : tuple of M str
+    texts : tuple of M str
         Their texts.
     corners : (M, 2)
         Top left corners, pixels from the picture's left and upper edge.
@@ -101,7 +101,7 @@ class PlacedLabels:
         Number of points within the picture, for each ``Labels``.
     """
 
-    words: tuple[str, ...]
+    texts: tuple[str, ...]
     corners: Ints
     colors: Floats
     points: Floats
@@ -144,19 +144,19 @@ def place_labels(
     lettering : Lettering
         The font.
     """
-    words = [word for one in labels for word in one.words]
+    texts = [text for one in labels for text in one.texts]
     points = np.concatenate([np.zeros((0, 3)), *(one.points for one in labels)])
     colors = np.concatenate([np.zeros((0, 3)), *(one.colors for one in labels)])
     ranks = np.concatenate([np.zeros(0, np.int32), *(one.ranks for one in labels)])
-    owners = np.repeat(np.arange(len(labels)), [len(one.words) for one in labels])
+    owners = np.repeat(np.arange(len(labels)), [len(one.texts) for one in labels])
     found = project(view, size, points)
     nearest = np.lexsort((found.depths, ranks))
     order = nearest[found.seen[nearest]].astype(np.int32)
-    sizes = lettering.sizes(words)
+    sizes = lettering.sizes(texts)
     layout = lay_out(found.pixels, order, sizes, size, _GAP * picture_scale(size))
     chosen = layout.chosen
     return PlacedLabels(
-        tuple(words[index] for index in chosen.tolist()),
+        tuple(texts[index] for index in chosen.tolist()),
         layout.corners,
         colors[chosen],
         points[chosen],

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
-from viewer.rendering.overlay.segments import Manner, Segments
+from viewer.rendering.overlay.segments import SegmentStyle, Segments
 from viewer.rendering.pinhole import picture_size
 from viewer.rendering.projection import picture_scale
 from viewer.rig.arrays import Floats
@@ -97,4 +97,4 @@ def frusta_annotation(
         np.full(len(cameras), _RANK, dtype=np.int32),
         np.tile(LABEL_COLOR, (len(cameras), 1)),
     )
-    return Annotation(segments, Manner(), labels)
+    return Annotation(segments, SegmentStyle(), labels)

@@ -14,7 +14,7 @@ from viewer.rendering.overlay.joint_marks import (
     marks_of,
 )
 from viewer.rendering.overlay.joint_names import name_labels
-from viewer.rendering.overlay.segments import Manner, Segments, joined
+from viewer.rendering.overlay.segments import Segments, SegmentStyle, joined
 from viewer.rendering.projection import picture_scale
 from viewer.rig.scene import Actor
 
@@ -45,7 +45,7 @@ def joint_annotation(
     if not parts:
         return None
     labels = name_labels(marks, selected) if options.joint_names else None
-    return Annotation(joined(parts), Manner(on_top=options.xray), labels)
+    return Annotation(joined(parts), SegmentStyle(on_top=options.xray), labels)
 
 
 def _parts(

@@ -33,36 +33,36 @@ class Lettering:
         self._widths: dict[str, int] = {}
         self._pixels: dict[str, Bytes] = {}
 
-    def sizes(self, words: Sequence[str]) -> Ints:
+    def sizes(self, texts: Sequence[str]) -> Ints:
         """Return the width and height of texts with their outlines: (N, 2), pixels."""
         if len(self._widths) > _MOST:
             self._widths.clear()
-        for word in words:
-            if word not in self._widths:
-                self._widths[word] = int(np.ceil(self._font.getlength(word))) + 2 * _RIM
-        widths = [min(self._widths[word], _WIDEST) for word in words]
-        heights = [self._height] * len(words)
+        for text in texts:
+            if text not in self._widths:
+                self._widths[text] = int(np.ceil(self._font.getlength(text))) + 2 * _RIM
+        widths = [min(self._widths[text], _WIDEST) for text in texts]
+        heights = [self._height] * len(texts)
         return np.array([widths, heights], dtype=np.int32).reshape(2, -1).T
 
     @property
     def _height(self) -> int:
         return round(1.25 * self.letters) + 2 * _RIM
 
-    def pixels(self, word: str) -> Bytes:
+    def pixels(self, text: str) -> Bytes:
         """Return white text with a dark outline: (H, W, 2) uint8, premultiplied grey and alpha."""
         from PIL import Image, ImageDraw
 
-        if word not in self._pixels:
+        if text not in self._pixels:
             if len(self._pixels) > _MOST:
                 self._pixels.clear()
-            width, height = self.sizes([word])[0].tolist()
+            width, height = self.sizes([text])[0].tolist()
             rim, inside = Image.new("L", (width, height)), Image.new("L", (width, height))
             place = _RIM, _RIM
-            ImageDraw.Draw(rim).text(place, word, _DARK, self._font, stroke_width=_RIM)
-            ImageDraw.Draw(inside).text(place, word, 255, self._font)
+            ImageDraw.Draw(rim).text(place, text, _DARK, self._font, stroke_width=_RIM)
+            ImageDraw.Draw(inside).text(place, text, 255, self._font)
             white = np.array(inside)
-            self._pixels[word] = np.dstack([white, np.maximum(white, np.array(rim))])
-        return self._pixels[word]
+            self._pixels[text] = np.dstack([white, np.maximum(white, np.array(rim))])
+        return self._pixels[text]
 
 
 def shelves(sizes: Ints, width: int, tallest: int) -> Ints:

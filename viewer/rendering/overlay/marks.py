@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.rendering.overlay.annotation import Annotation
-from viewer.rendering.overlay.segments import Manner, Segments
+from viewer.rendering.overlay.segments import Segments, SegmentStyle
 from viewer.rig.arrays import Floats
 
 __all__ = ["MARK_COLOR", "Marks", "mark_annotation"]
@@ -16,7 +16,7 @@ MARK_COLOR = (1.0, 0.16, 0.56)
 """Colour of marks, sRGB, distinct from the colour maps and the lights."""
 
 _LINE = 1.0  # radius of lines, pixels
-_MANNER = Manner(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0.05))
+_STYLE = SegmentStyle(hidden=0.5, lift=0.004, border=1.5, border_color=(0.08, 0.02, 0.05))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,4 +44,4 @@ def mark_annotation(marks: Marks) -> Annotation:
     colors = np.broadcast_to((*MARK_COLOR, 1.0), (len(radii), 4))
     starts = np.concatenate([marks.lines[:, 0], marks.points])
     ends = np.concatenate([marks.lines[:, 1], marks.points])
-    return Annotation(Segments(starts, ends, colors, 2.0 * radii), _MANNER)
+    return Annotation(Segments(starts, ends, colors, 2.0 * radii), _STYLE)

@@ -15,7 +15,7 @@ from viewer.rendering.options import Color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 
-__all__ = ["HIDDEN", "Manner", "SegmentPass", "Segments", "dots", "joined"]
+__all__ = ["HIDDEN", "SegmentPass", "SegmentStyle", "Segments", "dots", "joined"]
 
 HIDDEN = 0.4
 """Default opacity of parts behind a surface."""
@@ -42,7 +42,7 @@ class Segments:
 
 
 @dataclass(frozen=True, slots=True)
-class Manner:
+class SegmentStyle:
     """Style of segments.
 
     Attributes
@@ -110,7 +110,9 @@ class SegmentPass:
         names = "in_start", "in_end", "in_color", "in_width"
         self._rows = InstanceRows(context, self._program, "3f4 3f4 4f4 f4", names, "segments")
 
-    def draw(self, segments: Segments, view: View, size: tuple[int, int], manner: Manner) -> None:
+    def draw(
+        self, segments: Segments, view: View, size: tuple[int, int], style: SegmentStyle
+    ) -> None:
         """Draw segments into the bound framebuffer.
 
         Parameters
@@ -121,7 +123,7 @@ class SegmentPass:
             The camera's matrices.
         size : (int, int)
             Width and height of the picture, pixels.
-        manner : Manner
+        style : SegmentStyle
             Style of the segments.
         """
         if not len(segments.widths):
@@ -133,14 +135,14 @@ class SegmentPass:
         set_model(self._program, view, np.eye(4), center)
         values = {
             "u_size": size,
-            "u_lift": manner.lift,
-            "u_height": manner.lift * view.camera.distance,
-            "u_border": manner.border,
-            "u_border_color": manner.border_color,
+            "u_lift": style.lift,
+            "u_height": style.lift * view.camera.distance,
+            "u_border": style.border,
+            "u_border_color": style.border_color,
         }
         set_uniforms(self._program, values)
         with without_depth_writes(self.context):  # overlapping segments must not hide each other
-            for opacity in opacities(self.context, None if manner.on_top else manner.hidden):
+            for opacity in opacities(self.context, None if style.on_top else style.hidden):
                 set_uniforms(self._program, {"u_opacity": opacity})
                 self._rows.draw()
 

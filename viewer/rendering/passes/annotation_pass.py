@@ -9,7 +9,7 @@ import moderngl
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.overlay.annotation import Annotation, leader_lines, letters_for, place_labels
 from viewer.rendering.overlay.lettering import Lettering
-from viewer.rendering.overlay.segments import Manner, SegmentPass
+from viewer.rendering.overlay.segments import SegmentPass, SegmentStyle
 from viewer.rendering.passes.label_pass import LabelPass
 from viewer.rendering.view import View
 
@@ -49,7 +49,7 @@ class AnnotationPass:
         RenderError
             If there is not enough graphics memory.
         """
-        self.segments.draw(annotation.segments, view, size, annotation.manner)
+        self.segments.draw(annotation.segments, view, size, annotation.style)
 
     def write(
         self, annotations: Sequence[Annotation], view: View, size: tuple[int, int]
@@ -85,8 +85,8 @@ class AnnotationPass:
         if self._lettering is None or self._lettering.letters != letters:
             self._lettering = Lettering(letters)
         placed = place_labels(labels, view, size, self._lettering)
-        self.segments.draw(leader_lines(placed, view, size), view, size, Manner(on_top=True))
-        self.labels.draw(placed.words, placed.corners, placed.colors, self._lettering, size)
+        self.segments.draw(leader_lines(placed, view, size), view, size, SegmentStyle(on_top=True))
+        self.labels.draw(placed.texts, placed.corners, placed.colors, self._lettering, size)
         for row, left_out, seen in zip(having, placed.n_left_out, placed.n_seen, strict=True):
             counts[row] = left_out, seen
         return counts

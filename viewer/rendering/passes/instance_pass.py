@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import moderngl
-
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.mesh_pass import draw_runs, set_surface, shading_of
+from viewer.rendering.passes.mesh_pass import draw_runs, draw_solid, set_surface, shading_of
 from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
 
@@ -111,5 +109,4 @@ def draw_instance_shapes(
     instances.place(actors, view)
     instances.use(program, view)
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
-    array = instances.array(program, indices)
-    array.render(moderngl.TRIANGLES, instances=instances.count)
+    draw_solid(instances.array(program, indices), indices, instances.count)

@@ -13,6 +13,8 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.mesh_pass import MeshPass, shading_of
+from viewer.rendering.view import View
+from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.accumulation import Accumulation
@@ -196,6 +198,23 @@ class LatePasses:
             self._sum = None
             self._sum = Accumulation(self._context, self._programs, size)
         return self._sum
+
+    def draw_motion_paths(
+        self, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
+    ) -> None:
+        """Draw the paths of joints around the scene's time."""
+        if not options.path_joints:
+            return
+        from viewer.rendering.passes.motion_path_pass import Moment
+
+        at = Moment(scene.time or 0.0, options.path_seconds)
+        for index, actor in enumerate(scene.actors):
+            joints = tuple(joint for owner, joint in options.path_joints if owner == index)
+            # Paths are drawn across gaps: they show past and future positions of absent actors.
+            if joints and actor.visible and actor.clip is not None:
+                paths = self._buffers.motion_path(actor)
+                paths.update(actor, joints, options.min_confidence)
+                self.motion_path_pass.draw(paths, actor.placement, view, size, at)
 
     def release(self) -> None:
         """Free all passes that were created."""

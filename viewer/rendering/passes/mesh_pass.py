@@ -21,7 +21,7 @@ from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 
-__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "set_surface", "shading_of"]
+__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "draw_solid", "set_surface", "shading_of"]
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""
@@ -109,7 +109,7 @@ class MeshPass:
         program = self.programs.drawing("mesh", fragment=fragment)
         set_model(program, view, placement, mesh.center)
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
+        draw_solid(self.array(mesh, program, indices), indices)
 
     def draw_lines(
         self,
@@ -234,6 +234,15 @@ def draw_runs(
                 array.render(
                     moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
                 )
+
+
+def draw_solid(array: moderngl.VertexArray, indices: IndexSet, instances: int = 1) -> None:
+    """Draw all triangles that are not blended, whatever their material."""
+    for run in indices.runs:
+        if not run.surface.is_blended:
+            array.render(
+                moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
+            )
 
 
 def _premultiplied(color: tuple[float, float, float, float], opacity: float) -> tuple[float, ...]:

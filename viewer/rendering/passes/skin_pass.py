@@ -32,7 +32,7 @@ from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
 
-__all__ = ["PosedMesh", "skinning_words"]
+__all__ = ["PosedMesh", "skinning_options_key"]
 
 _BYTES_PER_VERTEX = 24  # position and normal, three float32 each
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
@@ -97,7 +97,7 @@ class PosedMesh:
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
-        key = (*skinning_words(how), pose.skinning_key) if attached and pose else ("binding",)
+        key = (*skinning_options_key(how), pose.skinning_key) if attached and pose else ("binding",)
         if key == self._key:
             return
         self.center = self.mesh.center
@@ -181,6 +181,6 @@ class PosedMesh:
         self._owner.release()
 
 
-def skinning_words(how: Skinning) -> tuple[object, ...]:
+def skinning_options_key(how: Skinning) -> tuple[object, ...]:
     """Return a key that identifies skinning settings."""
     return (how.method, how.blend_factor, how.max_influences, how.normalize, how.correctives)

@@ -147,10 +147,10 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     Raises
     ------
     RigError
-        If the figure has no skin that follows a skeleton, or no such vertex.
+        If the figure has no skin attached to a skeleton, or no such vertex.
     """
     if not figure.is_attached:
-        raise RigError(f"figure {figure.name} has no skin that follows a skeleton")
+        raise RigError(f"figure {figure.name} has no skin attached to a skeleton")
     chosen = np.array([vertex], dtype=np.int32)
     check_vertices(figure, chosen)
     stored, figure = figure.require_mesh().positions[vertex], shaped(figure, pose.shape_weights)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from viewer.diagnostics import Phrase
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 
@@ -20,13 +21,13 @@ class SkeletonMotion:
         A skeleton without a mesh.
     clip : SampledClip
         Its motion.
-    unit_note : str
-        How the figure's unit was guessed, as text; empty if it was not.
-    up_notes : tuple of str
-        Messages about how the up axis was guessed, and about contrary evidence.
+    unit_note : Phrase or None
+        How the figure's unit was guessed; None if it was not.
+    up_notes : tuple of Phrase
+        How the up axis was guessed, and about contrary evidence.
     """
 
     figure: Figure
     clip: SampledClip
-    unit_note: str = ""
-    up_notes: tuple[str, ...] = ()
+    unit_note: Phrase | None = None
+    up_notes: tuple[Phrase, ...] = ()

@@ -144,7 +144,7 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
 
 
 def apply_record(
-    record: PoseRecord, figure: Figure, pose: Pose, cut: bool = False
+    record: PoseRecord, figure: Figure, pose: Pose, drop_excess: bool = False
 ) -> list[Diagnostic]:
     """Apply a record to a figure's pose, in place.
 
@@ -156,7 +156,7 @@ def apply_record(
         With a skeleton.
     pose : Pose
         Changed, except for parts that the record does not mention.
-    cut : bool
+    drop_excess : bool
         Drop coefficients that a figure with fewer shapes lacks, as with files of related models,
         instead of raising an error. Records with ``joint_rotations`` always drop them.
 
@@ -192,11 +192,11 @@ def apply_record(
             notes += _apply_part(name, values, record, figure, work)
     has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
     # A pose of a figure with the same skeleton is applied as far as possible.
-    cut = record.joint_rotations is not None or (cut and has_shapes)
+    drop_excess = record.joint_rotations is not None or (drop_excess and has_shapes)
     with _part("shape"):
-        notes += apply_coefficients("shape", record.shape, figure, work, cut)
+        notes += apply_coefficients("shape", record.shape, figure, work, drop_excess)
     with _part("expression"):
-        notes += apply_coefficients("expression", record.expression, figure, work, cut)
+        notes += apply_coefficients("expression", record.expression, figure, work, drop_excess)
     if record.translation is not None:
         work.figure_translation = np.array(record.translation, dtype=np.float64)
     if record.scale is not None:

@@ -22,7 +22,7 @@ from viewer.rig.scalars._asked import Asked, influences_kept
 from viewer.rig.scalars._fields import field_of
 from viewer.rig.scalars._joints import joint_of, joint_text
 from viewer.rig.scalars._lengths import length_text, length_unit
-from viewer.rig.scalars._start import joint_influences, most_influential, telling_quantity
+from viewer.rig.scalars._start import informative_quantity, joint_influences, most_influential
 from viewer.rig.skeleton import joint_labels
 from viewer.rig.skinning import METHODS, PURE, Skinning
 
@@ -32,6 +32,7 @@ __all__ = [
     "categories",
     "compute",
     "find_quantity",
+    "informative_quantity",
     "joint_influences",
     "joint_of",
     "joint_text",
@@ -44,7 +45,6 @@ __all__ = [
     "shown_unit",
     "split_name",
     "strongest",
-    "telling_quantity",
 ]
 
 _NOISE = 1e-9  # relative to the figure's size for lengths, else absolute

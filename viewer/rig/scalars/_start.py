@@ -26,13 +26,13 @@ def most_influential(figure: Figure) -> int:
     return int(sums.argmax()) if sums.any() else -1
 
 
-def telling_field(figure: Figure) -> str:
+def informative_field(figure: Figure) -> str:
     """Return the name of the first numeric field that is not 0 everywhere; empty without one."""
     fields = [field for field in figure.fields if not field.names]
     return next((field.name for field in fields if field.values.any()), "")
 
 
-def telling_quantity(key: str, figures: Iterable[Figure]) -> str:
+def informative_quantity(key: str, figures: Iterable[Figure]) -> str:
     """Return the name of a quantity with the first joint or field that is not 0 everywhere.
 
     The key of a quantity without joint or field is its name already.
@@ -40,6 +40,6 @@ def telling_quantity(key: str, figures: Iterable[Figure]) -> str:
     for figure in figures:
         if key == "weight" and (joint := most_influential(figure)) >= 0:
             return f"weight:{joint_text(figure, joint)}"
-        if key == "field" and (field := telling_field(figure)):
+        if key == "field" and (field := informative_field(figure)):
             return f"field:{field}"
     return key

@@ -1,4 +1,4 @@
-"""Passes of final quality that software rendering draws in reasonable time."""
+"""Limits of final quality: the time of software rendering, and graphics memory."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ __all__ = ["limit_passes", "seconds_per_pass"]
 
 _PATIENCE = 2.0  # seconds for a still picture
 _FEWEST = 3  # passes; fewer look no better than normal quality
+_BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9  # of the sum of passes, and occlusion at half resolution
 _PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # seconds on two cores, measured
 
 
@@ -29,7 +30,7 @@ def seconds_per_pass(size: tuple[int, int], n_triangles: int) -> float:
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower a quality that would take longer than two seconds in software.
+    """Lower a quality that would take over two seconds in software, or over 1 GB of memory.
 
     Estimated and not measured, so that the picture does not depend on what else runs.
 
@@ -42,14 +43,23 @@ def limit_passes(
     size : (int, int)
         Width and height in pixels.
     context : moderngl.Context
-        Tells whether drawing is done in software.
+        Tells whether rendering is done in software.
 
     Returns
     -------
     list of str
         A message if the quality was lowered.
     """
-    if options.quality != "final" or not is_software(context):
+    if options.quality != "final":
+        return []
+    memory = _BYTES_PER_PIXEL * math.prod(size)
+    if memory > _MOST_BYTES:
+        options.quality = "normal"
+        return [
+            f"drawn with normal quality, as final needs {memory / 1e9:.1f} GB of graphics memory "
+            "beside the picture; --quality final draws it"
+        ]
+    if not is_software(context):
         return []
     meshes = [actor.figure.mesh for actor in scene.actors if actor.is_drawn]
     seconds = seconds_per_pass(size, sum(mesh.n_triangles for mesh in meshes if mesh))

@@ -1,0 +1,42 @@
+"""The manual's page about the gallery."""
+
+from __future__ import annotations
+
+from gallery_generator.pictures import PICTURES
+
+__all__ = ["page"]
+
+_HEAD = """<!-- Written by assets/make_gallery.py: make gallery -->
+
+# Gallery
+
+Pictures from bundled data alone, and the commands that drew them (without `-o FILE`). `make
+gallery` draws them again, and fails if 0.1 % of the pixels are burnt or black. `walk` and `capture`
+are synthetic recordings in EasyMocap's layout, `scan.obj` a person without a rig, `body.npz` the
+bundled body; `assets/gallery_generator/` makes them.
+"""
+
+
+def page() -> str:
+    """Return the page as Markdown."""
+    parts = [_HEAD]
+    for name, picture in PICTURES.items():
+        parts.append(f"\n## {picture.title}\n\n{picture.text}\n")
+        parts.append(f"\n![{picture.title}](../../assets/pictures/gallery_{name}.png)\n")
+        if picture.commands:
+            lines = "\n".join(_wrapped(command) for command in picture.commands)
+            parts.append(f"\n```sh\n{lines}\n```\n")
+        else:
+            parts.append("\nDrawn with Python: `assets/gallery_generator/pictures.py`.\n")
+    return "".join(parts)
+
+
+def _wrapped(command: str) -> str:
+    """Return a command on lines of at most 96 characters."""
+    lines, line = [], ""
+    for word in command.split():
+        if len(line) + len(word) > 94:
+            lines.append(f"{line} \\")
+            line = "   "
+        line = f"{line} {word}" if line else word
+    return "\n".join([*lines, line])

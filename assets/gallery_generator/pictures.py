@@ -1,0 +1,216 @@
+"""Pictures of the gallery: those that a command draws, and those that need Python."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import viewer
+from gallery_generator.inputs import IMAGE, body_figure, spread, without_weights
+from viewer.lint import lint_scene, places_of
+from viewer.media.image import decode_picture
+from viewer.rendering.camera import Camera, fit
+from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.overlay.marks import Marks
+from viewer.rig.annotations import VertexField
+from viewer.rig.arrays import Bytes
+from viewer.rig.figure import Figure
+from viewer.rig.scene import Actor, Scene, scene_box, scene_points
+from viewer.rig.skin import limit_influences
+
+__all__ = ["PICTURES", "Picture"]
+
+PAPER = "#e9ebee"
+_OPTIONS = f"--quality final --background {PAPER}"
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture of the gallery.
+
+    Attributes
+    ----------
+    title, text : str
+        Heading and description in the manual.
+    commands : tuple of str
+        Commands that draw it, the last one without its output; empty if Python draws it.
+    draw : callable or None
+        Draws it otherwise.
+    """
+
+    title: str
+    text: str
+    commands: tuple[str, ...] = ()
+    draw: Callable[[], Bytes] | None = None
+
+    def pixels(self, folder: Path) -> Bytes:
+        """Draw the picture with the input files of a folder: (H, W, 4) uint8."""
+        if self.draw is not None:
+            return self.draw()
+        from viewer.cli import run
+
+        output = folder / "picture.png"
+        for number, command in enumerate(self.commands, start=1):
+            words = shlex.split(command)[1:]
+            last = ["-o", str(output), "--force"] if number == len(self.commands) else ["--force"]
+            status = run([*words, *last])
+            if status:
+                raise SystemExit(f"{command}: exit code {status}")
+        return decode_picture(output, output.read_bytes())
+
+
+def _options(**changes: object) -> viewer.DisplayOptions:
+    return replace(viewer.DisplayOptions(quality="final", background=PAPER), **changes)
+
+
+def _draw_finding() -> Bytes:
+    """Draw a walking figure whose forearm has vertices without weights, with lint's marks."""
+    figure = without_weights(body_figure(), "left_elbow", 24)
+    actor = Actor(figure)
+    _lower_arms(actor)
+    scene = Scene([actor])
+    finding = next(f for f in lint_scene(scene) if f.code in ("W004", "W005"))
+    options = _options(wireframe=True, grid=False)
+    places = places_of(finding, scene, options.skinning)
+    points = scene_points(scene)
+    near = points[points[:, 0] > 0.12]
+    camera = Camera(azimuth=25.0, inclination=12.0)
+    fit(camera, near[near[:, 1] > -0.25], 1.6)
+    with Offscreen() as offscreen:
+        vertices = places.vertices
+        offscreen.renderer.marks = Marks(vertices, np.full(len(vertices), 3.0))
+        return offscreen.render(scene, (800, 500), camera, options, scene_box(scene))
+
+
+def _lower_arms(actor: Actor) -> None:
+    skeleton, pose = actor.figure.require_skeleton(), actor.require_pose()
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        rows = np.flatnonzero(skeleton.dof_joints == skeleton.names.index(f"{side}_shoulder"))
+        pose.dofs[rows[2]] = 0.9 * sign
+
+
+def _draw_influences() -> Bytes:
+    """Draw a posed figure with 13 influences, and the error of keeping 4."""
+    exact = spread(body_figure(), 13, 60)
+    pruned = replace(exact, skin=limit_influences(exact.require_skin(), 4))
+    actors = []
+    for number, figure in enumerate((exact, pruned)):
+        actor = Actor(figure)
+        _bend(actor)
+        actor.placement[0, 3] = 1.1 * number
+        actors.append(actor)
+    apart = viewer.deform(exact, actors[0].pose)[0] - viewer.deform(pruned, actors[1].pose)[0]
+    values = 1000.0 * np.linalg.norm(apart, axis=1)
+    for actor, shown in zip(actors, (np.zeros_like(values), values), strict=True):
+        field = VertexField("difference", "Error of 4 influences", shown, "mm")
+        actor.figure = _with_field(actor.figure, field)
+    scene = Scene(actors)
+    options = _options(shading="scalar", scalar="field:difference", legend=True, grid=False)
+    camera = Camera(azimuth=20.0, inclination=8.0)
+    fit(camera, scene_points(scene), 1.6)
+    with Offscreen() as offscreen:
+        return offscreen.render(scene, (800, 500), camera, options, scene_box(scene))
+
+
+def _with_field(figure: Figure, field: VertexField) -> Figure:
+    return replace(figure, fields=(*figure.fields, field))
+
+
+def _bend(actor: Actor) -> None:
+    """Lift a knee, and bend the arms."""
+    skeleton, pose = actor.figure.require_skeleton(), actor.require_pose()
+    turns = {
+        "left_hip": (-1.5, 0.0, 0.0),
+        "left_knee": (1.7, 0.0, 0.0),
+        "left_shoulder": (0.0, -0.4, -0.9),
+        "right_shoulder": (0.0, 0.4, 0.9),
+        "left_elbow": (0.0, -1.6, 0.0),
+        "right_elbow": (0.0, 1.2, 0.0),
+        "spine2": (0.0, 0.35, 0.0),
+    }
+    for name, angles in turns.items():
+        rows = np.flatnonzero(skeleton.dof_joints == skeleton.names.index(name))
+        pose.dofs[rows[-3:]] = angles
+
+
+PICTURES: dict[str, Picture] = {
+    "fox": Picture(
+        "The bundled fox",
+        "Final quality: soft shadows, ambient occlusion, smooth edges.",
+        (f"viewer render {_OPTIONS} --size 800x500",),
+    ),
+    "walk": Picture(
+        "A motion in one picture",
+        "Seven poses of a walk, evenly spaced; earlier ones are fainter, and so are their shadows.",
+        (
+            "viewer render walk --model body.npz --onion 7 --azimuth -62 --inclination 8 "
+            f"{_OPTIONS} --size 1000x460",
+        ),
+    ),
+    "sheet": Picture(
+        "A contact sheet",
+        "The same walk in cells with frame numbers, at one scale and with one ground line.",
+        (
+            "viewer render walk --model body.npz --contact-sheet 8 --frames 0:34 --azimuth -75 "
+            f"--inclination 6 {_OPTIONS} --quality normal --size 1000x330",
+        ),
+    ),
+    "capture": Picture(
+        "A capture",
+        "Two people fitted to keypoints, and the calibrated cameras with their images.",
+        (
+            f"viewer render capture --model body.npz --up y --frame {IMAGE} --cameras --azimuth 35 "
+            f"--inclination 18 {_OPTIONS} --size 900x560",
+        ),
+    ),
+    "view": Picture(
+        "Through a camera",
+        "The same frame through camera 02: its image, without the lens distortion, dimmed behind "
+        "the fitted bodies.",
+        (
+            f"viewer render capture --model body.npz --up y --frame {IMAGE} --view 02 --xray "
+            f"{_OPTIONS} --size 800x450",
+        ),
+    ),
+    "knee": Picture(
+        "The weights of a joint",
+        "How much the left knee moves each vertex, with lines at every tenth.",
+        (
+            "viewer render body.npz --dof left_hip.x=-60deg --dof left_knee.x=80deg "
+            "--dof left_shoulder.z=-65deg --dof right_shoulder.z=65deg --scalar weight:left_knee "
+            f"--legend --azimuth 60 {_OPTIONS} --size 700x560",
+        ),
+    ),
+    "finding": Picture(
+        "A finding of lint",
+        "Vertices of the forearm without weights stay where the skin was bound. Lint names them; "
+        "the Lint panel marks them in the view.",
+        draw=_draw_finding,
+    ),
+    "scan": Picture(
+        "A mesh without a rig",
+        "A person of another shape, as a scanner leaves it.",
+        (f"viewer render scan.obj --wireframe --azimuth 30 {_OPTIONS} --size 420x560",),
+    ),
+    "rigged": Picture(
+        "The same mesh, rigged",
+        "With the skeleton and the weights of the bundled body, in a pose of its own.",
+        (
+            "viewer rig scan.obj --from body -o scan.npz",
+            "viewer render scan.npz --show both --dof left_shoulder.z=-30deg "
+            "--dof right_shoulder.z=50deg --dof right_elbow.y=80deg --dof left_hip.x=-50deg "
+            f"--dof left_knee.x=70deg --azimuth 30 {_OPTIONS} --size 420x560",
+        ),
+    ),
+    "influences": Picture(
+        "13 influences against 4",
+        "Left: a figure with up to 13 influences per vertex, exact. Right: the same pose with the "
+        "four strongest ones, coloured by the distance to the exact surface.",
+        draw=_draw_influences,
+    ),
+}
+"""Pictures by name, in the order of the page."""

@@ -1,0 +1,31 @@
+"""Measure of burnt and black areas of pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Bytes
+
+__all__ = ["MOST", "saturated_fraction"]
+
+MOST = 1e-3
+"""Largest permitted fraction of saturated pixels."""
+
+_BLACK = 2  # of 255
+
+
+def saturated_fraction(pixels: Bytes, background: tuple[int, int, int] | None = None) -> float:
+    """Return the fraction of pixels of which a channel is burnt, or all are black.
+
+    Parameters
+    ----------
+    pixels : (H, W, 4) uint8
+        sRGB.
+    background : (int, int, int), optional
+        Exact colour of pixels that do not count.
+    """
+    colors = pixels[..., :3].reshape(-1, 3)
+    if background is not None:
+        colors = colors[(colors != np.array(background)).any(axis=1)]
+    burnt = (colors == 255).any(axis=1) | (colors <= _BLACK).all(axis=1)
+    return float(burnt.mean()) if len(burnt) else 0.0

@@ -1,0 +1,179 @@
+"""Messages about exported poses and motions."""
+
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "X001": Code("note", "written file", "none"),
+    "X002": Code(
+        "note", "error of a written file", "none if it is small; otherwise choose another format"
+    ),
+    "X003": Code("note", "data that is not written", "choose a format that can hold it"),
+    "X004": Code("note", "missing frames of a written motion", "choose another --gaps"),
+    "X005": Code("note", "data that is written in another form", "none if intentional"),
+}
+
+_INFLUENCES = "up to {most} influences per vertex, all of them written, strongest first"
+_MISSING = "; {missing:#frame|is|are} missing in the motion and {missing:?has|have} no file}"
+_LIMITS = "{extent:+ ({})}{causes:+: {}}{estimate:+ ({})}{rate:+: written at {rate:g} fps}"
+
+MESSAGES = {
+    # Written files
+    "X001.anim": "{channels:#channel} with {keys:#key}, {start:zg} to {end:zg} s{how:+, {}}",
+    "X001.bvh": "{joints:#joint}, {rest:+{} and }{frames} at {rate:g} fps, {unit}, {up} up, "
+    "channels {order}",
+    "X001.gltf": "{counts:all}, {size} bytes",
+    "X001.gltf-motion": "{counts:all}, {frames} at {rate:g} fps, {size} bytes",
+    "X001.gltf-arrays": "array data, {size} bytes",
+    "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
+    "X001.texture": "its texture",
+    "X001.one-mesh": "1 file, {first:text}{missing:+" + _MISSING,
+    "X001.meshes": "{n} files, {first:text} to {last:text}{missing:+" + _MISSING,
+    "X001.no-meshes": "no person is present in these frames, nothing was written",
+    "X001.arrays": "{names:all}",
+    "X001.motion-arrays": "{n:#frame} at {rate:g} fps{missing:+; {} of them missing, NaN}: "
+    "{names:all}",
+    "X001.point-arrays": "{n:#frame} at {rate:g} fps{missing:+; {} of them missing, NaN}, {up} up: "
+    "{names:all}",
+    "X001.pose": "{n:#DOF}",
+    "X001.target-pose": "{n:#DOF}, the target's pose",
+    "X001.skel": "{n:#joint}",
+    "X001.skin": "{n:#vertex}",
+    "X001.rigged": "the figure with its rig, the target's pose, confidence",
+    "X001.amass": "{n:#frame} of {model} at {rate:g} fps, {up} up",
+    "X001.easymocap": "{n:#frame} of {people:?1 person|{people} people}, {up} up; EasyMocap stores "
+    "no frame rate: it is {rate:g} fps",
+    "X001.pose-at-frame": "one frame: the pose at frame {frame}",
+    "X001.pose-at-time": "one frame: the pose at {time:zg} s",
+    "X001.current-pose": "one frame: nothing moves, so the current pose was written",
+    # Errors, measured in the files
+    "X002.joints": f"joints differ from {{original}} by {{joint}}{_LIMITS}",
+    "X002.vertices": f"{{vertices}} differ from {{original}} by {{vertex}}{_LIMITS}",
+    "X002.both": f"joints differ from {{original}} by {{joint}}; {{vertices}} by {{vertex}}"
+    f"{_LIMITS}",
+    "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
+    "to {length}{extent:+ ({})}",
+    # Omitted data
+    "X003.parts": "not held by {format}: {parts:all}",
+    "X003.clip-placement": "the placement of the whole figure is not part of its clip and is "
+    "omitted",
+    "X003.clip-scale": ".anim cannot hold the figure's scale of {scale:g}, which is omitted",
+    "X003.clip-translations": ".anim translates only the root: translations of other joints, up to "
+    "{length}, are omitted",
+    "X003.clip-shape": ".anim holds no shape: the weights of blend shapes are omitted",
+    "X003.body-translations": "translations of joints are omitted (up to {distance:.3g} m)",
+    "X003.body-scale": "the figure's scale is omitted ({low:.6g} to {high:.6g})",
+    "X003.rigged-correctives": "pose correctives cannot be stored in .skel and .skin: the rest "
+    "mesh is adjusted to match the target without them",
+    "X003.empty-mesh": "the mesh has no vertices and is omitted",
+    "X003.absent": "{figure:text}: absent in {frames}, not written",
+    "X003.absent-now": "{figure:text}: absent at that time, not written",
+    "X003.absent-in-range": "{figure:text}: absent throughout the range, not exported",
+    "X003.no-motion": "{figure:text}: it has no motion, so it is not written",
+    "X003.no-joints": "{figure:text}: it has no joints, so it is not written",
+    "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
+    "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
+    "keypoints3d folder",
+    "X003.points": "captured points are not exported: {names:all}",
+    "X003.of-person": "{person}: {remark}",
+    # Missing frames
+    "X004.closed": "missing {n:?frame|frames} {gaps:list}: {how}",
+    "X004.kept": "{n:?frame|frames} {gaps:list} missing, as in the original motion",
+    "X004.of-person": "{person}: {remark}",
+    # Changed data
+    "X005.seams": "split at texture seams: {before} vertices are {after} in the .skin",
+    "X005.common-root": "several roots: a common parent joint {joint:name} was added",
+    "X005.unit-unknown": "lengths are unchanged: the unit of {figure:text} is unknown",
+    "X005.unit-unknown-metres": "lengths are unchanged: the unit of {figure:text} is unknown, and "
+    "programs interpret glTF lengths as metres",
+    "X005.unit-scaled": "lengths are in {unit}: a node above the figure scales them to metres by "
+    "{factor:g}",
+    "X005.unit-converted": "lengths were converted from {unit} to metres",
+    "X005.z-up": "z is up: a node above the figure rotates it by -90 degrees about x",
+    "X005.position-channels": "{n:#joint} below the root {n:?translates and has|translate and "
+    "have} position channels: {names:list8}",
+    "X005.joints-translate": "{n:#joint} below the root {n:?translates|translate}: {names:list8}",
+    "X005.shape-changes": "the shape changes over time: bone lengths are those of frame {frame}",
+    "X005.scale-changes": "the figure's scale changes from {low:g} to {high:g}: bone lengths are "
+    "written with {first:g}",
+    "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
+    "X005.shape-baked": "the shape is baked into mesh and joints",
+    "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
+    "X005.morph-normals": "normals are not affected by these: glTF does not define it",
+    "X005.influences": _INFLUENCES,
+    "X005.no-influence": '{n:#vertex} without influence: bound to the node "fixed", which never '
+    "moves",
+    "X005.own-shape": "shape and translation are those of {figure:text}, which is not an SMPL "
+    "model: other models are offset by the distance between the rest positions of the pelvis",
+    "X005.own-root": "translations are relative to the skeleton's root at rest, ({x:z.4g}, "
+    "{y:z.4g}, {z:z.4g}) m: a model with another rest root is offset by the difference (use "
+    "--model for exact translations)",
+    "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
+    "its roughness map",
+    "X005.untracked": "{names:all}: without a track, possibly a different person in each frame",
+    "X005.of-person": "{person}: {remark}",
+}
+
+PHRASES = {
+    "own-keys": "the clip's own",
+    "tangents": "{rule} tangents",
+    "rest-pose": "the rest pose",
+    "figure-unit": "the figure's unit",
+    "written-frame": "1 frame ({first})",
+    "written-frames": "{n} frames ({first} to {last})",
+    "written-vertices": "{n:#vertex}",
+    "split-vertices": "{n:#vertex} ({before} before they were split along texture seams)",
+    "written-triangles": "{n:#triangle}",
+    "written-joints": "{n:#joint}",
+    "missing-frame": "{frame}",
+    "missing-frames": "{first} to {last}",
+    # What stands in place of missing frames
+    "pose-held": "the last pose is held",
+    "pose-held-and-marked": "the last pose is held, and the frames are marked in present",
+    "interpolated": "interpolated",
+    "interpolated-and-held": "interpolated, held at both ends",
+    "interpolated-and-marked": "interpolated along the shorter arc, and marked in present",
+    "file-per-run": "one file for each run of frames",
+    "omitted-between-files": "omitted between the files",
+    # Errors of a written file
+    "the-original-motion": "the motion",
+    "the-original-pose": "the pose",
+    "motion-between-frames": "the motion between frames",
+    "mesh-vertices": "vertices",
+    "driven-vertices": "vertices of a skin driven by it",
+    "farthest-joint": "up to {length} ({joint:name})",
+    "farthest-joint-in-frame": "up to {length} ({joint:name}, frame {frame})",
+    "farthest-vertex": "up to {length} (vertex {vertex})",
+    "farthest-vertex-in-frame": "up to {length} (vertex {vertex}, frame {frame})",
+    "compared-frames": "vertices compared in {n} of {all} frames",
+    "estimated-times": "an estimate from {n} times",
+    # Causes of vertex errors
+    "weights-unnormalized": "weights of {n:#vertex} do not add up to 1: scaled, as glTF requires",
+    "weights-negative": "weights of {negative:#vertex} are negative: omitted and the others "
+    "scaled, as glTF requires",
+    "weights-both": "weights of {n:#vertex} do not add up to 1 and weights of {negative:#vertex} "
+    "are negative: omitted and the others scaled, as glTF requires",
+    "nonlinear-skinning": "{method} skinning is not supported, glTF uses linear blending",
+    "unsupported-correctives": "pose correctives are not supported",
+    "unsupported-shape-change": "the shape changes over time, which is not supported",
+    "single-precision": "the mesh is far from its origin for glTF's single precision",
+    # Parts of a figure
+    "part-blend-shapes": "{n:#blend shape}",
+    "part-baked-shapes": "{n:#blend shape} as such",
+    "part-current-shape": "{n:#blend shape} (the current shape is kept)",
+    "part-correctives": "pose correctives",
+    "part-up": "the up axis {up}",
+    "part-body-parts": "body parts",
+    "part-keypoints": "keypoints",
+    "part-symmetry": "the symmetry map",
+    "part-reduced": "the reduced mesh",
+    "part-regressor": "the joint regressor",
+    "part-limits": "limits of joints",
+    "part-materials": "material properties except one texture each",
+    "part-occlusion": "occlusion maps",
+    "part-alpha-cutoff": "alpha cutoffs",
+    "part-unlit": "unlit surfaces",
+    "part-single-sided": "single-sided surfaces",
+    "part-second-uvs": "second texture coordinates",
+    "part-texture-rotation": "rotated or mirrored textures",
+    "part-unfiltered": "unfiltered textures",
+}
