@@ -42,7 +42,7 @@ def main(names: list[str]) -> int:
         for name in names or PICTURES:
             pixels = PICTURES[name].pixels(folder)
             paper = tuple(round(255 * channel) for channel in parse_color(PAPER))
-            burnt = saturated_fraction(pixels, paper)
+            burnt = saturated_fraction(pixels, paper, PICTURES[name].has_data)
             faults += burnt > MOST
             path = _HERE / "pictures" / f"gallery_{name}.png"
             path.write_bytes(_small(pixels))

@@ -1,4 +1,4 @@
-"""Wall time of a run, printed beside its budget, and the tests that took longest.
+"""Wall time of a run, printed next to its budget, and the tests that took longest.
 
 ``VIEWER_TEST_BUDGET`` is the budget in seconds; ``make test`` and ``make quick`` set it. A run that
 takes longer does not fail: that would depend on the machine.

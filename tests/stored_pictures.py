@@ -1,4 +1,4 @@
-"""Stored pictures: where they lie, and which of them a run draws anew.
+"""Golden images: their location, and which of them a run re-renders.
 
 ``VIEWER_UPDATE_GOLDEN`` holds their names, or ``all``; ``make golden NAME…`` sets it. Look at every
 picture that was drawn anew before it is committed.

@@ -159,7 +159,7 @@ def test_folders_stay_small() -> None:
     assert not {name for name, count in counts.items() if count > 30}
 
 
-def test_files_of_tests_stay_short_in_folders_that_mirror_the_sources() -> None:
+def test_test_files_stay_short_in_folders_that_mirror_the_sources() -> None:
     for path in TEST_FILES:
         assert path.read_text().count("\n") <= 400, path
     counts = Counter(path.parent.relative_to(TESTS).as_posix() for path in TEST_FILES)
@@ -171,7 +171,7 @@ def test_files_of_tests_stay_short_in_folders_that_mirror_the_sources() -> None:
         assert folder in OTHER_FOLDERS or mirrored.is_dir() or private.is_dir(), folder
 
 
-def test_tests_of_a_folder_lie_in_its_mirror() -> None:
+def test_tests_of_a_folder_are_in_its_mirror() -> None:
     """A file of tests that imports nothing but one folder's modules lies in that folder's tests."""
     for path in TEST_FILES:
         used = set(re.findall(r"^ *(?:from|import) viewer\.(\w+)", path.read_text(), re.MULTILINE))
@@ -289,7 +289,7 @@ def reached(graph: dict[str, set[str]], start: str) -> set[str]:
     return found
 
 
-def test_modules_do_not_import_each_other_in_a_circle() -> None:
+def test_modules_have_no_circular_imports() -> None:
     """Neither at run time, nor within functions, nor for types alone."""
     graph = import_graph()
     behind = {name: reached(graph, name) for name in graph}

@@ -82,7 +82,7 @@ def test_usage_error_is_one_line(arguments, capsys, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("words", [["--up", "-z"], ["--up=-z"], ["--up", "-y"]])
-def test_downward_axes_may_follow_a_blank(words, rig, capsys):
+def test_negative_axes_may_follow_a_blank(words, rig, capsys):
     assert run(["info", *words, *map(str, rig)]) == 0
     assert capsys.readouterr().err == ""
 
@@ -97,7 +97,7 @@ def test_downward_axes_may_follow_a_blank(words, rig, capsys):
         ("vew", "view"),
     ],
 )
-def test_mistyped_command_is_told_the_nearest(word, meant, capsys, tmp_path, monkeypatch):
+def test_mistyped_command_suggests_the_nearest(word, meant, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for rest in ([], ["x.skel"], ["x.skel", "-o", "y.png"]):
         assert run([word, *rest]) == 2
@@ -105,7 +105,7 @@ def test_mistyped_command_is_told_the_nearest(word, meant, capsys, tmp_path, mon
         assert f'"{word}"; did you mean {meant}?' in said and said.count("\n") == 1
 
 
-def test_word_that_is_no_command_is_taken_for_a_file(capsys, tmp_path, monkeypatch):
+def test_non_command_word_is_treated_as_a_file(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     # Far from every command, with a suffix, in a folder, or there.
     for word in ("walk", "rendr.skel", "./rendr"):
@@ -131,7 +131,7 @@ def test_word_that_is_no_command_is_taken_for_a_file(capsys, tmp_path, monkeypat
         (["doctor", "--hlp"], "--hlp", "--help"),
     ],
 )
-def test_unknown_option_comes_first_and_with_the_nearest(arguments, unknown, meant, capsys):
+def test_unknown_option_is_reported_first_with_the_nearest(arguments, unknown, meant, capsys):
     assert run(arguments) == 2
     said = capsys.readouterr().err
     assert f"option {unknown}; did you mean {meant}" in said and "required" not in said
@@ -161,7 +161,7 @@ def test_unknown_value_lists_the_choices_and_the_nearest(arguments, choices, mea
     assert choices in said and f'"{arguments[-1]}"; did you mean {meant}?' in said
 
 
-def test_bad_file_is_one_line_with_its_place(tmp_path):
+def test_invalid_file_is_one_line_with_its_location(tmp_path):
     bad = tmp_path / "bad.skel"
     bad.write_text("balljoint root {\n offset 1 2\n}\n")
     for command in (["info"], ["render", "-o", str(tmp_path / "x.png")], ["view"]):
@@ -185,7 +185,7 @@ def test_info_into_a_closed_pipe_is_silent(rig):
     assert done.stdout == b"{\n0\n" and done.stderr == b""
 
 
-def test_pipe_that_is_closed_before_anything_is_written_is_silent(rig):
+def test_pipe_closed_before_anything_is_written_is_silent(rig):
     process = subprocess.Popen(
         [*COMMAND, "info", *rig], env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
@@ -200,7 +200,7 @@ def test_full_output_is_exit_code_5(rig):
         _refused(call("info", *rig, stdout=full), 5, "No space left")
 
 
-def test_missing_output_stream_is_no_fault(rig):
+def test_missing_output_stream_is_not_an_error(rig):
     line = f"{sys.executable} -m viewer info {rig[0]} >&-"
     done = subprocess.run(
         ["bash", "-c", line], env=ENVIRONMENT, capture_output=True, timeout=60, check=False
@@ -208,7 +208,7 @@ def test_missing_output_stream_is_no_fault(rig):
     assert done.returncode == 0 and done.stderr == b""
 
 
-def test_terminal_without_unicode_is_no_fault(tmp_path):
+def test_terminal_without_unicode_is_not_an_error(tmp_path):
     path = tmp_path / "f.skel"
     path.write_text("balljoint Küken { pose 1 0 0 }")
     done = call("info", path, environment={"PYTHONIOENCODING": "ascii"})
@@ -235,7 +235,7 @@ def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
     assert list(folder.iterdir()) == []
 
 
-def test_sigterm_ends_a_program_that_waits(rig, tmp_path):
+def test_sigterm_ends_a_waiting_program(rig, tmp_path):
     pipe = tmp_path / "pipe.png"
     os.mkfifo(pipe)
     # It waits for a reader of the pipe, or is just about to.
@@ -260,7 +260,7 @@ def test_sigterm_ends_a_program_that_waits(rig, tmp_path):
     "name",
     ["with blank", "quo'te\"s", "{x} %s %(a)d", "new\nline", "-1", "umläut", b"un\xffdecodable"],
 )
-def test_strange_file_names(tmp_path, name):
+def test_unusual_file_names(tmp_path, name):
     folder = os.fsencode(tmp_path)
     path = os.path.join(folder, os.fsencode(name) + b".skel")  # noqa: PTH118
     with open(path, "w") as stream:  # noqa: PTH123

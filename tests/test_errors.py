@@ -18,7 +18,7 @@ def test_every_error_is_a_viewer_error(name):
     assert issubclass(getattr(errors, name), ViewerError)
 
 
-def test_exit_codes_tell_input_graphics_and_output_apart():
+def test_exit_codes_distinguish_input_graphics_and_output():
     assert (FormatError.exit_code, RenderError.exit_code, OutputError.exit_code) == (2, 4, 5)
     assert errors.RigError.exit_code == errors.UnsupportedFormatError.exit_code == 2
 
@@ -30,7 +30,7 @@ def test_format_error_begins_with_file_and_line():
     assert str(wrong("a b.skel")) == "a b.skel: positions: expected 3 numbers, found 2"
 
 
-def test_format_error_shows_an_odd_path_on_one_line():
+def test_format_error_shows_an_unusual_path_on_one_line():
     assert str(wrong("a\nb\udcff\x1b[0m{}%s")).startswith(
         "a\\nb\\udcff\\x1b[0m{}%s: positions: expected"
     )
@@ -48,11 +48,11 @@ def test_format_error_shows_an_odd_path_on_one_line():
         (12, "12"),
     ],
 )
-def test_printable_escapes_what_cannot_be_shown(text, shown):
+def test_printable_escapes_unprintable_characters(text, shown):
     assert printable(text) == shown
 
 
-def test_printable_cuts_long_text():
+def test_printable_truncates_long_text():
     assert printable("x" * 200) == "x" * 200
     assert printable("x" * 201) == "x" * 199 + "…"
     assert printable("abcdef", 3) == "ab…"

@@ -1,4 +1,4 @@
-"""Signals at chosen moments: what ends the program, what comes too late, what stays behind.
+"""Signals at chosen moments: termination, late signals, and leftover files.
 
 Programs signal themselves at the moment that is tested, so nothing depends on how fast they are.
 """
@@ -130,7 +130,7 @@ INFO = ("info",), {}
         "viewer.rendering.gpu.program",
     ],
 )
-def test_import_that_is_interrupted_ends_in_one_line(end, module):
+def test_interrupted_import_ends_in_one_line(end, module):
     command, places = PNG
     moment = f"sys.meta_path.insert(0, At({module!r}))"
     assert end(moment, INT, *command, **places) == (*ENDINGS[INT], OLD)
@@ -139,7 +139,7 @@ def test_import_that_is_interrupted_ends_in_one_line(end, module):
 @BOTH
 @pytest.mark.parametrize("helper", ["make_attribute", "make_uniform", "make_varying"])
 @pytest.mark.parametrize("kind", [PNG, MP4], ids=["png", "mp4"])
-def test_signal_while_moderngl_calls_python_is_no_crash(end, number, helper, kind):
+def test_signal_while_moderngl_calls_python_does_not_crash(end, number, helper, kind):
     command, places = kind
     moment = f"import _moderngl\nbefore(_moderngl, {helper!r})"
     assert end(moment, number, *command, **places) == (*ENDINGS[number], OLD)
@@ -164,7 +164,7 @@ def test_signal_while_moderngl_calls_python_is_no_crash(end, number, helper, kin
     ],
     ids=["frame", "pose", "encoding", "finishing"],
 )
-def test_video_that_is_interrupted_leaves_the_old_file(end, number, moment):
+def test_interrupted_video_keeps_the_old_file(end, number, moment):
     command, places = MP4
     assert end(moment, number, *command, **places) == (*ENDINGS[number], OLD)
 
@@ -182,7 +182,7 @@ def test_video_that_is_interrupted_leaves_the_old_file(end, number, moment):
         (OBJ, "import tempfile\nbefore(tempfile, 'mkstemp')"),
     ],
 )
-def test_command_that_is_interrupted_leaves_the_old_file(end, number, kind, moment):
+def test_interrupted_command_keeps_the_old_file(end, number, kind, moment):
     command, places = kind
     output = OLD if places else b""
     assert end(moment, number, *command, **places) == (*ENDINGS[number], output)
@@ -218,14 +218,14 @@ def test_signal_after_the_work_is_done_changes_nothing(end, number, moment, kind
             assert picture.size == (40, 30)
 
 
-def test_closed_terminal_ends_a_run_as_well(end):
+def test_closed_terminal_ends_a_run_too(end):
     command, places = PNG
     moment = "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"
     wanted = (129, b"viewer: hung up\n", OLD)
     assert end(moment, signal.SIGHUP, *command, **places) == wanted
 
 
-def test_signal_that_python_drops_is_raised_again(end):
+def test_signal_swallowed_by_python_is_raised_again(end):
     # What a destructor raises is only reported; so is what a weak reference's callback raises.
     moment = (
         "import viewer.commands.info as m\n"
@@ -240,7 +240,7 @@ def test_signal_that_python_drops_is_raised_again(end):
     assert end(moment, INT, *INFO[0]) == (*ENDINGS[INT], b"")
 
 
-def test_second_signal_ends_a_program_that_does_not_react(end):
+def test_second_signal_ends_an_unresponsive_program(end):
     moment = (
         "import time, viewer.commands.info as m\n"
         "from viewer.interrupts import hold\n"
@@ -263,7 +263,7 @@ def test_ignored_signal_stays_ignored(end):
 
 
 @pytest.mark.parametrize("arguments", [["--version"], ["info", "/no/such.skel"], ["info", "-?"]])
-def test_callers_handlers_are_back_afterwards(arguments, capsys):
+def test_handlers_of_the_caller_are_restored(arguments, capsys):
     def mine(number, frame):
         """Do nothing."""
 
@@ -337,7 +337,7 @@ def test_held_signal_waits_for_a_poll(ctrl_c):
     assert reached == ["held"]
 
 
-def test_held_signal_that_nobody_polls_is_too_late(ctrl_c):
+def test_held_signal_without_a_poll_is_dropped(ctrl_c):
     with watched():
         hold()
         ctrl_c()
@@ -356,7 +356,7 @@ def test_hold_lasts_until_the_end_of_the_block(ctrl_c):
     assert not reached
 
 
-def test_clean_up_is_not_interrupted_again(ctrl_c):
+def test_clean_up_is_not_interrupted_twice(ctrl_c):
     reached = []
     with pytest.raises(Interrupted), watched():
         try:

@@ -74,7 +74,7 @@ def test_skeleton_alone_opens_as_boxes(files):
     assert scene.warnings == ()
 
 
-def test_skin_alone_opens_in_its_binding_space(files):
+def test_skin_alone_opens_in_bind_pose(files):
     scene = viewer.load(*files("2.skin"))
     assert parts(scene) == [("2", None, 2)]
     assert scene.actors[0].pose is None
@@ -85,7 +85,7 @@ def test_path_may_be_text(files):
 
 
 @pytest.mark.parametrize("order", [("2.skel", "2.skin"), ("2.skin", "2.skel")])
-def test_pair_opens_attached_in_any_order(files, order):
+def test_pair_opens_as_one_figure_in_any_order(files, order):
     scene = viewer.load(*files(*order))
     assert parts(scene) == [("2", 2, 2)]
     assert scene.actors[0].figure.is_attached
@@ -107,18 +107,18 @@ def test_pair_opens_attached_in_any_order(files, order):
         (["2.skel", "2.skin"] * 2, [("2", 2, 2), ("2", 2, 2)]),
     ],
 )
-def test_files_find_their_partners(files, order, expected):
+def test_skeletons_and_skins_are_paired(files, order, expected):
     assert parts(viewer.load(*files(*order))) == expected
 
 
-def test_skin_of_another_skeleton_is_refused_with_both_names_and_numbers(files):
+def test_skin_of_another_skeleton_is_refused_with_both_names_and_counts(files):
     skel, skin = files("2.skel", "3.skin")
     expected = f"{skin}: expected 2 bind matrices, one per joint of {skel}, found 3"
     assert refusal(skel, skin) == expected
     assert refusal(skin, skel) == expected
 
 
-def test_odd_skin_among_pairs_is_refused(files):
+def test_unpaired_skin_among_pairs_is_refused(files):
     skels = files("2.skel", "3.skel")
     skins = files("2.skin", "5.skin")
     assert refusal(*skels, *skins) == (
@@ -157,7 +157,7 @@ def test_one_actor_stays_where_it_is(files):
     assert spans(viewer.load(*files("2.skin", left=7.0))) == [(7, 8)]
 
 
-def test_actors_stand_side_by_side_a_quarter_of_the_wider_apart(files):
+def test_actors_are_spaced_a_quarter_of_the_wider_apart(files):
     paths = files("2.skin", left=-5.0, width=4.0) + files("3.skin", left=100.0, width=1.0)
     paths += files("4.skin", left=-9.0, width=8.0)
     # 4 wide, a gap of 1, 1 wide, a gap of 2, 8 wide.
@@ -181,7 +181,7 @@ def test_stray_vertex_does_not_push_the_next_actor_away(files, tmp_path):
     assert 1.0 <= scene.actors[1].placement[0, 3] < 1.5
 
 
-def test_actors_of_no_width_stand_apart_from_wide_ones(files):
+def test_actors_of_zero_width_are_spaced_from_wide_ones(files):
     paths = files("2.skin", width=0.0) + files("3.skin", width=4.0)
     assert spans(viewer.load(*paths)) == [(0, 0), (1, 5)]
 
@@ -189,7 +189,7 @@ def test_actors_of_no_width_stand_apart_from_wide_ones(files):
 # Recognition
 
 
-def test_skeleton_named_skin_opens_with_a_warning(files):
+def test_skeleton_with_a_skin_suffix_opens_with_a_warning(files):
     (skel,) = files("2.skel")
     wrong = skel.with_suffix(".skin")
     skel.rename(wrong)
@@ -198,7 +198,7 @@ def test_skeleton_named_skin_opens_with_a_warning(files):
     assert scene.warnings == (f"{wrong}: .skel file with the suffix .skin",)
 
 
-def test_exchanged_names_still_pair(files):
+def test_swapped_names_still_pair(files):
     skel, skin = files("2.skel", "2.skin")
     text = skel.read_text()
     skel.write_text(skin.read_text())
@@ -212,7 +212,7 @@ def test_exchanged_names_still_pair(files):
 
 
 @pytest.mark.parametrize("name", ["figure", "figure.txt", ".skel", "a.SKEL", "a.b.c"])
-def test_any_name_will_do(files, name):
+def test_any_file_name_is_accepted(files, name):
     (skel,) = files("2.skel")
     other = skel.with_name(name)
     skel.rename(other)
@@ -236,7 +236,7 @@ def test_5_million_blank_lines_before_a_skeleton_load(tmp_path):
         ("balljoint a { }".encode("utf-16"), "UTF-16 text"),
     ],
 )
-def test_other_content_is_named(tmp_path, data, kind):
+def test_other_content_is_described(tmp_path, data, kind):
     for name, wanted in (("a.skel", ".skel"), ("a.skin", ".skin"), ("a", ANY)):
         path = tmp_path / name
         path.write_bytes(data)
@@ -251,7 +251,7 @@ def test_missing_file_is_named(tmp_path):
     assert refusal(path) == f"{path}: cannot be read: No such file or directory"
 
 
-def test_missing_file_comes_with_the_nearest_name(tmp_path):
+def test_missing_file_suggests_the_nearest_name(tmp_path):
     for name in ("wasp.skel", "wasp.skin", "tube.skel"):
         (tmp_path / name).write_text("")
     path = tmp_path / "wasp.skl"
@@ -303,7 +303,7 @@ def test_link_is_followed_and_a_broken_one_named(files, tmp_path):
     assert refusal(link) == f"{link}: cannot be read: No such file or directory"
 
 
-def test_link_that_leads_to_itself_is_refused(tmp_path):
+def test_circular_link_is_refused(tmp_path):
     link = tmp_path / "loop.skel"
     link.symlink_to(link)
     assert refusal(link) == f"{link}: cannot be read: Too many levels of symbolic links"
@@ -321,7 +321,7 @@ def test_unreadable_file_is_refused(files, monkeypatch):
     assert refusal(skel) == f"{skel}: cannot be read: Permission denied"
 
 
-def test_name_that_no_system_can_have_is_refused(tmp_path):
+def test_invalid_name_is_refused(tmp_path):
     # Newer Pythons name the call that found it as well.
     assert refusal("a\0b.skel").startswith("a\\x00b.skel: cannot be read: ")
     long = "x" * 300 + ".skel"
@@ -331,7 +331,7 @@ def test_name_that_no_system_can_have_is_refused(tmp_path):
 @pytest.mark.parametrize(
     "name", ["a b.skel", "a'\"{}%s.skel", "a\nb.skel", "\udcff.skel", "x" * 240]
 )
-def test_odd_names_load_and_are_shown_on_one_line(tmp_path, name):
+def test_unusual_names_load_and_are_shown_on_one_line(tmp_path, name):
     path = tmp_path / name
     path.write_text("balljoint a { offset up }")
     shown = str(path).replace("\n", "\\n").replace("\udcff", "\\udcff")

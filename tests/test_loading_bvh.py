@@ -1,4 +1,4 @@
-"""BVH among other files: units that agree, models that are driven, and what is said of both."""
+"""BVH among other files: common units, driven models, and messages about both."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def units(scene):
     return [actor.figure.unit for actor in scene.actors]
 
 
-def test_alone_it_keeps_the_numbers_of_its_file(bvh):
+def test_bvh_alone_keeps_its_file_units(bvh):
     path = bvh()
     scene = load(path)
     assert units(scene) == ["cm"] and scene.warnings == (f"{path}: {GUESS}; --unit overrides it",)
     assert_allclose(places(scene.actors[0]), 100 * np.array(PERSON_TURNED), rtol=0, atol=1e-9)
 
 
-def test_beside_a_body_it_is_scaled_to_metres(bvh):
+def test_bvh_with_a_body_is_scaled_to_metres(bvh):
     path = bvh()
     scene = load(path, bundled_body(), motion=BESIDE)
     note = f"{path}: {GUESS}, and scaled to metres to match the others; --unit overrides it"
@@ -66,7 +66,7 @@ def test_beside_a_body_it_is_scaled_to_metres(bvh):
 
 
 @pytest.mark.parametrize(("scale", "word"), [(100, "centimetres"), (1000, "millimetres")])
-def test_beside_figures_that_look_like_metres(bvh, scale, word):
+def test_bvh_with_figures_that_look_like_metres(bvh, scale, word):
     fox = viewer.loading.bundled_files()
     scene = load(*fox, bvh(scale))
     assert [actor.figure.name for actor in scene.actors] == ["fox", "walk"]
@@ -75,7 +75,7 @@ def test_beside_figures_that_look_like_metres(bvh, scale, word):
     assert_allclose(places(scene.actors[1]), PERSON_TURNED, rtol=0, atol=1e-12)
 
 
-def test_beside_figures_of_unknown_unit_and_other_size_it_stays(bvh, tmp_path):
+def test_bvh_with_figures_of_unknown_unit_and_other_size_is_unscaled(bvh, tmp_path):
     giant = tmp_path / "giant.obj.skel"
     giant.write_text("balljoint root { offset 0 0 0 balljoint tip { offset 0 20 0 } }")
     scene = load(giant, bvh())
@@ -83,7 +83,7 @@ def test_beside_figures_of_unknown_unit_and_other_size_it_stays(bvh, tmp_path):
     assert scene.warnings[-1].endswith(f"{GUESS}; --unit overrides it")
 
 
-def test_two_in_one_unit_stay_and_two_in_two_units_become_metres(bvh):
+def test_two_bvh_files_are_scaled_only_if_their_units_differ(bvh):
     first, second = bvh(), bvh(name="b.bvh")
     assert units(load(first, second)) == ["cm", "cm"]
     for other in (bvh(1, "m.bvh"), bvh(1000, "mm.bvh")):
@@ -93,7 +93,7 @@ def test_two_in_one_unit_stay_and_two_in_two_units_become_metres(bvh):
             assert_allclose(places(actor), PERSON_TURNED, rtol=0, atol=1e-12)
 
 
-def test_beside_captured_keypoints(bvh, tmp_path):
+def test_bvh_with_captured_keypoints(bvh, tmp_path):
     folder = tmp_path / "out" / "keypoints3d"
     folder.mkdir(parents=True)
     points = [[0.1 * k, 0.0, 0.05 * k, 1.0] for k in range(25)]
@@ -113,7 +113,7 @@ def test_unknown_units_are_never_scaled(bvh):
 @pytest.mark.parametrize(
     ("unit", "scale"), [("m", 1), ("cm", 100), ("mm", 1000), ("in", 1 / 0.0254)]
 )
-def test_a_unit_that_is_asked_for_is_not_guessed(bvh, unit, scale):
+def test_a_requested_unit_is_not_guessed(bvh, unit, scale):
     scene = load(bvh(scale), motion=MotionSettings(unit=unit))
     assert units(scene) == ["m"] and scene.warnings == ()
     assert_allclose(places(scene.actors[0]), PERSON_TURNED, rtol=0, atol=1e-7)  # six decimals
@@ -121,7 +121,7 @@ def test_a_unit_that_is_asked_for_is_not_guessed(bvh, unit, scale):
     assert fact == f"{unit} in the file, as requested" + "; scaled to metres" * (unit != "m")
 
 
-def test_an_axis_that_is_asked_for_is_not_guessed(bvh):
+def test_a_requested_up_axis_is_not_guessed(bvh):
     text = person(1.0).replace("0.000000 -0.050000 0.000000", "0.000000 0.000000 -0.050000")
     for number in ("-0.400000", "-0.450000", "0.600000", "0.200000"):
         text = text.replace(f"0.000000 {number} 0.000000", f"0.000000 0.000000 {number}")
@@ -132,7 +132,7 @@ def test_an_axis_that_is_asked_for_is_not_guessed(bvh):
     assert asked.up == "z" and asked.warnings == ()
 
 
-def test_the_model_is_driven(bvh):
+def test_bvh_drives_the_model(bvh):
     path = bvh()
     named = load(path, motion=MotionSettings(model=bundled_body()))
     among = load(path, bundled_body())
@@ -149,13 +149,13 @@ def test_the_model_is_driven(bvh):
     assert along[1] > 0.99
 
 
-def test_every_motion_drives_a_model_of_its_own(bvh):
+def test_every_motion_drives_a_separate_model(bvh):
     scene = load(bvh(), bvh(1, "b.bvh"), motion=MotionSettings(model=bundled_body()))
     first, second = scene.actors
     assert first.figure is second.figure and (first.clip.name, second.clip.name) == ("walk", "b")
 
 
-def test_a_model_beside_figures_among_the_files(bvh):
+def test_a_model_together_with_other_figures(bvh):
     scene = load(
         *viewer.loading.bundled_files(), bvh(), motion=MotionSettings(model=bundled_body())
     )
@@ -176,7 +176,7 @@ def test_a_model_that_does_not_fit_is_refused(bvh, tmp_path):
     assert str(wrong.value) == f"{path}: --model: expected a body model, found another file"
 
 
-def test_beside_leaves_the_model_out_and_says_so(bvh):
+def test_option_beside_skips_the_model_with_a_note(bvh):
     path = bvh()
     scene = load(path, motion=MotionSettings(model=bundled_body(), drives=False))
     assert units(scene) == ["cm"]
@@ -186,7 +186,7 @@ def test_beside_leaves_the_model_out_and_says_so(bvh):
 
 
 @pytest.mark.parametrize("named", [False, True])
-def test_figures_driven_by_a_world_that_hangs_stand(bvh, named):
+def test_figures_driven_by_an_upside_down_world_are_upright(bvh, named):
     down = person(1.0)
     for number in ("-0.050000", "-0.400000", "-0.450000", "0.600000", "0.200000"):
         other = number.removeprefix("-") if number.startswith("-") else f"-{number}"
@@ -202,7 +202,7 @@ def test_figures_driven_by_a_world_that_hangs_stand(bvh, named):
     assert joints[names.index("head"), 1] > joints[names.index("left_knee"), 1] + 0.5
 
 
-def test_a_body_written_as_bvh_comes_back_on_its_model(tmp_path):
+def test_a_body_written_as_bvh_round_trips_on_its_model(tmp_path):
     from viewer.cli import run
 
     smpl = tmp_path / "SMPL.npz"

@@ -1,4 +1,4 @@
-"""Files that move or change figures, opened together: who gets what, and what is refused."""
+"""Motions, poses and morphs opened together with figures: assignment and refusals."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def smpl(tmp_path):
     return path
 
 
-def test_people_come_and_go(recording, smpl):
+def test_people_appear_and_disappear(recording, smpl):
     scene = load(recording, smpl)
     assert [actor.person for actor in scene.actors] == [0, 7]
     assert scene.up == "z"
@@ -99,19 +99,19 @@ def test_people_come_and_go(recording, smpl):
         assert_allclose(first.pose.dofs[3 * 4], 0.2 * frame, atol=1e-12)
 
 
-def test_model_among_the_files_is_not_an_actor_of_its_own(recording, smpl):
+def test_model_among_the_files_is_not_a_separate_actor(recording, smpl):
     assert len(load(smpl, recording).actors) == 2
     named = load(recording, motion=MotionSettings(model=smpl))
     assert [actor.figure.name for actor in named.actors] == ["SMPL", "SMPL"]
 
 
-def test_without_a_model_the_bundled_body_is_used_and_said(recording):
+def test_without_a_model_the_bundled_body_is_used_with_a_note(recording):
     scene = load(recording)
     assert scene.actors[0].figure.n_shapes == 10
     assert any("drawn with the bundled body" in text for text in scene.warnings)
 
 
-def test_bundled_body_has_neither_shapes_nor_expressions_of_the_files(tmp_path):
+def test_bundled_body_ignores_shapes_and_expressions_of_the_files(tmp_path):
     for name, extra, lost in (
         (
             "a",
@@ -133,7 +133,7 @@ def test_bundled_body_has_neither_shapes_nor_expressions_of_the_files(tmp_path):
         assert load(tmp_path / name).warnings == (text,)
 
 
-def test_people_without_any_shapes_are_said_once(tmp_path, smpl):
+def test_people_without_shapes_are_reported_once(tmp_path, smpl):
     folder = tmp_path / "output" / "smpl"
     folder.mkdir(parents=True)
     people = [person(0, 0.0), person(7, 5.0)]
@@ -150,12 +150,12 @@ def test_people_without_any_shapes_are_said_once(tmp_path, smpl):
     assert text not in load(tmp_path / "output", smpl).warnings
 
 
-def test_frame_rate_is_that_asked_for(recording, smpl):
+def test_frame_rate_is_as_requested(recording, smpl):
     scene = load(recording, smpl, motion=MotionSettings(frame_rate=50.0))
     assert scene.actors[0].clip.end == pytest.approx(3 / 50)
 
 
-def test_up_axis_as_asked(recording, smpl):
+def test_up_axis_is_as_requested(recording, smpl):
     assert load(recording, smpl, motion=MotionSettings(up="y")).up == "y"
     turned = load(recording, smpl, motion=MotionSettings(up="-y"))
     assert turned.up == "y"
@@ -171,7 +171,7 @@ def test_hands_alone_need_their_model(tmp_path):
         load(folder)
 
 
-def test_bvh_drives_a_body_and_stands_alone_without(tmp_path):
+def test_bvh_drives_a_body_or_is_shown_alone(tmp_path):
     path = tmp_path / "legs.bvh"
     path.write_text(BVH)
     alone = load(path)
@@ -189,7 +189,7 @@ def test_bvh_drives_a_body_and_stands_alone_without(tmp_path):
     assert len(beside.actors) == 2
 
 
-def test_bvh_that_drives_nothing_stands_beside(tmp_path):
+def test_bvh_that_drives_nothing_is_a_separate_actor(tmp_path):
     path = tmp_path / "legs.bvh"
     path.write_text(BVH)
     scene = load(path, *write_rig(tmp_path))
@@ -201,7 +201,7 @@ def test_bvh_that_drives_nothing_stands_beside(tmp_path):
     )
 
 
-def test_bvh_unit_rate_and_up_as_asked(tmp_path):
+def test_bvh_unit_rate_and_up_are_as_requested(tmp_path):
     path = tmp_path / "legs.bvh"
     path.write_text(BVH)
     scene = load(path, motion=MotionSettings(unit="cm", frame_rate=20.0, up="z"))
@@ -241,7 +241,7 @@ def test_morph_alone_and_morph_of_another_skin_are_refused(tmp_path):
         load(skel, skin, morph)
 
 
-def test_rig_file_opens_what_it_names_also_in_circles(tmp_path):
+def test_rig_file_opens_its_files_even_with_cycles(tmp_path):
     (tmp_path / "a.skel").write_text(SKEL)
     (tmp_path / "a.skin").write_text(skin_text())
     (tmp_path / "smile.morph").write_text(morph_text())
@@ -256,7 +256,7 @@ def test_rig_file_opens_what_it_names_also_in_circles(tmp_path):
     assert only.figure.skeleton is None
 
 
-def test_clip_fits_course_rigs_only(tmp_path, smpl):
+def test_clip_fits_skel_rigs_only(tmp_path, smpl):
     # An SMPL body has 72 DOFs, as a course rig of 23 joints has: its channels mean something else.
     channel = " channel { extrapolate constant constant keys 1 { 0 0 flat flat } }"
     path = tmp_path / "walk.anim"

@@ -1,4 +1,4 @@
-"""Body models that a person has on disk, found by their published names."""
+"""Body models on disk, found by their published names."""
 
 import json
 import os
@@ -76,7 +76,7 @@ def test_published_name_is_known(folder, file, name):
         *["SMPL_NEUTRAL", "SMPL_NEUTRAL.pkl.part"],
     ],
 )
-def test_other_names_are_left_alone(folder, file):
+def test_other_names_are_ignored(folder, file):
     assert names(folder(file)) == {}
 
 
@@ -93,11 +93,11 @@ def test_npz_goes_before_pkl(folder, files):
     assert names(folder(*files)) == {"smpl:male": "SMPL_MALE.npz"}
 
 
-def test_large_letters_in_suffixes_do_not_matter(folder):
+def test_upper_case_suffixes_do_not_matter(folder):
     assert names(folder("a/SMPL_MALE.PKL", "b/SMPL_MALE.NPZ")) == {"smpl:male": "SMPL_MALE.NPZ"}
 
 
-def test_of_two_alike_the_higher_one_is_taken(folder):
+def test_of_two_equal_matches_the_shallower_is_used(folder):
     root = folder("SMPL_MALE.npz", "backup/SMPL_MALE.npz")
     assert models.known_models(root) == {"smpl:male": root / "SMPL_MALE.npz"}
 
@@ -114,7 +114,7 @@ def test_of_two_alike_the_higher_one_is_taken(folder):
         *[("smpl", None), ("smplx:other", None), ("", None), (":neutral", None)],
     ],
 )
-def test_model_is_found_in_any_case_of_letters(folder, asked, file):
+def test_model_is_found_in_any_letter_case(folder, asked, file):
     root = folder(
         *["x/SMPLX_NEUTRAL.npz", "x/SMPLX_MALE.npz", "smplh/female/model.npz", "own.npz"],
         *["mano/MANO_LEFT.pkl", "mano/MANO_RIGHT.pkl"],
@@ -163,7 +163,7 @@ def test_folder_is_remembered(folder, settings):
     assert settings.is_file()
 
 
-def test_relative_folder_is_remembered_whole(folder, monkeypatch):
+def test_relative_folder_is_remembered_as_absolute(folder, monkeypatch):
     root = folder("SMPL_MALE.npz")
     monkeypatch.chdir(root.parent)
     models.save_model_folder("models")
@@ -171,14 +171,14 @@ def test_relative_folder_is_remembered_whole(folder, monkeypatch):
     assert models.load_model_folder() == root.resolve()
 
 
-def test_what_is_no_folder_is_not_remembered(tmp_path, settings):
+def test_non_folder_is_not_remembered(tmp_path, settings):
     with pytest.raises(ViewerError) as caught:
         models.save_model_folder(tmp_path / "gone")
     assert str(caught.value) == f"--model-path: expected a folder, found {tmp_path / 'gone'}"
     assert not settings.exists()
 
 
-def test_settings_that_cannot_be_written_are_reported(folder, settings):
+def test_unwritable_settings_are_reported(folder, settings):
     settings.parent.touch()  # a file where the folder should be
     with pytest.raises(OutputError) as caught:
         models.save_model_folder(folder("a.npz"))
@@ -192,19 +192,19 @@ def test_settings_that_cannot_be_written_are_reported(folder, settings):
         *['{"folder": ["a"]}', "[" * 100_000, "\0", "\xff"],
     ],
 )
-def test_bad_settings_are_as_none(settings, text):
+def test_invalid_settings_are_ignored(settings, text):
     settings.parent.mkdir()
     settings.write_bytes(text.encode("latin-1"))
     assert models.load_model_folder() is None
     assert models.resolve("smpl").name == "smpl"
 
 
-def test_settings_that_are_a_folder_are_as_none(settings):
+def test_settings_path_that_is_a_folder_is_ignored(settings):
     settings.mkdir(parents=True)
     assert models.load_model_folder() is None
 
 
-def test_remembered_folder_that_is_gone_finds_nothing(settings, tmp_path):
+def test_missing_remembered_folder_finds_nothing(settings, tmp_path):
     settings.parent.mkdir()
     settings.write_text(json.dumps({"folder": str(tmp_path / "gone")}))
     assert models.resolve("smpl").name == "smpl"
@@ -229,6 +229,6 @@ def test_file_that_exists_goes_before_a_model(folder, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["gone.npz", "a/smplx", "/smplx", "", "x" * 300, "a\0b"])
-def test_what_is_no_model_stays_as_it_is(folder, name):
+def test_non_model_path_is_unchanged(folder, name):
     models.save_model_folder(folder("smplx_neutral.npz"))
     assert str(models.resolve(name)) == (name or ".")

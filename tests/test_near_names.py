@@ -1,4 +1,4 @@
-"""Names that are offered in place of one that does not exist."""
+"""Names suggested in place of an unknown one."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def test_near_names(text, names, near):
     assert near_names(text, names) == near
 
 
-def test_questions_offer_one_or_several():
+def test_suggestions_offer_one_or_several():
     assert did_you_mean("rendr", ["render"]) == "did you mean render?"
     assert did_you_mean("ab", ["abx", "aby", "abz"]) == "did you mean abx, aby or abz?"
     assert did_you_mean("tail", ["hip"]) == ""
@@ -31,7 +31,7 @@ def test_questions_offer_one_or_several():
     assert did_you_mean("gone.png", ["text.png"], alike=0.8) == ""
 
 
-def test_short_lists_are_shown_whole_and_long_ones_begun():
+def test_short_lists_are_shown_in_full_and_long_ones_truncated():
     assert name_hint("hipp", ["hip", "knee"]) == "did you mean hip?"
     assert name_hint("tail", ["hip", "knee"]) == "there are 2: hip, knee"
     assert name_hint("tail", []) == "there are none"
@@ -45,5 +45,5 @@ def test_names_from_files_stay_on_one_line():
     assert name_hint("x", ["\x1b[31m"]) == r"there are 1: \x1b[31m"
 
 
-def test_long_texts_are_compared_by_their_beginning():
+def test_long_strings_are_compared_by_their_start():
     assert near_names("a" * 100_000, ["a" * 80, "b"]) == ["a" * 80]

@@ -1,4 +1,4 @@
-"""Actors and scenes are called after what was opened, and no two alike."""
+"""Actors and scenes are named uniquely after the opened files."""
 
 from __future__ import annotations
 
@@ -71,24 +71,24 @@ def test_bundled_figure_is_the_fox():
     assert names(*bundled_files()) == (["fox"], "fox")
 
 
-def test_people_of_a_recording_are_called_after_it(seq):
+def test_people_in_a_recording_are_named_after_it(seq):
     people = ["seq_smpl 0", "seq_smpl 7", "seq_smpl body25 0"]
     assert names(seq) == (people, "seq_smpl")
     assert names(seq / "smpl") == (people[:2], "seq_smpl")
     assert names(seq / "keypoints3d") == (people[2:], "seq_smpl")
 
 
-def test_folder_without_a_name_of_its_own_is_the_one_that_was_opened(seq, monkeypatch):
+def test_generic_folder_name_falls_back_to_the_opened_folder(seq, monkeypatch):
     monkeypatch.chdir(seq / "smpl")
     assert names(".")[1] == names("../smpl")[1] == names("..")[1] == "seq_smpl"
 
 
-def test_dot_in_the_name_of_a_folder_is_no_suffix(tmp_path):
+def test_dot_in_a_folder_name_is_not_a_suffix(tmp_path):
     write_frames(tmp_path / "dance.v2", {0: [body(0)]})
     assert names(tmp_path / "dance.v2")[1] == "dance.v2"
 
 
-def test_motions_of_bodies_are_called_after_their_file_whatever_draws_them(walk, tmp_path):
+def test_body_motions_are_named_after_their_file_whatever_the_model(walk, tmp_path):
     assert names(walk) == (["walk"], "walk")
     (tmp_path / "jump.bvh").write_text(BVH)
     driven = load(bundled_body_path(), tmp_path / "jump.bvh")
@@ -104,7 +104,7 @@ def bundled_body_path():
     return bundled_body()
 
 
-def test_pig_is_called_after_the_file_or_the_folder_that_somebody_named(tmp_path, monkeypatch):
+def test_pig_is_named_after_the_given_file_or_folder(tmp_path, monkeypatch):
     write_pig(tmp_path / "core_txt_files", CORE)
     (tmp_path / "piglet").mkdir()
     shutil.move(tmp_path / "core_txt_files", tmp_path / "piglet")
@@ -115,13 +115,13 @@ def test_pig_is_called_after_the_file_or_the_folder_that_somebody_named(tmp_path
     assert names(tmp_path / "hog")[0] == ["hog"]
 
 
-def test_figure_of_a_rig_file_is_called_after_it(tmp_path):
+def test_figure_of_a_rig_file_is_named_after_it(tmp_path):
     write_rig(tmp_path, "tiny")
     (tmp_path / "hero.rig").write_text("rig Someone { skeleton tiny.skel skin tiny.skin }")
     assert names(tmp_path / "hero.rig") == (["hero"], "hero")
 
 
-def test_several_things_of_one_name_stay_apart(tmp_path, walk, seq):
+def test_duplicate_names_are_made_unique(tmp_path, walk, seq):
     rig = write_rig(tmp_path)
     assert names(*rig, *rig)[0] == ["tiny", "tiny-2"]
     (tmp_path / "other").mkdir()
@@ -132,25 +132,25 @@ def test_several_things_of_one_name_stay_apart(tmp_path, walk, seq):
     assert both == ["seq_smpl 0", "seq_smpl 7", "seq_smpl-2 0", "seq_smpl-2 7"]
 
 
-def test_several_files_are_called_after_the_main_one(tmp_path, walk):
+def test_several_files_are_named_after_the_main_one(tmp_path, walk):
     rig = write_rig(tmp_path, "hero")
     assert names(*rig, walk) == (["hero", "walk"], "hero")
 
 
-def test_free_title_counts_on():
+def test_free_title_increments_its_number():
     figure = load().actors[0].figure
     actors = [Actor(figure), Actor(figure, called="fox-2")]
     assert free_title(actors, "fox") == "fox-3" and free_title(actors, "cat") == "cat"
 
 
-def test_names_of_folders_and_files_that_are_offered(tmp_path):
+def test_suggested_folder_and_file_names(tmp_path):
     assert folder_name(tmp_path / "keypoints3d" / "smpl") == tmp_path.name
     assert opened_text(tmp_path / "take" / "smpl") == "take/smpl"
     assert opened_text(tmp_path / "take.bvh") == "take.bvh"
     assert file_stem("../seq 0\n") == ".._seq_0_"
 
 
-def test_info_calls_people_after_their_recording(seq, capsys):
+def test_info_names_people_after_their_recording(seq, capsys):
     assert run(["info", str(seq / "smpl")]) == 0
     heads = [line for line in capsys.readouterr().out.splitlines() if line[:1] not in " w"]
     assert heads == ["seq_smpl 0", "seq_smpl 7"]

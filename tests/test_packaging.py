@@ -1,4 +1,4 @@
-"""The wheel holds all that is needed: install it in an empty environment and draw."""
+"""The wheel is complete: install it in an empty environment and render."""
 
 import os
 import subprocess

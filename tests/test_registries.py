@@ -1,4 +1,4 @@
-"""Each registry is exactly its folder, and what it names can be loaded."""
+"""Each registry is exactly its folder, and its entries can be loaded."""
 
 from importlib import import_module
 from inspect import signature
@@ -43,14 +43,14 @@ def test_shader_registry_is_exactly_its_folder(folder: str, registry: dict[str, 
     assert {path.stem for path in resource("shaders", folder).glob("*.glsl")} == set(registry)
 
 
-def test_formats_can_read_and_those_that_say_so_write() -> None:
+def test_formats_can_read_and_write_as_declared() -> None:
     for name in FORMATS:
         module = import_module(f"viewer.formats.{name}")
         assert callable(module.read)
         assert hasattr(module, "write") == FORMATS[name].writes
 
 
-def test_exporters_write_what_they_say() -> None:
+def test_exporters_write_what_they_declare() -> None:
     for name, kind in EXPORTERS.items():
         module = import_module(f"viewer.export.{name}")
         assert hasattr(module, "export") == kind.writes_pose

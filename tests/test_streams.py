@@ -1,4 +1,4 @@
-"""Standard streams that are closed, full, redirected or read by nobody: one line at most."""
+"""Standard streams that are closed, full, redirected or without a reader: one line at most."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def refused(done: subprocess.CompletedProcess, *words: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_picture_into_a_closed_output_is_refused(rig, name):
+def test_image_to_a_closed_output_is_refused(rig, name):
     refused(shell(f'viewer render "$@" -o {name} --size 64x64 >&-', *rig), name)
 
 
@@ -93,14 +93,14 @@ def test_full_output_is_refused(rig, command):
 @pytest.mark.parametrize(
     "command", ["--help", "--version", "render --help", 'info "$@"', 'diff "$1" "$1" --json']
 )
-def test_text_for_nobody_is_no_fault(rig, command):
+def test_text_to_a_closed_stream_is_not_an_error(rig, command):
     for redirection in (">&-", "<&- >&-", "| true; exit ${PIPESTATUS[0]}"):
         done = shell(f"viewer {command} {redirection}", *rig)
         assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
 @pytest.mark.parametrize("sink", ["&-", "/dev/full"])
-def test_messages_for_nobody_change_no_result(rig, tmp_path, sink):
+def test_closed_error_stream_does_not_change_results(rig, tmp_path, sink):
     done = shell(f"viewer info missing.skel 2>{sink}", *rig)
     assert (done.returncode, done.stdout) == (2, b"")
     target = tmp_path / "x.bmp"
@@ -111,7 +111,7 @@ def test_messages_for_nobody_change_no_result(rig, tmp_path, sink):
     assert done.returncode == 0 and done.stdout.startswith(os.fsencode(target))
 
 
-def test_picture_with_all_streams_closed_is_whole(rig, tmp_path):
+def test_image_with_all_streams_closed_is_complete(rig, tmp_path):
     target = tmp_path / "x.png"
     done = shell(f'viewer render "$@" --size 64x64 -o "{target}" <&- >&- 2>&-', *rig)
     assert done.returncode == 0 and target.read_bytes().endswith(b"IEND\xaeB`\x82")
@@ -139,7 +139,7 @@ def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
     assert os.fsencode(name) not in log.read_bytes()
 
 
-def test_mesh_into_a_pipe_is_the_mesh_alone(rig, tmp_path):
+def test_mesh_to_a_pipe_is_the_only_output(rig, tmp_path):
     (tmp_path / "link.obj").symlink_to("/dev/stdout")
     done = shell('viewer convert "$@" -o link.obj | cat', *rig, folder=tmp_path)
     assert done.returncode == 0 and done.stdout.startswith(b"# ")
@@ -147,7 +147,7 @@ def test_mesh_into_a_pipe_is_the_mesh_alone(rig, tmp_path):
     assert kinds <= {b"#", b"o", b"v", b"vt", b"vn", b"f", b"mtllib", b"usemtl"}
 
 
-def test_pipe_that_nobody_reads_is_no_fault(rig):
+def test_pipe_without_a_reader_is_not_an_error(rig):
     done = shell(
         'viewer render "$@" --turntable --contact-sheet 2 -o /dev/stdout | true; '
         "exit ${PIPESTATUS[0]}",
@@ -165,7 +165,7 @@ def test_names_of_the_output_stream(tmp_path):
     assert not any(map(is_stdout, others))
 
 
-def test_output_stream_is_no_file_to_keep_or_replace(tmp_path, capsysbinary):
+def test_output_stream_is_not_checked_for_replacement(tmp_path, capsysbinary):
     link = tmp_path / "x.mp4"
     link.symlink_to("/dev/stdout")
     with pytest.raises(OutputError, match="regular file"):
@@ -177,7 +177,7 @@ def test_output_stream_is_no_file_to_keep_or_replace(tmp_path, capsysbinary):
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
 
 
-def test_streams_are_those_of_the_caller_again(monkeypatch):
+def test_streams_of_the_caller_are_restored(monkeypatch):
     before = sys.stderr
     with standard_streams():
         assert sys.stderr is not before
@@ -188,7 +188,7 @@ def test_streams_are_those_of_the_caller_again(monkeypatch):
     assert sys.stderr is None
 
 
-def test_reserved_descriptors_are_given_back():
+def test_reserved_descriptors_are_released():
     program = (
         "import os\n"
         "from viewer.streams import standard_streams\n"
@@ -202,7 +202,7 @@ def test_reserved_descriptors_are_given_back():
 
 
 @pytest.mark.parametrize("suffix", [".anim", ".skel", ".bvh"])
-def test_results_are_compared_with_what_went_into_a_pipe(rig, tmp_path, suffix):
+def test_results_match_the_output_sent_to_a_pipe(rig, tmp_path, suffix):
     """Such a file cannot be opened again to be read back."""
     (tmp_path / f"link{suffix}").symlink_to("/dev/stdout")
     done = shell(

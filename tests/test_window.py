@@ -1,4 +1,4 @@
-"""The real window under Xvfb, driven by xdotool; pictures of the screen are compared."""
+"""The real window under Xvfb, driven by xdotool; screenshots are compared."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def places(figure):
     return rects, view
 
 
-def test_window_does_what_hands_ask_for(window, places, figure):
+def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     rects, view = places
     app = window()
     before = app.wait_until_quiet()
@@ -229,7 +229,7 @@ def surface(figure):
     return middle, seen
 
 
-def test_text_about_a_vertex_comes_whole_wherever_the_mouse_rests(window, places, surface):
+def test_vertex_text_is_complete_wherever_the_mouse_rests(window, places, surface):
     (x, y, width, height), (tab, seen) = places[1], surface
     part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
     app = window()
@@ -254,7 +254,7 @@ def test_text_about_a_vertex_comes_whole_wherever_the_mouse_rests(window, places
         assert (app.screen()[part] == shown).all()
 
 
-def test_idle_window_burns_no_processor(window):
+def test_idle_window_uses_no_cpu(window):
     app = window()
     # Messages at the start go away after some seconds; until then frames are drawn.
     time.sleep(0.5)

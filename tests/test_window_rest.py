@@ -1,4 +1,4 @@
-"""When the window rests: frames that show what was awaited, then none."""
+"""The idle window: frames that show the awaited event, then none."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.app.window import _Rest
 pytestmark = pytest.mark.slow
 
 
-def test_what_was_awaited_is_followed_by_frames_that_show_it():
+def test_awaited_event_is_followed_by_frames_showing_it():
     for at in range(1, 9):  # the frame that brings it, be it the last one before the window sleeps
         rest = _Rest()
         for frame in range(at):
@@ -22,7 +22,7 @@ def test_what_was_awaited_is_followed_by_frames_that_show_it():
         assert drawn >= 2 and rest.left < 0
 
 
-def test_rest_ends_when_nothing_happens():
+def test_waiting_times_out_when_nothing_happens():
     rest, drawn = _Rest(), 0
     for _ in range(20):
         rest.count(happened=False, awaits=False)

@@ -18,7 +18,6 @@ from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.overlay.marks import Marks
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bytes
-from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 from viewer.rig.skin import limit_influences
 
@@ -40,12 +39,15 @@ class Picture:
         Commands that draw it, the last one without its output; empty if Python draws it.
     draw : callable or None
         Draws it otherwise.
+    has_data : bool
+        Whether its colours show numbers.
     """
 
     title: str
     text: str
     commands: tuple[str, ...] = ()
     draw: Callable[[], Bytes] | None = None
+    has_data: bool = False
 
     def pixels(self, folder: Path) -> Bytes:
         """Draw the picture with the input files of a folder: (H, W, 4) uint8."""
@@ -77,9 +79,8 @@ def _draw_finding() -> Bytes:
     options = _options(wireframe=True, grid=False)
     places = places_of(finding, scene, options.skinning)
     points = scene_points(scene)
-    near = points[points[:, 0] > 0.12]
     camera = Camera(azimuth=25.0, inclination=12.0)
-    fit(camera, near[near[:, 1] > -0.25], 1.6)
+    fit(camera, points[points[:, 1] > -0.1], 1.6)
     with Offscreen() as offscreen:
         vertices = places.vertices
         offscreen.renderer.marks = Marks(vertices, np.full(len(vertices), 3.0))
@@ -91,6 +92,19 @@ def _lower_arms(actor: Actor) -> None:
     for side, sign in (("left", -1.0), ("right", 1.0)):
         rows = np.flatnonzero(skeleton.dof_joints == skeleton.names.index(f"{side}_shoulder"))
         pose.dofs[rows[2]] = 0.9 * sign
+
+
+def _draw_knee() -> Bytes:
+    """Draw the weights of a bent knee."""
+    actor = Actor(body_figure())
+    _bend(actor)
+    scene = Scene([actor])
+    options = _options(shading="scalar", scalar="weight:left_knee", legend=True, grid=False)
+    camera = Camera(azimuth=62.0, inclination=8.0)
+    points = scene_points(scene)
+    fit(camera, points[points[:, 1] < -0.05], 1.4)
+    with Offscreen() as offscreen:
+        return offscreen.render(scene, (700, 500), camera, options, scene_box(scene))
 
 
 def _draw_influences() -> Bytes:
@@ -105,19 +119,15 @@ def _draw_influences() -> Bytes:
         actors.append(actor)
     apart = viewer.deform(exact, actors[0].pose)[0] - viewer.deform(pruned, actors[1].pose)[0]
     values = 1000.0 * np.linalg.norm(apart, axis=1)
-    for actor, shown in zip(actors, (np.zeros_like(values), values), strict=True):
-        field = VertexField("difference", "Error of 4 influences", shown, "mm")
-        actor.figure = _with_field(actor.figure, field)
+    field = VertexField("difference", "Error of 4 influences", values, "mm")
+    # The left figure has no such field, so it keeps its usual shading.
+    actors[1].figure = replace(pruned, fields=(*pruned.fields, field))
     scene = Scene(actors)
     options = _options(shading="scalar", scalar="field:difference", legend=True, grid=False)
     camera = Camera(azimuth=20.0, inclination=8.0)
     fit(camera, scene_points(scene), 1.6)
     with Offscreen() as offscreen:
         return offscreen.render(scene, (800, 500), camera, options, scene_box(scene))
-
-
-def _with_field(figure: Figure, field: VertexField) -> Figure:
-    return replace(figure, fields=(*figure.fields, field))
 
 
 def _bend(actor: Actor) -> None:
@@ -145,10 +155,10 @@ PICTURES: dict[str, Picture] = {
     ),
     "walk": Picture(
         "A motion in one picture",
-        "Seven poses of a walk, evenly spaced; earlier ones are fainter, and so are their shadows.",
+        "Six poses of a walk, evenly spaced; earlier ones are fainter, and so are their shadows.",
         (
-            "viewer render walk --model body.npz --onion 7 --azimuth -62 --inclination 8 "
-            f"{_OPTIONS} --size 1000x460",
+            "viewer render walk --model body.npz --onion 6 --azimuth -72 --inclination 8 "
+            f"{_OPTIONS} --size 800x460",
         ),
     ),
     "sheet": Picture(
@@ -179,11 +189,8 @@ PICTURES: dict[str, Picture] = {
     "knee": Picture(
         "The weights of a joint",
         "How much the left knee moves each vertex, with lines at every tenth.",
-        (
-            "viewer render body.npz --dof left_hip.x=-60deg --dof left_knee.x=80deg "
-            "--dof left_shoulder.z=-65deg --dof right_shoulder.z=65deg --scalar weight:left_knee "
-            f"--legend --azimuth 60 {_OPTIONS} --size 700x560",
-        ),
+        draw=_draw_knee,
+        has_data=True,
     ),
     "finding": Picture(
         "A finding of lint",
@@ -211,6 +218,7 @@ PICTURES: dict[str, Picture] = {
         "Left: a figure with up to 13 influences per vertex, exact. Right: the same pose with the "
         "four strongest ones, coloured by the distance to the exact surface.",
         draw=_draw_influences,
+        has_data=True,
     ),
 }
 """Pictures by name, in the order of the page."""

@@ -14,7 +14,9 @@ MOST = 1e-3
 _BLACK = 2  # of 255
 
 
-def saturated_fraction(pixels: Bytes, background: tuple[int, int, int] | None = None) -> float:
+def saturated_fraction(
+    pixels: Bytes, background: tuple[int, int, int] | None = None, has_data: bool = False
+) -> float:
     """Return the fraction of pixels of which a channel is burnt, or all are black.
 
     Parameters
@@ -23,9 +25,13 @@ def saturated_fraction(pixels: Bytes, background: tuple[int, int, int] | None = 
         sRGB.
     background : (int, int, int), optional
         Exact colour of pixels that do not count.
+    has_data : bool
+        Whether colours show numbers: the last colour of the colour map has one full channel, so
+        only two count.
     """
     colors = pixels[..., :3].reshape(-1, 3)
     if background is not None:
         colors = colors[(colors != np.array(background)).any(axis=1)]
-    burnt = (colors == 255).any(axis=1) | (colors <= _BLACK).all(axis=1)
+    full = (colors == 255).sum(axis=1) > has_data
+    burnt = full | (colors <= _BLACK).all(axis=1)
     return float(burnt.mean()) if len(burnt) else 0.0

@@ -1,4 +1,4 @@
-"""A body model that is a box, for sums by hand: three joints, two shapes, one corrective.
+"""A box-shaped body model for hand calculation: three joints, two shapes, one corrective.
 
 The box is 2 m high, 0.5 m wide and 0.25 m deep. Its joints are the middle, and the middles of the
 left (+x) and the right (-x) side, which follow the second and the third joint as a whole.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 HEIGHT, WIDTH, DEPTH = 2.0, 0.5, 0.25
-STATURE, GIRTH = 0.1, 0.2  # what a standard deviation adds to height and width, as shares
+STATURE, GIRTH = 0.1, 0.2  # relative change of height and width per standard deviation
 
 _FACES = (
     *((0, 1, 3), (0, 3, 2), (6, 7, 5), (6, 5, 4), (4, 5, 1), (4, 1, 0)),

@@ -15,7 +15,7 @@ NAMES = ("nose", "left_eye", "right_eye", "neck")
 
 
 def timing(present, rate=10.0, first=0):
-    """A timeline: true for frames that are there."""
+    """A timeline: true for present frames."""
     present = np.asarray(present, dtype=bool)
     rows = np.where(present, np.cumsum(present) - 1, -1)
     return Timing(rate, rows, first_frame=first, holds=False)

@@ -1,4 +1,4 @@
-"""Fixtures of the interface's tests: apps that are closed again, and tiny files."""
+"""Fixtures for interface tests: apps closed after each test, and tiny files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def drive():
 
 @pytest.fixture
 def hand(drive, rig):
-    """A hand on an app that shows the tiny figure."""
+    """A test driver on an app that shows the tiny figure."""
     return drive(*rig)
 
 
@@ -60,7 +60,7 @@ def drive_body(drive, tmp_path):
 
 @pytest.fixture
 def curves(drive, rig, tmp_path):
-    """A hand on the Curves panel of the tiny rig; the arm's curves are shown."""
+    """A test driver on the Curves panel of the tiny rig; the arm's curves are shown."""
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
     hand.show_panel("Curves")
@@ -73,13 +73,13 @@ def curves(drive, rig, tmp_path):
 
 @pytest.fixture
 def box(drive_body):
-    """A hand on an app that shows the box, with all of its panels in reach."""
+    """A test driver on an app that shows the box, with all of its panels in reach."""
     return drive_body()
 
 
 @pytest.fixture
 def texts(monkeypatch):
-    """What panels write as plain text, in the order of writing; empty the list to read anew."""
+    """Plain text shown by panels, in drawing order; clear the list to collect again."""
     written = []
 
     def recorder(write):

@@ -1,4 +1,4 @@
-"""A hand for the tests: mouse and keys for a HeadlessApp, aimed by the labels of widgets."""
+"""Test driver: mouse and keyboard input for a HeadlessApp, aimed by widget labels."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ class Driver:
     size, scale, pixels_per_point
         As for ``HeadlessApp``.
     samples : int
-        Of multisampling: 4 as in the window takes ten times as long without a graphics card.
+        Samples per pixel; 4, as in the window, takes ten times as long without a graphics card.
     scene : Scene, optional
         Shown in place of files.
     layout : str
-        Places of panels as ImGui remembers them.
+        Panel layout as saved by ImGui.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Driver:
     # Mouse
 
     def place(self, target, across=0.5, down=0.5):
-        """Return a point given as such, or in the widget of this label."""
+        """Return a given point, or a point in the widget with the given label."""
         if not isinstance(target, str):
             return target
         x0, y0, x1, y1 = self.state.item_rects[target]
@@ -167,7 +167,7 @@ class Driver:
                 self.step()
 
     def type(self, text):
-        """Type letters as a keyboard does: the key and the character."""
+        """Type letters like a keyboard: the key and the character."""
         for letter in text:
             code = getattr(imgui.Key, letter.lower() if letter.isalpha() else "", None)
             if code is not None:
@@ -192,7 +192,7 @@ class Driver:
             self.step(2)
 
     def show_panel(self, title):
-        """Click the tab of a panel that others may lie over."""
+        """Click the tab of a panel that may be hidden behind others."""
         rect = imgui.internal.find_window_by_name(title).dc.dock_tab_item_rect
         # Left of the cross that closes it.
         self.click((rect.min.x + 0.3 * (rect.max.x - rect.min.x), (rect.min.y + rect.max.y) / 2))
@@ -213,7 +213,7 @@ class Driver:
         self.wait_for_loader()
 
     def says(self, text):
-        """Return whether a message that goes away by itself contains a text."""
+        """Return whether a transient message contains a text."""
         return any(text in note.text for note in self.state.messages.notes)
 
     # What is shown
@@ -233,7 +233,7 @@ class Driver:
         return len(self.state.history._undo)
 
     def wait_for_loader(self):
-        """Run frames until the file that is being read is shown or refused."""
+        """Run frames until the file being loaded is shown or refused."""
         loader = self.state.of(Files).loader
         if loader is not None:
             loader.wait()
@@ -256,7 +256,7 @@ class Driver:
         return self.app.frame.scene_picture()
 
     def assert_sane(self):
-        """Check what must hold whatever the user does."""
+        """Check the invariants that hold whatever the user does."""
         camera = self.state.camera
         numbers = [*camera.target, camera.distance, camera.azimuth, camera.inclination, camera.fov]
         assert np.isfinite(numbers).all() and camera.distance > 0
@@ -273,7 +273,7 @@ class Driver:
 
 
 class _Held:
-    """Modifier keys that are down while a block runs."""
+    """Modifier keys held down while a block runs."""
 
     def __init__(self, driver, modifiers):
         self.driver, self.codes = driver, [MODIFIERS[name] for name in modifiers.split()]

@@ -1,4 +1,4 @@
-"""Made-up rigs for the tools that pose by hand, and where things are seen."""
+"""Synthetic rigs for the posing tools, and window positions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIZE = (1280, 800)
 
 
 def arm_figure(orders=("xyz", "z", "xyz"), limits=None, root="", name="arm", up="y") -> Figure:
-    """Return three joints along x, one unit apart; each turns about the axes of its word.
+    """Return three joints along x, one unit apart; each rotates about its named axes.
 
     ``root`` names translations of the first joint; ``limits`` are by (joint, axis).
     """
@@ -52,12 +52,12 @@ def seen_at(hand, point):
 
 
 def joint_seen(hand, joint):
-    """Return where a joint of the chosen actor is seen."""
+    """Return the window position of a joint of the active actor."""
     return seen_at(hand, posed_joint(hand.state.actor, joint).center)
 
 
 def around(center, radius, start, end, steps=8):
-    """Return places on a circle of the window, against the clock from +x, radians."""
+    """Return positions on a circle in the window, counter-clockwise from +x, radians."""
     return [
         (center[0] + radius * np.cos(a), center[1] - radius * np.sin(a))
         for a in np.linspace(start, end, steps)
@@ -65,7 +65,7 @@ def around(center, radius, start, end, steps=8):
 
 
 def drag_along(hand, places, held=""):
-    """Press at the first place and let go at the last."""
+    """Press at the first position and release at the last."""
     with hand.holding(held):
         hand.move(places[0])
         hand.press()

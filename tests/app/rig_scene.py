@@ -1,4 +1,4 @@
-"""A bent arm whose mesh, turned and thirty times as large, is to be rigged from the arm itself."""
+"""A bent arm whose mesh, rotated and scaled by thirty, is rigged from the arm itself."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def bent():
 
 
 def scan(figure, pose) -> Figure:
-    """Return the posed arm's mesh alone, elsewhere."""
+    """Return the posed arm's mesh alone, transformed."""
     positions = deform(figure, pose)[0] @ TRUE[:3, :3].T + MOVE
     return Figure("scan", mesh_of(positions, figure.mesh.triangles))
 
 
 def swing(figure) -> Clip:
-    """Return a motion of the arm: it moves along x by 1 and its tip turns about z by 1."""
+    """Return a motion of the arm: it moves along x by 1 and its tip rotates about z by 1."""
     channels = []
     for dof in range(figure.skeleton.n_dofs):
         last = 1.0 if dof in (0, 8) else 0.0
@@ -41,7 +41,7 @@ def swing(figure) -> Clip:
 
 
 def scene(with_template=True, with_clip=False) -> Scene:
-    """Return the mesh, and beside it the posed arm."""
+    """Return a scene of the mesh and the posed arm."""
     figure, pose = bent()
     actors = [Actor(scan(figure, pose))]
     if with_template:

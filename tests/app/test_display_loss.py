@@ -1,4 +1,4 @@
-"""An X server that goes away while the window is open."""
+"""Loss of the X server while the window is open."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ sys.exit(run(sys.argv[3:]))
 """
 
 
-# The same at start-up: when a step of it begins, the server is no longer there.
+# The same at start-up: the server has gone when a step begins.
 START = """
 import os, signal, sys
 from viewer.app.display import import_glfw
@@ -60,7 +60,7 @@ sys.exit(run(sys.argv[3:]))
 
 @pytest.fixture
 def server():
-    """An Xvfb of the test's own: its process and the display's name."""
+    """A separate Xvfb: its process and display name."""
     if shutil.which("Xvfb") is None:
         text = "Xvfb not installed"
         pytest.fail(text) if os.environ.get("CI") == "true" else pytest.skip(text)
@@ -78,7 +78,7 @@ def server():
 
 
 def ended(server, tmp_path, word="", program=PROGRAM):
-    """Return how the viewer ended whose display was taken away."""
+    """Return how the viewer ended after losing its display."""
     process, display = server
     environment = {
         **os.environ,
@@ -113,12 +113,12 @@ def test_lost_display_leaves_no_half_written_recording(server, tmp_path):
 
 
 @pytest.mark.parametrize("step", ["create_window", "make_context_current", "swap_interval"])
-def test_display_lost_at_start_is_told_alike(server, tmp_path, step):
+def test_display_lost_at_start_gives_the_same_message(server, tmp_path, step):
     check_end(ended(server, tmp_path, step, START), server[1])
 
 
-def test_handler_of_others_comes_back():
-    """Run in a process of its own, as Xlib has one handler for all."""
+def test_previous_handler_is_restored():
+    """Run in a separate process, as Xlib has one global handler."""
     program = (
         "import ctypes\n"
         "from viewer.app.display_loss import stop_watching, watch_display\n"

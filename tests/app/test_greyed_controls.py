@@ -19,7 +19,7 @@ NOTHING_MOVES = "no motion: open a clip, a capture or a BVH"
 
 @pytest.fixture
 def tooltips(monkeypatch):
-    """What tooltips said."""
+    """Tooltip texts."""
     said = []
 
     def record(text):
@@ -30,7 +30,7 @@ def tooltips(monkeypatch):
 
 
 def rest(hand, label):
-    """Let the mouse rest on a widget until its tooltip comes."""
+    """Rest the mouse on a widget until its tooltip appears."""
     hand.move(hand.place(label))
     hand.step(40)
 
@@ -45,7 +45,7 @@ def rest(hand, label):
         ("Hands", "this figure has no hands"),
     ],
 )
-def test_panels_that_have_nothing_to_show_are_greyed(hand, tooltips, title, why):
+def test_inapplicable_panels_are_greyed(hand, tooltips, title, why):
     hand.menu("menu Window", title)
     assert hand.state.of(ShownPanels).closed == set()
     if title not in hand.state.item_rects:
@@ -59,7 +59,7 @@ def test_space_without_motion_says_why_nothing_happens(hand):
     assert not hand.state.clock.playing and hand.says(NOTHING_MOVES)
 
 
-def test_controls_of_a_motion_act(drive, rig, tooltips):
+def test_motion_controls_work(drive, rig, tooltips):
     hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
     rest(hand, "Play")
     assert tooltips[-1] == "play or pause (Space)"
@@ -67,16 +67,16 @@ def test_controls_of_a_motion_act(drive, rig, tooltips):
     assert hand.state.clock.playing
 
 
-def test_gaps_can_be_filled_where_there_are_some(drive, rig):
+def test_gaps_can_be_filled_if_present(drive, rig):
     hand = drive(scene=people(rig, [True, False, True]), size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")
     assert hand.state.clock.interpolate_gaps
 
 
-def test_gaps_cannot_be_filled_where_there_are_none(drive, rig, tooltips):
+def test_filling_gaps_is_greyed_without_gaps(drive, rig, tooltips):
     scene = people(rig, [True] * 9)
     clip = scene.actors[0].clip
-    # Nobody is missing before the first and after the last frame either.
+    # Nobody is missing before the first or after the last frame either.
     scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")
@@ -107,7 +107,7 @@ def test_menu_of_a_figure_without_joints_is_greyed(drive, tooltips):
     assert tooltips[-1] == "only captured points move; there are no joints to export"
 
 
-def test_ways_to_draw_what_is_not_there_are_greyed(drive, tooltips):
+def test_inapplicable_display_modes_are_greyed(drive, tooltips):
     hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=(900, 1000), samples=1)
     before = hand.state.options.show
     for label, why in (
@@ -122,14 +122,14 @@ def test_ways_to_draw_what_is_not_there_are_greyed(drive, tooltips):
     assert hand.state.options.show == before and not hand.state.options.wireframe
 
 
-def test_texture_is_greyed_where_there_is_none(hand, tooltips):
+def test_texture_is_greyed_without_a_texture(hand, tooltips):
     hand.click("Texture")
     rest(hand, "Texture")
     assert hand.state.options.texture
     assert tooltips[-1] == "no figure in the scene has a texture: drop a picture on the window"
 
 
-def test_texture_can_be_switched_where_there_is_one(drive):
+def test_texture_can_be_toggled_if_present(drive):
     fox = drive(size=(900, 1000))
     fox.click("Texture")
     assert not fox.state.options.texture and fox.undo_steps == 1
@@ -148,7 +148,7 @@ def test_recording_waits_for_other_work(hand, tooltips):
     hand.state.job = None
 
 
-def test_window_goes_on_drawing_until_a_tooltip_is_due(drive, rig):
+def test_window_keeps_drawing_until_a_tooltip_is_due(drive, rig):
     hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
     context = hand.app._imgui
     hand.move(hand.middle)

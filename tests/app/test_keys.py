@@ -1,4 +1,4 @@
-"""The keyboard: every row of KEYS does what it says, and undo takes it back."""
+"""Shortcuts: every row of KEYS has its described effect, and undo reverts it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewer.app.keys import Keyboard
 OPTION_KEYS = {"w": "wireframe", "n": "normals", "t": "texture", "g": "grid"}
 
 
-def test_keys_are_told_apart_and_described():
+def test_shortcuts_are_unique_and_described():
     labels = [key.label for key in KEYS]
     chords = [int(chord) for key in KEYS for chord in key.chords]
     assert len(set(labels)) == len(labels) and len(set(chords)) == len(chords)
@@ -43,7 +43,7 @@ def test_s_toggles_the_skeleton(hand):
     assert hand.state.options.show == "skin"
 
 
-def test_k_toggles_the_binding_space(hand):
+def test_k_toggles_the_bind_pose(hand):
     attached = hand.scene_picture()
     hand.key("k")
     assert hand.state.options.show == "binding"
@@ -54,7 +54,7 @@ def test_k_toggles_the_binding_space(hand):
 
 
 @pytest.mark.parametrize("key", OPTION_KEYS)
-def test_letter_toggles_its_display_option_and_the_picture(drive, key):
+def test_letter_toggles_its_display_option_and_the_view(drive, key):
     hand = drive()  # the bundled figure: it has a texture
     before, picture = getattr(hand.state.options, OPTION_KEYS[key]), hand.scene_picture()
     hand.key(key)
@@ -81,7 +81,7 @@ def test_f_fits_the_posed_figure(hand):
     ("keys", "view"),
     [(("_1", "keypad1"), (0, 0)), (("_3", "keypad3"), (90, 0)), (("_7", "keypad7"), (0, 90))],
 )
-def test_digits_look_from_named_sides(hand, keys, view):
+def test_digits_choose_named_views(hand, keys, view):
     for key in keys:
         hand.state.camera.azimuth, hand.state.camera.inclination = 12.0, 34.0
         hand.key(key)
@@ -158,7 +158,7 @@ def test_letters_do_nothing_under_a_dialog_or_message(hand):
     assert hand.state.panels_visible
 
 
-def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch):
+def test_f12_saves_the_view_and_never_overwrites(hand, tmp_path, monkeypatch):
     folder = tmp_path / "pictures"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -176,7 +176,7 @@ def test_f12_saves_what_is_shown_and_never_replaces(hand, tmp_path, monkeypatch)
     assert hand.undo_steps == 1  # only the wireframe
 
 
-def test_f12_says_that_the_legend_is_not_in_the_picture(hand, tmp_path, monkeypatch):
+def test_f12_reports_that_the_legend_is_not_in_the_image(hand, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = 'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
     hand.key("f12")
@@ -246,7 +246,7 @@ def test_undo_and_redo_walk_over_pose_and_display(hand, redo):
     assert now() == states[-1]
 
 
-def test_new_change_after_undo_forgets_redo(hand):
+def test_new_edit_after_undo_clears_redo(hand):
     hand.key("w")
     hand.key("z", "ctrl")
     hand.key("g")
@@ -276,7 +276,7 @@ def test_menu_entries_act(hand):
 
 
 @pytest.mark.parametrize("key", ["q", "w"])
-def test_modifier_let_go_within_the_frame_of_the_letter_still_counts(hand, key):
+def test_modifier_released_in_the_same_frame_still_counts(hand, key):
     hand.io.add_key_event(imgui.Key.mod_ctrl, True)
     hand.step()
     hand.io.add_key_event(getattr(imgui.Key, key), True)

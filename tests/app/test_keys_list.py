@@ -1,4 +1,4 @@
-"""The list of keys: whole in columns of letters of usual size, scrolled where there is no room."""
+"""The shortcut list: complete columns at the usual text size, scrolled if they do not fit."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ def test_list_lies_within_the_window_and_takes_no_input(drive, rig, size):
     assert hand.state.camera.distance < distance
 
 
-def test_all_lines_are_written_at_the_usual_size(drive, rig, texts):
+def test_all_lines_are_shown_at_the_usual_size(drive, rig, texts):
     hand = drive(*rig, size=(1200, 700), samples=1)
     texts.clear()
     listed(hand)
     assert {key.text for key in KEYS} | {text for _, text in MOUSE} <= set(texts)
 
 
-def test_wheel_scrolls_where_there_is_no_room(drive, rig):
+def test_wheel_scrolls_if_the_list_does_not_fit(drive, rig):
     hand = drive(*rig, size=(600, 300), samples=1)
     window = listed(hand)
     assert window.pos.y >= 0 and window.pos.y + window.size.y <= 300
     line = imgui.get_text_line_height_with_spacing()
-    # Its height is that of all lines, less what is seen.
+    # The scroll range is the height of all lines minus the visible part.
     assert window.scroll_max.y == pytest.approx(N_LINES * line - window.size.y, abs=3 * line)
     distance = hand.state.camera.distance
     for _ in range(40):

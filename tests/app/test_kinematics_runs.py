@@ -13,7 +13,7 @@ from viewer.rig import kinematics
 
 @pytest.fixture
 def runs(monkeypatch):
-    """How many poses forward kinematics ran for."""
+    """Number of poses that forward kinematics ran for."""
     counted, run = [], kinematics.forward_kinematics
 
     def count(parents, local, root=None):

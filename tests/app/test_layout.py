@@ -1,4 +1,4 @@
-"""Panels, sizes and scales: what is closed comes back, and clicks hit at every scale."""
+"""Panels, sizes and scales: closed panels reopen, and clicks hit at every scale."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_panel_closes_by_its_cross(hand):
 
 def test_all_panels_closed_leave_the_view(hand):
     for panel in PANELS.values():
-        if not panel.needs and not panel.on_demand:  # the others are not there
+        if not panel.needs and not panel.on_demand:  # the others are closed
             hand.menu("menu Window", panel.title)
     hand.step(3)
     x, _y, width, height = hand.state.view_rect
@@ -58,7 +58,7 @@ def test_reset_layout_keeps_pose_and_camera(hand):
 
 
 @pytest.mark.parametrize("size", [(900, 640), (640, 480), (320, 240), (50, 40), (8, 8), (1, 1)])
-def test_small_windows_draw_without_a_fault(drive, rig, size):
+def test_small_windows_draw_without_errors(drive, rig, size):
     hand = drive(*rig, size=size)
     hand.key("s")
     hand.key("f")
@@ -85,7 +85,7 @@ def test_window_shrinks_to_nothing_and_grows_again(hand):
     assert hand.dof("arm.x") != FILE_POSE["arm.x"]
 
 
-def test_view_of_no_width_or_height_is_skipped(hand):
+def test_view_of_zero_size_is_skipped(hand):
     for rect in ((0, 0, 0, 0), (0, 0, 0, 50), (0, 0, 50, 0), (0, 0, 0.2, 0.2), (0, 0, -5, 9)):
         hand.state.view_rect = tuple(map(float, rect))
         hand.app.frame._draw_scene(1.0)
@@ -96,7 +96,7 @@ def test_view_of_no_width_or_height_is_skipped(hand):
     ("pixels", "scale"),
     [(1.0, 1.0), (1.25, 1.0), (2.0, 1.0), (1.0, 1.5), (1.0, 2.0), (2.0, 2.0)],
 )
-def test_clicks_hit_at_every_scale(drive, rig, pixels, scale):
+def test_clicks_hit_their_target_at_every_scale(drive, rig, pixels, scale):
     hand = drive(*rig, size=(900, 640), pixels_per_point=pixels, scale=scale)
     assert hand.app.screen.size == (round(900 * pixels), round(640 * pixels))
     width, height = (round(side * pixels) for side in hand.state.view_rect[2:])
@@ -119,7 +119,7 @@ def test_unit_buttons_stay_within_the_panel(drive, rig, size, scale):
         assert hand.state.item_rects[label][2] <= hand.state.view_rect[0], label
 
 
-def test_scene_fills_exactly_its_place_in_the_window(drive, rig):
+def test_scene_fills_exactly_its_area_of_the_window(drive, rig):
     hand = drive(*rig, pixels_per_point=2.0)
     hand.state.panels_visible = False
     screen, scene = hand.screen(), hand.scene_picture()
@@ -128,7 +128,7 @@ def test_scene_fills_exactly_its_place_in_the_window(drive, rig):
     assert notes or np.abs(screen.astype(int) - scene[..., :3]).max() <= 1
 
 
-def test_background_that_is_transparent_shows_no_older_frame(hand):
+def test_transparent_background_shows_no_previous_frame(hand):
     hand.state.options.background = "transparent"
     hand.state.options.grid = False
     hand.key("tab")
@@ -150,7 +150,7 @@ def test_closed_panels_are_remembered(tmp_path, monkeypatch):
     assert load_closed_panels() == set()
 
 
-def test_changed_scale_enlarges_widgets_that_still_work(hand):
+def test_scaled_widgets_still_work(hand):
     from viewer.app.theme import change_scale
 
     x0, y0, x1, y1 = hand.state.item_rects["Reset (R)"]
@@ -164,7 +164,7 @@ def test_changed_scale_enlarges_widgets_that_still_work(hand):
     assert hand.state.actor.pose.dofs[0] == 0.0
 
 
-def test_menu_that_closes_leaves_the_timeline_before_the_curves(drive, rig):
+def test_closing_menu_keeps_the_timeline_tab_in_front_of_the_curves(drive, rig):
     hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
     assert "Scrubber" in hand.state.item_rects
     hand.click("menu Edit")
@@ -173,7 +173,7 @@ def test_menu_that_closes_leaves_the_timeline_before_the_curves(drive, rig):
     assert "Scrubber" in hand.state.item_rects and "plot" not in hand.state.item_rects
 
 
-def test_panel_that_a_remembered_layout_does_not_know_joins_its_neighbours(drive, rig):
+def test_panel_missing_from_a_saved_layout_docks_with_its_neighbours(drive, rig):
     hand = drive(*rig)
     sections = imgui.save_ini_settings_to_memory().split("\n\n")
     old = "\n\n".join(part for part in sections if not part.startswith("[Window][Weights]"))

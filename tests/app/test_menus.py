@@ -1,4 +1,4 @@
-"""The menus: the bundled body, models of a remembered folder, and what edits a pose."""
+"""The menus: the bundled body, models in a remembered folder, and pose editing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.models import load_model_folder, save_model_folder
 
 @pytest.fixture
 def models(tmp_path):
-    """A folder with three models and something else, as people unpack them."""
+    """A folder with three models and other files, as unpacked from their archives."""
     folder = tmp_path / "body models"
     (folder / "smplx").mkdir(parents=True)
     np.savez(folder / "SMPL_NEUTRAL.npz", **model("smpl"))
@@ -70,7 +70,7 @@ def test_model_opens_from_the_menu(hand, models):
     assert hand.state.paths == (models.resolve() / "smplx" / "SMPLX_FEMALE.npz",)
 
 
-def test_model_that_is_gone_or_broken_shows_its_message(hand, models):
+def test_missing_or_invalid_model_shows_a_message(hand, models):
     save_model_folder(models)
     _open_models(hand)
     (models / "SMPL_NEUTRAL.npz").write_text("gone")
@@ -80,7 +80,7 @@ def test_model_that_is_gone_or_broken_shows_its_message(hand, models):
     assert "SMPL_NEUTRAL.npz" in hand.state.error and hand.state.scene is scene
 
 
-def test_models_are_looked_for_whenever_the_menu_opens(hand, models):
+def test_menu_rescans_for_models_whenever_it_opens(hand, models):
     save_model_folder(models)
     _open_models(hand)
     for _ in range(2):
@@ -126,7 +126,7 @@ def test_folder_of_models_is_chosen_and_remembered(hand, models):
     assert hand.state.of(Files).dialog.folder == models.resolve()
 
 
-def test_cancelled_dialog_keeps_the_folder_that_was_remembered(hand, models, tmp_path):
+def test_cancelled_dialog_keeps_the_remembered_folder(hand, models, tmp_path):
     save_model_folder(tmp_path)
     _choose_folder(hand)
     hand.click("file body models")
@@ -135,7 +135,7 @@ def test_cancelled_dialog_keeps_the_folder_that_was_remembered(hand, models, tmp
     assert hand.state.of(Files).dialog is None and load_model_folder() == tmp_path.resolve()
 
 
-def test_dialog_starts_somewhere_if_the_remembered_folder_is_gone(hand, models, tmp_path):
+def test_dialog_starts_elsewhere_if_the_remembered_folder_is_missing(hand, models, tmp_path):
     save_model_folder(models)
     models.rename(tmp_path / "moved")
     _choose_folder(hand)
@@ -156,7 +156,7 @@ def test_folder_that_cannot_be_remembered_shows_why(hand, models):
     assert "models.json" in hand.state.error and "\n" not in hand.state.error
 
 
-def test_keys_for_poses_are_listed_and_shown(box, texts):
+def test_pose_shortcuts_are_listed_and_shown(box, texts):
     table = {key.label: key.text for key in KEYS}
     wanted = {
         "M": "mirror the pose left to right",
@@ -187,7 +187,7 @@ def test_edit_menu_copies_pastes_mirrors_and_resets(box):
     assert box.dof("joint_2.x") == 0
 
 
-def test_edits_of_a_pose_are_grey_without_one(drive, rig):
+def test_pose_edits_are_greyed_without_a_pose(drive, rig):
     hand = drive(rig[1])
     imgui.set_clipboard_text("kept")
     for entry in ("Mirror pose", "Copy pose", "Copy pose as numbers", "Paste pose"):
@@ -203,7 +203,7 @@ def test_edits_of_a_pose_are_grey_without_one(drive, rig):
     )
 
 
-def test_window_menu_closes_and_opens_the_new_panels(box):
+def test_window_menu_closes_and_opens_panels(box):
     box.show_panel("Shape")
     box.show_panel("Skinning")
     for title, label in (("Shape", "Random"), ("Skinning", "engine")):
@@ -226,7 +226,7 @@ def test_export_menu_writes_a_figure_without_a_skeleton(drive, rig, tmp_path):
     assert not hand.state.error and (tmp_path / "tiny.obj").is_file()
 
 
-def test_models_with_a_name_of_their_own_open_by_the_dialog(hand, tmp_path):
+def test_models_with_custom_names_open_by_the_dialog(hand, tmp_path):
     np.savez(tmp_path / "mine.npz", **arrays())
     hand.key("o", "ctrl")
     hand.step(3)

@@ -93,7 +93,7 @@ def test_drag_that_begins_on_a_slider_never_orbits(hand):
     assert _aim(hand.state.camera) == before
 
 
-def test_drag_that_begins_in_the_view_goes_on_over_panels(hand):
+def test_drag_that_begins_in_the_view_continues_over_panels(hand):
     before, pose = hand.state.camera.azimuth, hand.dofs()
     hand.pull(hand.middle, hand.place("root.x"))
     assert hand.state.camera.azimuth != before and (hand.dofs() == pose).all()

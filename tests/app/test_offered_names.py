@@ -14,12 +14,12 @@ from viewer.app.recording.state import KINDS, RecordSettings
 
 @pytest.fixture
 def recorded(drive, tmp_path):
-    """A hand on a recording of two people, drawn with the bundled body."""
+    """A test driver on a recording of two people, drawn with the bundled body."""
     folder = write_frames(tmp_path / "seq_smpl" / "smpl", {0: [body(0), body(7)], 1: [body(0)]})
     return drive(folder, samples=1, size=(1000, 700))
 
 
-def test_recordings_are_called_after_the_sequence(recorded):
+def test_recordings_are_named_after_the_sequence(recorded):
     offered = {}
     for kind in KINDS:
         _ask_where(recorded.state, RecordSettings(kind=kind))
@@ -29,7 +29,7 @@ def test_recordings_are_called_after_the_sequence(recorded):
     assert offered and offered == {kind: f"seq_smpl{kind}" for kind in offered}
 
 
-def test_what_one_person_gives_is_called_after_that_person(recorded):
+def test_files_for_one_person_are_named_after_them(recorded):
     state = recorded.state
     state.choose_actor(1)
     recorded.menu("menu File", "Save pose…")
@@ -39,19 +39,19 @@ def test_what_one_person_gives_is_called_after_that_person(recorded):
     assert state.of(Files).dialog.name == "seq_smpl_7.obj"
 
 
-def test_motions_of_all_are_called_after_the_sequence(recorded):
+def test_motions_of_everyone_are_named_after_the_sequence(recorded):
     ask_for_motion(recorded.state)
     assert recorded.state.of(Files).dialog.name.startswith("seq_smpl.")
 
 
-def test_screenshot_is_called_after_the_sequence(recorded, tmp_path, monkeypatch):
+def test_screenshot_is_named_after_the_sequence(recorded, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recorded.key("f12")
     recorded.step(2)
     assert (tmp_path / "seq_smpl.png").is_file()
 
 
-def test_figure_and_its_clip_are_called_after_the_figure(hand):
+def test_figure_and_clip_files_are_named_after_the_figure(hand):
     state = hand.state
     new_clip(state)
     hand.step(2)
@@ -62,7 +62,7 @@ def test_figure_and_its_clip_are_called_after_the_figure(hand):
     assert state.of(Files).dialog.name == "tiny_sheet.png"
 
 
-def test_name_with_a_slash_offers_no_folder(hand):
+def test_name_with_a_slash_does_not_suggest_a_folder(hand):
     hand.state.actor.called = "../a b"
     hand.menu("menu File", "Export…")
     assert hand.state.of(Files).dialog.name == ".._a_b.obj"

@@ -1,6 +1,6 @@
-"""Golden pictures of the interface, compared coarsely: letters differ between machines.
+"""Golden images of the interface, compared coarsely: letters differ between machines.
 
-``make golden NAME…`` draws them anew; look at them before they are committed.
+``make golden NAME…`` re-renders them; review them before committing.
 """
 
 from __future__ import annotations
@@ -144,16 +144,16 @@ def _shown(hand, prepare):
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", STATES)
-def test_interface_looks_as_it_did(drive, rig, name):
+def test_interface_matches_golden_images(drive, rig, name):
     _compare(_shown(drive(*rig, size=SIZE, samples=4), STATES[name]), name)
 
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", BODIES)
-def test_panels_of_bodies_look_as_they_did(drive_body, name):
+def test_body_panels_match_golden_images(drive_body, name):
     kind, prepare = BODIES[name]
     hand = drive_body(kind, size=BODY_SIZE)
-    hand.state.of(ShownPanels).closed.add("stats")  # its times are others every time
+    hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
 
@@ -168,7 +168,7 @@ def _compare(pixels, name):
     assert _is_like(pixels, wanted), _difference(pixels, wanted)
 
 
-def test_comparison_tells_states_apart(drive, rig):
+def test_comparison_distinguishes_states(drive, rig):
     hand = drive(*rig, size=SIZE, samples=4)
     start = _shown(hand, _nothing)
     hand.state.of(ShownPanels).closed.add("stats")

@@ -1,4 +1,4 @@
-"""The key of the picture: every change of what is drawn changes it, and nothing else does."""
+"""The cache key of the view: every visible change changes it, and nothing else does."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_every_change_of_what_is_drawn_changes_the_key(state, name):
     assert keys.key(state, SIZE) == after
 
 
-def test_size_and_what_is_drawn_over_the_scene_are_part_of_the_key(state):
+def test_size_and_overlays_are_part_of_the_key(state):
     keys, marks = PictureKeys(), Marks(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2, 3)))
     known = [
         keys.key(state, SIZE),
@@ -172,7 +172,7 @@ def test_size_and_what_is_drawn_over_the_scene_are_part_of_the_key(state):
     assert keys.key(state, SIZE, marks) == known[2]
 
 
-def test_time_counts_only_where_motion_paths_are_drawn(state):
+def test_key_includes_time_only_if_motion_paths_are_drawn(state):
     keys = PictureKeys()
     before = keys.key(state, SIZE)
     state.scene.time = 1.0
@@ -183,7 +183,7 @@ def test_time_counts_only_where_motion_paths_are_drawn(state):
     assert keys.key(state, SIZE) != before
 
 
-def test_numbers_that_come_back_give_an_equal_key(state):
+def test_restored_values_give_an_equal_key(state):
     keys = PictureKeys()
     before = keys.key(state, SIZE)
     state.actor.pose.dofs[0] += 0.5

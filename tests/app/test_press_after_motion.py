@@ -1,6 +1,6 @@
-"""A pointer that moves and presses between two frames: the way to the press is no drag.
+"""Pointer motion and press between two frames: the motion before the press is not a drag.
 
-Remote desktops, tablets and slow machines hand over both at once.
+Remote desktops, tablets and slow machines deliver both at once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from viewer.app.posing.state import Posing
 
 @pytest.fixture(params=[True, False], ids=["trickled", "at once"])
 def spread(request):
-    """Whether ImGui spreads quick input over several frames; to be set in a hand's own io."""
+    """Whether ImGui spreads quick input over several frames; set in the io of a test driver."""
     return request.param
 
 
@@ -37,7 +37,7 @@ def _aim(camera):
 
 
 @pytest.mark.parametrize(("button", "held"), [(0, ""), (1, ""), (2, ""), (0, "shift")])
-def test_press_after_a_leap_leaves_the_camera(hand, spread, button, held):
+def test_press_after_a_pointer_jump_leaves_the_camera(hand, spread, button, held):
     x, y = hand.middle
     hand.move((x - 100, y - 80))
     before = _aim(hand.state.camera)
@@ -49,7 +49,7 @@ def test_press_after_a_leap_leaves_the_camera(hand, spread, button, held):
     assert _aim(hand.state.camera) == before
 
 
-def test_drag_after_a_leap_counts_from_the_press(hand, spread):
+def test_drag_after_a_pointer_jump_starts_at_the_press(hand, spread):
     x, y = hand.middle
     hand.move((x - 100, y - 80))
     azimuth, inclination = hand.state.camera.azimuth, hand.state.camera.inclination
@@ -84,7 +84,7 @@ def test_splitter_follows_the_pointer_from_the_press(hand, spread):
     assert _aim(hand.state.camera)[4:] == before[4:]
 
 
-def test_plot_of_curves_stays_under_a_press(drive, rig, tmp_path, spread):
+def test_curve_plot_does_not_move_on_press(drive, rig, tmp_path, spread):
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=(1280, 860), samples=1)
     hand.show_panel("Curves")
@@ -102,7 +102,7 @@ def test_plot_of_curves_stays_under_a_press(drive, rig, tmp_path, spread):
     assert hand.state.item_rects["key arm.x 0"][0] == pytest.approx(before[0] - 20, abs=0.5)
 
 
-def test_handle_of_a_joint_turns_from_the_press(hand, spread):
+def test_joint_handle_rotates_from_the_press(hand, spread):
     hand.state.selected_joint = 1
     hand.key("e")
     hand.step(2)
@@ -117,7 +117,7 @@ def test_handle_of_a_joint_turns_from_the_press(hand, spread):
 
 
 def _ring(hand):
-    """Return a place on a ring of the tool Rotate."""
+    """Return a position on a ring of the Rotate tool."""
     frame = view_frame(hand.state)
     center = joint_seen(hand, hand.state.selected_joint)
     places = around(center, RADIUS, 0.0, 2.0 * np.pi, 36)

@@ -1,4 +1,4 @@
-"""A monkey at mouse and keyboard: whatever it does, nothing is raised and numbers stay finite.
+"""Monkey test of mouse and keyboard: nothing is raised and values stay finite.
 
 VIEWER_MONKEY_EVENTS=20000 tries more by hand.
 """
@@ -84,7 +84,7 @@ class Monkey:
 
 
 def _rig_files(folder):
-    """Return what to open and what to drop: the tiny rig, parts of it, and what is broken."""
+    """Return files to open and to drop: the tiny rig, parts of it, and invalid files."""
     rig = write_rig(folder)
     bad = folder / "bad.skel"
     bad.write_text(SKEL[:100])
@@ -92,7 +92,7 @@ def _rig_files(folder):
 
 
 def _body_files(folder):
-    """Return what to open and what to drop: a body, its poses and textures, and what is broken."""
+    """Return files to open and to drop: a body, its poses and textures, and invalid files."""
     body, broken, empty = folder / "smplx.npz", folder / "broken.npz", folder / "empty"
     np.savez(body, **model("smplx"))
     broken.write_bytes(body.read_bytes()[:4000])
@@ -115,7 +115,7 @@ def _body_files(folder):
 
 
 def _keep_inside(folder, monkeypatch):
-    """Let dialogs wander wherever they like, but write into this folder only."""
+    """Let dialogs browse any folder, but write into this one only."""
     monkeypatch.setenv("HOME", str(folder))
     for name in ("save_pose", "save_export"):
         save = getattr(menus, name)

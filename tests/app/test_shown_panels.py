@@ -24,7 +24,7 @@ def test_opening_and_closing(hand):
     assert state.of(ShownPanels).opened == {"lint"} and not state.of(ShownPanels).closed
 
 
-def test_cross_of_its_tab_closes_a_panel_on_demand(hand):
+def test_tab_close_button_closes_a_panel_on_demand(hand):
     set_open(hand.state, "lint", True)
     hand.step(4)
     assert "Check" in hand.state.item_rects or "Recheck" in hand.state.item_rects

@@ -15,7 +15,7 @@ CTRL = 2
 
 @pytest.fixture
 def type_at_once(hand):
-    """A function that sends what a keyboard sends for a text, all of it between two frames."""
+    """A function that sends all key events of a text between two frames."""
     keys = TypedKeys()
 
     def send(letter, action, modifiers=0):
@@ -31,7 +31,7 @@ def type_at_once(hand):
     return type_text
 
 
-def test_text_that_is_typed_between_two_frames_arrives_whole(hand, type_at_once):
+def test_text_typed_between_two_frames_arrives_complete(hand, type_at_once):
     hand.click("Filter")
     type_at_once("abba cadabra".replace(" ", ""))
     hand.step(1)
@@ -60,7 +60,7 @@ def test_click_between_two_frames_acts_also_while_text_is_entered(hand, type_at_
     assert not hand.state.in_degrees
 
 
-def test_key_between_two_frames_acts_where_nothing_is_typed(hand, type_at_once):
+def test_shortcut_between_two_frames_acts_without_text_input(hand, type_at_once):
     was_on = hand.state.options.wireframe
     type_at_once("w")
     hand.step(3)
@@ -72,7 +72,7 @@ def test_key_between_two_frames_acts_where_nothing_is_typed(hand, type_at_once):
     [(A, 0, False), (A, CTRL, True), (ENTER, 0, True), (BACKSPACE, 0, True),
      (KEYPAD_1, 0, False), (KEYPAD_ENTER, 0, True)],
 )  # fmt: skip
-def test_only_keys_that_type_are_left_out(key, modifiers, passes):
+def test_only_text_keys_are_suppressed(key, modifiers, passes):
     keys = TypedKeys()
     assert keys.passes(key, PRESS, modifiers, is_typing=True) == passes
     assert keys.passes(key, REPEAT, modifiers, is_typing=True) == passes
@@ -80,7 +80,7 @@ def test_only_keys_that_type_are_left_out(key, modifiers, passes):
     assert keys.passes(key, RELEASE, modifiers, is_typing=True)  # known to be up
 
 
-def test_key_that_was_down_before_the_field_was_active_comes_up():
+def test_key_pressed_before_the_field_was_active_is_released():
     keys = TypedKeys()
     assert keys.passes(A, PRESS, 0, is_typing=False)
     assert keys.passes(A, RELEASE, 0, is_typing=True)

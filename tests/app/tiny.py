@@ -62,12 +62,12 @@ def write_rig(folder: Path, name: str = "tiny") -> tuple[Path, Path]:
 
 
 def chain(n_joints: int) -> str:
-    """Return a .skel in which every joint hangs on the one before."""
+    """Return a .skel in which every joint is a child of the previous one."""
     return "balljoint j { offset 0 0.1 0 " * n_joints + "}" * n_joints
 
 
 def comb(n_joints: int) -> str:
-    """Return a .skel in which every joint but the first hangs on the first, in a wide square."""
+    """Return a .skel in which every other joint is a child of the first, in a wide square."""
     side = int(n_joints**0.5) + 1
     joints = (
         f"balljoint j {{ offset {0.2 * (k % side):.1f} {0.2 * (k // side):.1f} 0 }}\n"

@@ -26,7 +26,7 @@ def mesh_of(positions, triangles) -> Mesh:
 
 
 def tube(around=16, along=21, length=2.0):
-    """Return a closed tube along y whose section differs in all directions, and grows upwards."""
+    """Return a closed tube along y with an asymmetric section that widens upwards."""
     angles = np.arange(around) * 2 * np.pi / around
     heights = np.linspace(0.0, length, along)
     section = np.stack([0.3 * np.cos(angles) + 0.08 * np.cos(2 * angles), 0.2 * np.sin(angles)], 1)

@@ -1,4 +1,4 @@
-"""The whole transfer, on targets whose rig is known."""
+"""The complete rigging pipeline on targets with a known rig."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def transferred():
     return figure, pose, target, transfer(figure, pose, target, QUICK)
 
 
-def test_the_templates_own_mesh_gets_its_rig_back(transferred):
+def test_template_mesh_gets_its_own_rig(transferred):
     figure, _, _, rigged = transferred
     size = 30.0 * 2.4
     assert_allclose(rigged.figure.mesh.positions, 30.0 * figure.mesh.positions, atol=1e-6 * size)
@@ -71,7 +71,7 @@ def test_the_templates_own_mesh_gets_its_rig_back(transferred):
     assert_allclose(dense[:, 1], fraction, atol=1e-6)
 
 
-def test_posed_again_it_is_the_target(transferred):
+def test_rigged_result_reproduces_the_target_pose(transferred):
     _, _, target, rigged = transferred
     assert_allclose(again(rigged), target.positions, atol=1e-10)
     assert rigged.residual < 1e-12
@@ -88,7 +88,7 @@ def test_target_is_not_altered_and_keeps_its_texture_coordinates(transferred):
     assert (rigged.figure.mesh.triangles == target.triangles).all()
 
 
-def test_target_that_is_inside_out_is_turned_round_in_the_result(transferred):
+def test_inside_out_target_is_flipped_in_the_result(transferred):
     figure, pose, target, rigged = transferred
     backwards = mesh_of(target.positions, target.triangles[:, ::-1])
     found = transfer(figure, pose, backwards, QUICK)
@@ -108,7 +108,7 @@ def test_target_that_is_inside_out_is_turned_round_in_the_result(transferred):
         (30.0, "", ("R014.unit-unknown", {})),
     ],
 )
-def test_unit_is_judged_by_size(scale, unit, line):
+def test_unit_is_inferred_from_size(scale, unit, line):
     figure, pose = bent_arm()
     rigged = transfer(replace(figure, unit="m"), pose, moved(figure, pose, scale), QUICK)
     assert rigged.figure.unit == unit
@@ -129,7 +129,7 @@ def test_the_templates_clip_plays(transferred):
     assert_allclose(deform(rigged.figure, other.pose)[0], expected, atol=1e-4)
 
 
-def test_scale_and_place_of_the_templates_pose_become_the_targets():
+def test_scale_and_placement_of_the_template_pose_are_transferred():
     figure, pose = bent_arm()
     pose.figure_scale = 3.0
     pose.figure_translation[:] = 1.0, 2.0, 3.0
@@ -138,7 +138,7 @@ def test_scale_and_place_of_the_templates_pose_become_the_targets():
     assert (rigged.figure_scale, rigged.length_scale) == (3.0, pytest.approx(1.0))
 
 
-def test_correctives_of_a_body_come_along():
+def test_body_correctives_are_transferred():
     actor = load(bundled_body()).actors[0]
     figure, pose = actor.figure, actor.pose
     names = figure.skeleton.names
@@ -158,7 +158,7 @@ def test_correctives_of_a_body_come_along():
 
 
 def test_joints_follow_the_surface_and_copies_do_not():
-    # Without alignment the target stands 0.1 beside the template. Closest points see the part of
+    # Without alignment the target is offset by 0.1. Closest points measure the component of
     # that across the surface: about half of it, as cos^2 around a section has the mean 1 / 2.
     figure, pose = arm(), rest_pose(arm().skeleton)
     target = mesh_of(figure.mesh.positions + np.array([0.1, 0, 0]), figure.mesh.triangles)
@@ -174,7 +174,7 @@ def test_joints_follow_the_surface_and_copies_do_not():
     assert_allclose(places["alignment"], [0, 1, 0], atol=1e-12)
 
 
-def test_nearest_follows_the_seed():
+def test_nearest_method_follows_the_seed():
     figure, pose = bent_arm()
     stretch, shift = np.array([4.0, 2.0, 3.0]), np.array([1.0, 0, 0])
     posed = deform(figure, pose)[0]
@@ -190,7 +190,7 @@ def test_nearest_follows_the_seed():
     assert rigged.lines[0].values == pytest.approx({"x": 0.25, "y": 0.5, "z": 1.0 / 3.0})
 
 
-def test_progress_rises_to_1_and_may_cancel():
+def test_progress_increases_to_1_and_may_cancel():
     figure, pose = bent_arm()
     steps = []
     target = moved(figure, pose)
@@ -209,7 +209,7 @@ def test_progress_rises_to_1_and_may_cancel():
         transfer(figure, pose, figure.mesh, still, report=stop)
 
 
-def test_joint_outside_the_target_is_told():
+def test_joint_outside_the_target_is_reported():
     # The inside of the template is solid; the target is two flat shells far from the axis.
     figure, pose = arm(), rest_pose(arm().skeleton)
     still = AlignmentSettings(matrix=np.eye(4))
@@ -251,13 +251,13 @@ def test_target_without_triangles_is_refused():
         ({"joints": "none"}, 'joints: expected surface or alignment, found "none"'),
     ],
 )
-def test_settings_that_do_not_exist_are_refused(settings, message):
+def test_unknown_settings_are_refused(settings, message):
     with pytest.raises(RigError) as problem:
         TransferSettings(**settings)
     assert str(problem.value) == message
 
 
-def test_scipy_that_is_missing_is_named(monkeypatch):
+def test_missing_scipy_is_named(monkeypatch):
     import sys
 
     figure, pose = bent_arm()

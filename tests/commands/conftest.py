@@ -1,4 +1,4 @@
-"""Fixtures of the tests of commands."""
+"""Fixtures for command tests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.cli import run
 
 @pytest.fixture
 def walk(tmp_path) -> list[str]:
-    """Files of the tiny rig and a clip of 1 s: it goes 4 along x, and its arm turns."""
+    """Files of the tiny rig and a clip of 1 s: the root moves 4 along x, and the arm rotates."""
     files = write_rig(tmp_path)
     clip = tmp_path / "walk.anim"
     # Three translations, then x, y, z of the root and of the arm.
@@ -24,7 +24,7 @@ _DRAFT = ("--quality", "draft")  # the quickest
 
 @pytest.fixture
 def draw(tmp_path, capsys):
-    """Return a function that renders files into a name with options, and returns what is said."""
+    """Return a function that renders files with options and returns the messages."""
 
     def command(files, name, *options, size="64x48", code=0):
         out = str(tmp_path / name)

@@ -1,4 +1,4 @@
-"""Motions for the tests of ``viewer render``, and their pictures."""
+"""Motions for the tests of ``viewer render``, and their images."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``viewer convert`` with captures: keypoints alone, people who are away, or without a track."""
+"""``viewer convert`` with captures: keypoints alone, absent people, and untracked people."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ def test_keypoints_are_written_person_by_person(keypoints, tmp_path, capsys):
         assert np.isnan(arrays["points"][2, 1]).all()
 
 
-def test_keypoints_that_hang_are_written_upright(keypoints, tmp_path):
+def test_upside_down_keypoints_are_written_upright(keypoints, tmp_path):
     assert convert(keypoints, "--up=-z", "-o", tmp_path / "m.npz") == 0
     with np.load(tmp_path / "m-4.npz") as arrays:
         assert str(arrays["up"]) == "z"
         assert_allclose(arrays["points"][2, 0], [2, 0, -1.6], rtol=0, atol=1e-15)
 
 
-def test_keypoints_at_one_frame_keep_their_numbers(keypoints, tmp_path, capsys):
+def test_keypoints_at_one_frame_keep_the_frame_number(keypoints, tmp_path, capsys):
     assert convert(keypoints, "-o", tmp_path / "m.npz", "--frame", 11) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [
         "kp body25 4: absent at that time, not written"
@@ -78,7 +78,7 @@ def test_keypoints_at_one_frame_keep_their_numbers(keypoints, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("arguments", [["m.bvh"], ["m"], ["m.npz", "--as", "amass"]])
-def test_keypoints_alone_are_no_motion_of_joints(keypoints, tmp_path, capsys, arguments):
+def test_keypoints_alone_are_not_joint_motion(keypoints, tmp_path, capsys, arguments):
     name, *others = arguments
     assert convert(keypoints, "-o", tmp_path / name, *others) == 2
     assert capsys.readouterr().err == (
@@ -88,7 +88,7 @@ def test_keypoints_alone_are_no_motion_of_joints(keypoints, tmp_path, capsys, ar
     assert not [*tmp_path.glob("m*")]
 
 
-def test_keypoints_beside_bodies_are_said_to_be_left_out(recording, tmp_path, capsys):
+def test_keypoints_omitted_next_to_bodies_are_reported(recording, tmp_path, capsys):
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
@@ -97,7 +97,9 @@ def test_keypoints_beside_bodies_are_said_to_be_left_out(recording, tmp_path, ca
 
 
 @pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w.glb"])
-def test_who_is_away_is_left_out_and_the_others_keep_their_names(recording, tmp_path, capsys, name):
+def test_absent_people_are_omitted_and_the_others_keep_their_names(
+    recording, tmp_path, capsys, name
+):
     assert convert(*recording, "-o", tmp_path / name, "--frames", "22:24") == 0
     stem, _, suffix = name.partition(".")
     assert [path.name for path in tmp_path.glob("w*")] == [f"{stem}-0.{suffix}"]
@@ -105,7 +107,7 @@ def test_who_is_away_is_left_out_and_the_others_keep_their_names(recording, tmp_
     assert lines[-1] == "take 7: absent in frames 22 to 23, not written"
 
 
-def test_who_is_away_is_left_out_of_folders(recording, tmp_path, capsys):
+def test_absent_people_are_omitted_from_folders(recording, tmp_path, capsys):
     assert convert(*recording, "-o", tmp_path / "w", "--frames", "23:24") == 0
     text = capsys.readouterr().out
     assert "1 frame of 1 person" in text and "take 7: absent in frame 23, not" in text
@@ -114,7 +116,7 @@ def test_who_is_away_is_left_out_of_folders(recording, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w.glb", "w"])
-def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path, capsys, name):
+def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path, capsys, name):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
@@ -123,14 +125,14 @@ def test_nobody_there_is_refused_before_anything_is_written(recording, tmp_path,
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
-def test_nobody_there_at_one_time_is_refused(recording, tmp_path, capsys):
+def test_time_at_which_everyone_is_absent_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
     message = "nobody is present at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 
-def test_people_without_a_track_have_names_of_their_own(recording, tmp_path, capsys):
+def test_untracked_people_have_unique_names(recording, tmp_path, capsys):
     frames = {0: [body(-1), body(3), body(-1, seed=1.0)], 1: [body(3), body(-1)]}
     folder = write_frames(tmp_path / "un" / "smpl", frames)
     assert convert(folder, *recording[1:], "-o", tmp_path / "w.bvh") == 0
@@ -144,7 +146,7 @@ def test_people_without_a_track_have_names_of_their_own(recording, tmp_path, cap
     assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # whoever has a track comes first
 
 
-def test_people_without_a_track_come_back_without_one(recording, tmp_path):
+def test_untracked_people_round_trip_untracked(recording, tmp_path):
     frames = {0: [body(-1), body(3), body(-1, seed=1.0)], 1: [body(3), body(-1)]}
     folder = write_frames(tmp_path / "un" / "smpl", frames)
     assert convert(folder, *recording[1:], "-o", tmp_path / "back") == 0
@@ -164,7 +166,7 @@ def test_motion_of_one_frame_is_written(recording, tmp_path):
     assert lines[lines.index("MOTION") + 1] == "Frames: 1"
 
 
-def test_keypoints_that_hang_are_written_upright_at_one_frame_too(keypoints, tmp_path):
+def test_upside_down_keypoints_are_written_upright_at_one_frame_too(keypoints, tmp_path):
     assert convert(keypoints, "--up=-z", "-o", tmp_path / "m.npz", "--frame", 12) == 0
     with np.load(tmp_path / "m-4.npz") as arrays:
         assert str(arrays["up"]) == "z"

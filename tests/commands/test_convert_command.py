@@ -1,4 +1,4 @@
-"""``viewer convert``: what a person asks for is what another program reads."""
+"""``viewer convert``: the requested output, verified by independent readers."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_every_member_of_the_family_is_posed(tmp_path, kind):
     assert_allclose(found["own_numbers"], pose, rtol=0, atol=EXACT)
 
 
-def test_ply_holds_the_same(tmp_path):
+def test_ply_holds_the_same_mesh(tmp_path):
     path, arrays = write_model(tmp_path)
     out = tmp_path / "person.ply"
     assert run(["convert", path, "--pose", listed(POSE), "-o", str(out)]) == 0
@@ -102,14 +102,14 @@ def test_pose_may_be_a_file(tmp_path, suffix):
     assert_allclose(found["vertices"], smpl_forward(arrays, shape, POSE)[0], rtol=0, atol=EXACT)
 
 
-def test_shape_given_goes_before_that_of_the_pose_file(tmp_path):
+def test_shape_option_overrides_the_pose_file(tmp_path):
     path, arrays = write_model(tmp_path)
     (tmp_path / "pose.json").write_text(json.dumps({"poses": POSE.tolist(), "betas": [9, 9]}))
     found = arrays_of(tmp_path, path, "--pose", tmp_path / "pose.json", "--shape", "1")
     assert_allclose(found["vertices"], smpl_forward(arrays, [1.0], POSE)[0], rtol=0, atol=EXACT)
 
 
-def test_expression_moves_the_columns_behind_the_shape(tmp_path):
+def test_expression_uses_the_columns_after_the_shape(tmp_path):
     path, arrays = write_model(tmp_path, "flame", 32)
     found = arrays_of(tmp_path, path, "--shape", "1,2", "--expression", "-1.5,0,3")
     vertices, _ = smpl_forward(arrays, [1, 2, -1.5, 3], columns=[0, 1, 10, 12])
@@ -125,14 +125,14 @@ def test_hands_are_the_mean_or_flat(tmp_path, which):
     assert_allclose(found["vertices"], vertices, rtol=0, atol=EXACT)
 
 
-def test_pose_numbers_follow_the_hands(tmp_path):
+def test_pose_values_follow_the_hands(tmp_path):
     path, arrays = write_model(tmp_path, "mano", 32)
     pose = 0.1 * np.arange(48.0)
     found = arrays_of(tmp_path, path, "--hands", "mean", "--pose", listed(pose))
     assert_allclose(found["vertices"], smpl_forward(arrays, (), pose)[0], rtol=0, atol=1e-11)
 
 
-def test_correctives_may_be_left_out(tmp_path):
+def test_correctives_may_be_disabled(tmp_path):
     path, arrays = write_model(tmp_path)
     found = arrays_of(tmp_path, path, "--pose", listed(POSE), "--no-correctives")
     vertices, _ = smpl_forward(arrays, (), POSE, correct=False)
@@ -142,7 +142,7 @@ def test_correctives_may_be_left_out(tmp_path):
 # DOFs, clips
 
 
-def test_dofs_pose_and_place(tmp_path):
+def test_dofs_pose_and_place_the_figure(tmp_path):
     rig = write_twist(tmp_path)
     dofs = ["--dof", "low.z=90deg", "--dof", "figure.scale=2", "--dof", "figure.ty=10"]
     found = arrays_of(tmp_path, *rig, *dofs)
@@ -171,7 +171,7 @@ def test_clip_poses_at_a_time_or_frame(tmp_path, options, x):
     assert_allclose(found["joints"], [[x, 0, 0], [x, 1, 0]], rtol=0, atol=EXACT)
 
 
-def test_mirror_exchanges_the_arms(tmp_path):
+def test_mirror_swaps_the_arms(tmp_path):
     (tmp_path / "arms.skel").write_text(ARMS_SKEL)
     options = ["--dof", "left.z=0.5", "--dof", "root.tx=3", "--mirror"]
     found = arrays_of(tmp_path, tmp_path / "arms.skel", *options)
@@ -204,7 +204,7 @@ def test_method_decides_the_radius_of_a_twist(tmp_path, options, radius):
     assert_allclose(found["vertices"], expected, rtol=0, atol=EXACT)
 
 
-def test_influences_are_cut_and_weights_normalised(tmp_path):
+def test_influences_are_pruned_and_weights_normalised(tmp_path):
     rows = [f"0 {vertex} {0.5 if vertex == 1 else 1}" for vertex in range(7)]
     weights = "\n".join([*rows, "0 7 0.6", "1 7 0.3"])
     box = write_box(tmp_path / "box", skinning_weights=weights)
@@ -282,12 +282,12 @@ def test_several_actors_become_numbered_files(tmp_path, capsys):
     counts = [" 3 vertices, 1 triangle", " 3 vertices, 1 triangle", " 48 vertices, 92 triangles"]
     paths = [out, tmp_path / "out-2.obj", tmp_path / "out-3.obj"]
     assert lines == [f"{path}:{text}" for path, text in zip(paths, counts, strict=True)]
-    # Where they stand in the scene is no part of them.
+    # Placement in the scene is not exported.
     assert_array_equal(read_obj(paths[1]).v, read_obj(paths[0]).v)
     assert_allclose(read_obj(paths[2]).v, arrays["v_template"], rtol=0, atol=DIGITS)
 
 
-def test_numbered_file_that_exists_stops_before_any_is_written(tmp_path, capsys):
+def test_existing_numbered_file_stops_before_any_is_written(tmp_path, capsys):
     (tmp_path / "out-2.obj").write_text("precious")
     rigs = [*write_twist(tmp_path, "a"), *write_twist(tmp_path, "b")]
     assert run(["convert", *rigs, "-o", str(tmp_path / "out.obj")]) == 5
@@ -296,7 +296,7 @@ def test_numbered_file_that_exists_stops_before_any_is_written(tmp_path, capsys)
     assert (tmp_path / "out-2.obj").read_text() == "precious"
 
 
-def test_actor_that_cannot_be_written_takes_the_others_back(tmp_path, capsys):
+def test_actor_that_cannot_be_written_reverts_the_others(tmp_path, capsys):
     rig = write_twist(tmp_path)
     (tmp_path / "arms.skel").write_text(ARMS_SKEL)
     (tmp_path / "out.obj").write_text("precious")
@@ -337,7 +337,7 @@ def test_impossible_output_is_one_line(tmp_path, capsys, out, code, message):
 
 
 @pytest.mark.parametrize("out", ["x" * 300 + ".obj", "a\0b.npz", "x" * 300 + ".skel"])
-def test_impossible_name_is_exit_code_5(tmp_path, capsys, out):
+def test_invalid_output_name_is_exit_code_5(tmp_path, capsys, out):
     assert run(["convert", *write_twist(tmp_path), "-o", f"{tmp_path}/{out}"]) == 5
     error = capsys.readouterr().err
     assert error.startswith("viewer: ") and error.count("\n") == 1

@@ -1,4 +1,4 @@
-"""``viewer convert`` with motions: which exporter, which frames, which files, and refusals."""
+"""``viewer convert`` with motions: exporters, frames, files, and refusals."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_one_pose_where_a_time_is_given(walk, tmp_path):
         assert arrays["vertices"].ndim == 2
 
 
-def test_people_get_files_of_their_own(recording, tmp_path, capsys):
+def test_each_person_gets_a_file(recording, tmp_path, capsys):
     assert convert(*recording, "-o", tmp_path / "walk.bvh") == 0
     written = sorted(path.name for path in tmp_path.glob("*.bvh"))
     assert written == ["walk-0.bvh", "walk-3.bvh"]
@@ -99,7 +99,7 @@ def test_people_get_files_of_their_own(recording, tmp_path, capsys):
     assert "missing frames 2" in text or "missing frame 2" in text
 
 
-def test_captures_become_amass_and_come_back(recording, tmp_path):
+def test_captures_round_trip_through_amass(recording, tmp_path):
     assert convert(*recording, "-o", tmp_path / "m.npz") == 0
     source = viewer.load(recording[0], motion=viewer.loading.MotionSettings(model=recording[2]))
     for actor in source.actors:
@@ -139,7 +139,7 @@ def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_pa
         (["-o", "w.bvh", "--digits", "0"], "--digits: expected 1 to 15, found 0"),
     ],
 )  # fmt: skip
-def test_refusals(walk, tmp_path, monkeypatch, capsys, arguments, message):
+def test_invalid_requests_are_refused(walk, tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     before = set(tmp_path.iterdir())
     assert run(["convert", *walk, *arguments]) in (2, 5)
@@ -163,7 +163,7 @@ def test_existing_files_need_force(walk, tmp_path, capsys):
     assert (tmp_path / "w.bvh").read_text().startswith("HIERARCHY")
 
 
-def test_worlds_that_hang_head_down_are_written_upright(recording, tmp_path):
+def test_upside_down_worlds_are_written_upright(recording, tmp_path):
     # With y pointing down, a body's joints come out turned by half a turn about x.
     assert convert(*recording, "--up=-y", "-o", tmp_path / "a.npz", "--as", "npz") == 0
     assert convert(*recording, "--up=y", "-o", tmp_path / "b.npz", "--as", "npz") == 0
@@ -183,7 +183,7 @@ def test_worlds_that_hang_head_down_are_written_upright(recording, tmp_path):
         (["-o", "w.skel", "--as", "easymocap"], ("--as easymocap", "/", "found w.skel")),
     ],
 )
-def test_name_that_cannot_be_is_a_usage_error_before_anything_is_read(
+def test_invalid_name_is_a_usage_error_before_anything_is_read(
     tmp_path, monkeypatch, capsys, arguments, words
 ):
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""``viewer convert`` of one pose: at a frame or time, or of figures that nothing moves."""
+"""``viewer convert`` of one pose: at a frame or time, or of still figures."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert convert(arms, *options, "-o", out) == 0
     bvh = PlainBvh(out)
     assert bvh.n_frames == 1
-    # Turned by a right angle: what lay along x stands along y. The left hand turned out of there.
+    # Rotated by a right angle: x becomes y. The left hand turned out of there.
     places = bvh.places(0)
     assert_allclose(places["root"], [3, 0, 0], atol=PRINTED)
     assert_allclose(places["left"], [3, 1, 0], atol=PRINTED)
@@ -69,7 +69,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert lines[1:] == [STILL]
 
 
-def test_rest_frame_and_rate_are_as_asked(arms, tmp_path):
+def test_rest_frame_and_rate_are_as_requested(arms, tmp_path):
     out = tmp_path / "out.bvh"
     assert convert(arms, "--dof", "root.z=90deg", "--rest-frame", "--fps", 50, "-o", out) == 0
     bvh = PlainBvh(out)
@@ -94,7 +94,7 @@ def test_animals_become_bvh(tmp_path):
     assert_allclose(list(places.values()), np.tile([0, 0, -200], (6, 1)), atol=PRINTED)
 
 
-def test_several_figures_get_files_of_their_own(arms, tmp_path, capsys):
+def test_each_of_several_figures_gets_a_file(arms, tmp_path, capsys):
     assert convert(arms, *write_twist(tmp_path), "-o", tmp_path / "x.bvh") == 0
     assert written(tmp_path, "*.bvh") == ["x-2.bvh", "x.bvh"]
     assert PlainBvh(tmp_path / "x-2.bvh").names == ["low", "high"]
@@ -102,7 +102,7 @@ def test_several_figures_get_files_of_their_own(arms, tmp_path, capsys):
     assert len(lines) == 3 and lines[-1] == STILL
 
 
-def test_figures_without_joints_are_said_to_be_left_out(tmp_path, capsys):
+def test_omitted_figures_without_joints_are_reported(tmp_path, capsys):
     (tmp_path / "stone.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     files = [*write_twist(tmp_path), tmp_path / "stone.obj"]
     assert convert(*files, "-o", tmp_path / "x.bvh") == 0
@@ -142,7 +142,7 @@ def test_keys_hold_one_pose_and_move_the_rig_there(arms, tmp_path, capsys):
     assert_allclose(place["left_hand"], [3, 2, 0], atol=1e-6)
 
 
-def test_figures_that_move_otherwise_have_no_keys(tmp_path, capsys):
+def test_figures_without_dofs_have_no_keys(tmp_path, capsys):
     assert convert("--body", "-o", tmp_path / "x.anim") == 2
     assert capsys.readouterr().err == (
         "viewer: .anim needs a root translation and three angles per joint, as in .skel files; "
@@ -151,7 +151,7 @@ def test_figures_that_move_otherwise_have_no_keys(tmp_path, capsys):
     assert not written(tmp_path, "*")
 
 
-def test_mesh_alone_has_nothing_to_write_as_bvh(tmp_path, capsys):
+def test_mesh_alone_cannot_be_written_as_bvh(tmp_path, capsys):
     (tmp_path / "stone.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert convert(tmp_path / "stone.obj", "-o", tmp_path / "x.bvh") == 2
     message = "no file has a motion: a motion cannot be written"
@@ -193,7 +193,7 @@ def test_one_frame_of_a_clip_as_keys(tmp_path, capsys):
         assert_allclose(arrays["joints"][0], [1, 0, 0], atol=1e-6)
 
 
-def test_one_frame_of_a_capture_is_its_own(recording, tmp_path, capsys):
+def test_one_frame_of_a_capture_is_exact(recording, tmp_path, capsys):
     for options in (["--frame", 21], ["--time", 1 / 30]):
         out = tmp_path / f"{options[0][2:]}.bvh"
         assert convert(*recording, *options, "-o", out) == 0
@@ -207,7 +207,7 @@ def test_one_frame_of_a_capture_is_its_own(recording, tmp_path, capsys):
     assert "1 frame (21) at 30 fps" in capsys.readouterr().out.splitlines()[0]
 
 
-def test_one_frame_of_a_capture_goes_back_under_its_number(recording, tmp_path, capsys):
+def test_one_frame_of_a_capture_keeps_its_number(recording, tmp_path, capsys):
     assert convert(*recording, "--frame", 21, "-o", tmp_path / "out") == 0
     (path,) = (tmp_path / "out" / "smpl").iterdir()
     assert path.name == "000021.json"
@@ -230,7 +230,7 @@ def test_numbered_mesh_of_one_frame(recording, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["w.bvh", "w", "w.obj"])
-def test_who_is_away_at_that_frame_is_left_out(recording, tmp_path, capsys, name):
+def test_people_absent_at_that_frame_are_omitted(recording, tmp_path, capsys, name):
     assert convert(*recording, "--frame", 22, "-o", tmp_path / name) == 0
     if name == "w":
         records = json.loads((tmp_path / "w" / "smpl" / "000022.json").read_text())
@@ -258,7 +258,7 @@ def test_bodies_are_written_without_their_keypoints(recording, tmp_path, capsys,
     assert capsys.readouterr().out.splitlines()[-1] == POINTS
 
 
-def test_still_figures_beside_a_motion_are_said_to_be_left_out(arms, tmp_path, capsys):
+def test_still_figures_omitted_next_to_a_motion_are_reported(arms, tmp_path, capsys):
     rig = write_twist(tmp_path)
     (tmp_path / "walk.anim").write_text(clip_text())
     files = [*rig, tmp_path / "walk.anim", arms]
@@ -275,7 +275,7 @@ def test_still_figures_beside_a_motion_are_said_to_be_left_out(arms, tmp_path, c
 @pytest.mark.parametrize(
     ("gaps", "ids"), [([], [0]), (["--gaps", "hold"], [0, 7]), (["--gaps", "split"], [0])]
 )
-def test_gaps_of_folders_and_meshes_are_closed_if_asked(recording, tmp_path, gaps, ids):
+def test_gaps_in_folders_and_meshes_are_closed_if_asked(recording, tmp_path, gaps, ids):
     assert convert(*recording, *gaps, "-o", tmp_path / "out") == 0
     records = json.loads((tmp_path / "out" / "smpl" / "000022.json").read_text())
     assert [record["id"] for record in records] == ids
@@ -286,7 +286,7 @@ def test_gaps_of_folders_and_meshes_are_closed_if_asked(recording, tmp_path, gap
     assert written(tmp_path, "m_22*") == [f"m_22-{person}.obj" for person in ids]
 
 
-def test_gaps_of_keypoints_are_interpolated_or_refused(recording, tmp_path, capsys):
+def test_gaps_in_keypoints_are_interpolated_or_refused(recording, tmp_path, capsys):
     folder = tmp_path / "kp" / "keypoints3d"
     first, last = points(0, seed=1.0), points(0, seed=2.0)
     write_frames(folder, {0: [first], 1: [], 2: [last]})

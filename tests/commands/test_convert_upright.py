@@ -1,4 +1,4 @@
-"""Single poses of captures as files: y is up in glTF, and others say what is."""
+"""Single poses of captures as files: y is up in glTF, and other formats record the up axis."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OVER = np.diag([1.0, -1.0, -1.0])
 
 @pytest.fixture
 def recording(tmp_path):
-    """A model with y up, and a folder of two frames in which somebody stands along z."""
+    """A model with y up, and a folder of two frames with a person upright along z."""
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     folder = tmp_path / "take" / "smpl"
@@ -73,7 +73,7 @@ def test_standing_people_stand_in_gltf(recording, tmp_path):
     assert gltf.nodes[gltf.top(gltf.named("head"))]["name"] == "z up"
 
 
-def test_other_files_say_what_is_up(recording, tmp_path):
+def test_other_formats_record_the_up_axis(recording, tmp_path):
     convert(recording, tmp_path / "pose.obj")
     assert ": z up, metres\n" in (tmp_path / "pose.obj").read_text().partition("v ")[0]
     convert(recording, tmp_path / "pose.npz")

@@ -1,4 +1,4 @@
-"""Captures whose people hang head down come back from ``viewer convert`` as they were."""
+"""Upside-down captures round-trip through ``viewer convert``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def smpl(tmp_path):
 
 @pytest.fixture
 def hanging(tmp_path):
-    """Bodies that the fixture's other tests have standing along y, turned over by hand."""
+    """Bodies upright along y, turned upside down explicitly."""
     frames = {}
     for frame in range(3):
         record = body(0, seed=0.01 * frame)
@@ -46,7 +46,7 @@ def convert(*arguments):
     assert run(["convert", *map(str, arguments)]) == 0
 
 
-def test_world_that_hangs_is_announced_when_it_is_judged(hanging, smpl):
+def test_upside_down_world_is_reported_when_detected(hanging, smpl):
     scene = viewer.load(smpl, hanging)
     told = (
         f"{hanging}: -y up, estimated from the poses, so everything is flipped; --up overrides it"
@@ -56,7 +56,7 @@ def test_world_that_hangs_is_announced_when_it_is_judged(hanging, smpl):
     assert_allclose(scene.actors[0].placement[:3, :3], OVER, atol=1e-12)
 
 
-def test_easymocap_comes_back_with_its_own_numbers(hanging, smpl, tmp_path, capsys):
+def test_easymocap_round_trips_its_values(hanging, smpl, tmp_path, capsys):
     convert(hanging, "--model", smpl, "-o", tmp_path / "back")
     assert ", -y up; " in capsys.readouterr().out
     for found, wanted in zip(records(tmp_path / "back"), records(hanging), strict=True):
@@ -64,7 +64,7 @@ def test_easymocap_comes_back_with_its_own_numbers(hanging, smpl, tmp_path, caps
             assert_allclose(found[key], wanted[key], atol=1e-9)
 
 
-def test_amass_has_the_captures_own_numbers_and_comes_back(hanging, smpl, tmp_path):
+def test_amass_keeps_the_capture_values_and_round_trips(hanging, smpl, tmp_path):
     convert(hanging, "--model", smpl, "-o", tmp_path / "m.npz")
     (path,) = tmp_path.glob("m*.npz")
     first = viewer.load(smpl, hanging)
@@ -88,7 +88,7 @@ def test_amass_has_the_captures_own_numbers_and_comes_back(hanging, smpl, tmp_pa
         assert_allclose(one.placement, other.placement, atol=1e-12)
 
 
-def test_amass_with_another_up_axis_asked_for_stands(hanging, smpl, tmp_path):
+def test_amass_with_another_requested_up_axis_is_upright(hanging, smpl, tmp_path):
     convert(hanging, "--model", smpl, "-o", tmp_path / "m.npz", "--to-up", "y")
     (path,) = tmp_path.glob("m*.npz")
     scene = viewer.load(smpl, path)
@@ -98,7 +98,7 @@ def test_amass_with_another_up_axis_asked_for_stands(hanging, smpl, tmp_path):
     assert joints[names.index("head")] > joints[names.index("pelvis")]
 
 
-def test_motion_that_does_not_say_what_is_up_is_judged_by_its_people(smpl, tmp_path):
+def test_up_axis_is_inferred_from_the_people_if_not_recorded(smpl, tmp_path):
     # A quarter turn about x stands the model's y up along z.
     poses = np.zeros((4, 72))
     poses[:, 0] = np.pi / 2

@@ -1,4 +1,4 @@
-"""--front and the first view: the same in pictures, in pictures with panels, and in the window."""
+"""--front and the first view: identical in images, images with panels, and the window."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def test_front_is_overridden(draw, front, azimuth):
     assert (draw(f"--front={front}") == _seen_from(draw.scene, azimuth)).all()
 
 
-def test_azimuth_counts_from_the_axes_whatever_the_front(draw):
+def test_azimuth_is_measured_from_the_axes_whatever_the_front(draw):
     for front in ("+z", "-x"):
         assert (draw(f"--front={front}", "--azimuth", "20") == _seen_from(draw.scene, 20)).all()
 
 
-def test_the_axis_that_points_up_is_no_front(tmp_path, capsys):
+def test_the_up_axis_cannot_be_the_front(tmp_path, capsys):
     skel, out = sided_skel(tmp_path / "a.skel", "+z"), tmp_path / "out.png"
     assert run(["render", str(skel), "-o", str(out), "--front=+y"]) == 2
     problem = capsys.readouterr().err
@@ -69,7 +69,7 @@ def test_the_axis_that_points_up_is_no_front(tmp_path, capsys):
 
 
 def test_window_gets_the_same_first_view(tmp_path):
-    """What ``viewer`` hands to the window, and what named views there count from."""
+    """The first view passed to the window, and the reference of its named views."""
     scene = viewer.load(sided_skel(tmp_path / "turned.skel", "-z"))
     parser = argparse.ArgumentParser()
     add_camera_arguments(parser)
@@ -82,8 +82,8 @@ def test_window_gets_the_same_first_view(tmp_path):
     assert (plain.front, plain.azimuth, plain.inclination) == (180.0, -145.0, 15.0)
 
 
-def test_picture_with_panels_fits_the_view_between_them_for_the_whole_motion(tmp_path):
-    """The figure of the picture with panels is nowhere cut off, and no smaller than it need be."""
+def test_image_with_panels_fits_the_whole_motion_between_them(tmp_path):
+    """In the image with panels the figure is not clipped, and no smaller than necessary."""
     from app.captured import people
     from app.tiny import write_rig
 

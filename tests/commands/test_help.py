@@ -18,7 +18,7 @@ def parser_of(command: str) -> argparse.ArgumentParser:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_no_option_is_undocumented(command):
+def test_every_option_is_documented(command):
     for action in parser_of(command)._actions:
         assert action.help and len(action.help) > 8, action.option_strings
 
@@ -41,7 +41,7 @@ def test_no_option_is_undocumented(command):
         ),
     ],
 )
-def test_groups_follow_the_order_of_work(command, titles):
+def test_option_groups_follow_the_order_of_work(command, titles):
     groups = [group for group in parser_of(command)._action_groups if group._group_actions]
     assert groups[0].title == "options"
     assert [action.dest for action in groups[0]._group_actions] == ["help"]

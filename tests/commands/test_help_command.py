@@ -13,25 +13,27 @@ from viewer.manual import PAGES, page_text
 
 
 class Terminal(io.StringIO):
-    """Standard output that says it is a terminal."""
+    """Standard output that claims to be a terminal."""
 
     def isatty(self) -> bool:
         return True
 
 
-def test_alone_it_lists_all_topics_and_commands(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_topic_it_lists_all_topics_and_commands(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert run(["help"]) == 0
     printed = capsys.readouterr().out
     assert all(f"  {topic} " in printed and text in printed for topic, text in PAGES.items())
     assert ", ".join(COMMANDS) in printed
 
 
-def test_into_a_pipe_a_page_is_printed_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pages_are_printed_verbatim_into_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["help", "keys"]) == 0
     assert capsys.readouterr().out == page_text("keys")
 
 
-def test_at_a_terminal_tables_are_laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_are_laid_out_at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -43,12 +45,12 @@ def test_at_a_terminal_tables_are_laid_out(monkeypatch: pytest.MonkeyPatch) -> N
     assert "reset the pose to that of the file" in printed
 
 
-def test_of_a_command_it_lists_the_options(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_for_a_command_lists_its_options(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["help", "diff"]) == 0
     assert capsys.readouterr().out.startswith("usage: viewer diff")
 
 
-def test_an_unknown_topic_is_one_line_with_the_nearest(
+def test_an_unknown_topic_suggests_the_nearest_in_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run(["help", "captres"]) == 2

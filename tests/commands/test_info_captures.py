@@ -1,4 +1,4 @@
-"""``viewer info`` of captures and morphs: who is where, what is up, which frames are missing."""
+"""``viewer info`` of captures and morphs: positions, up axis and missing frames."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def info(capsys):
     return lines
 
 
-def test_up_is_that_of_the_scene(info, tmp_path):
+def test_up_axis_is_that_of_the_scene(info, tmp_path):
     np.savez(tmp_path / "SMPL.npz", **model("smpl"))
     folder = write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
     lines, found, _ = info(folder, "--model", tmp_path / "SMPL.npz", "--up", "z")
@@ -34,7 +34,7 @@ def test_up_is_that_of_the_scene(info, tmp_path):
     assert found["actors"][0]["up"] == "z"
 
 
-def test_boxes_are_only_of_what_is_there(info, tmp_path):
+def test_boxes_cover_only_present_people(info, tmp_path):
     frames = {3: [standing(0, 0.0)], 4: [standing(0, 0.0), standing(4, 2.0)]}
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {**frames, 5: [standing(4, 2.0)]})
     lines, found, _ = info(folder)
@@ -57,7 +57,7 @@ def test_several_gaps_are_listed(info, tmp_path):
     assert lines[3] == "    4 frames are missing: 1, 3 to 4, 6"
 
 
-def test_keypoints_that_nobody_saw_have_no_box(info, tmp_path):
+def test_unseen_keypoints_have_no_box(info, tmp_path):
     unseen = {"id": 0, "keypoints3d": [[0.0] * 4] * 25}
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {0: [unseen], 1: [unseen]})
     lines, found, err = info(folder)
@@ -66,7 +66,7 @@ def test_keypoints_that_nobody_saw_have_no_box(info, tmp_path):
     assert err == "warning: kp: no keypoint of person 0 is ever visible: every confidence is 0\n"
 
 
-def test_morphs_are_listed_with_what_they_move(info, tmp_path):
+def test_morphs_are_listed_with_their_vertex_counts(info, tmp_path):
     skel, skin = write_rig(tmp_path)
     (tmp_path / "smile.morph").write_text(
         "positions 2 { 0 5 6 7  3 1 1 1 } normals 2 { 0 0 0 1  3 0 0 1 }"

@@ -1,4 +1,4 @@
-"""``viewer info``: numbers counted by hand, as text and as JSON."""
+"""``viewer info``: hand-counted values, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_tiny_rig_is_described_exactly(describe, tmp_path):
     assert skin["weight_sums"] == [1.0, 1.0] and skin["joints_without_vertices"] == []
 
 
-def test_text_says_the_same_in_words(tmp_path, capsys):
+def test_text_output_matches_json(tmp_path, capsys):
     assert run(["info", *map(str, write_rig(tmp_path))]) == 0
     text = capsys.readouterr().out
     for words in (
@@ -67,7 +67,7 @@ def test_parts_alone_are_described(describe, tmp_path):
     assert describe(skel)["actors"][0]["size"] > 1.8
 
 
-def test_dofs_given_are_described(describe, tmp_path):
+def test_given_dofs_are_described(describe, tmp_path):
     described = describe(*write_rig(tmp_path), "--dof", "arm.x=0.5")
     assert described["actors"][0]["skeleton"]["dof_table"][6]["value"] == 0.5
 
@@ -88,7 +88,7 @@ def test_names_are_printed_on_one_line(tmp_path, capsys):
     assert capsys.readouterr().out.splitlines()[0] == "two\\nlines"
 
 
-def test_course_skeleton_is_counted(describe, shared):
+def test_skel_files_are_counted(describe, shared):
     (actor,) = describe(shared / "test.skel")["actors"]
     skeleton = actor["skeleton"]
     # Six balljoints: 18 rotations and three translations of the root; knee_r has three limits.
@@ -102,7 +102,7 @@ def test_course_skeleton_is_counted(describe, shared):
 @pytest.mark.parametrize(
     ("name", "joints", "vertices", "triangles"), [("tube", 2, 240, 456), ("wasp", 23, 694, 1236)]
 )
-def test_course_figures_are_counted(describe, shared, name, joints, vertices, triangles):
+def test_skel_and_skin_pairs_are_counted(describe, shared, name, joints, vertices, triangles):
     (actor,) = describe(shared / f"{name}.skel", shared / f"{name}.skin")["actors"]
     # The counts that the files declare.
     assert actor["skeleton"]["joints"] == joints == actor["skin"]["bindings"]

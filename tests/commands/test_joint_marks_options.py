@@ -1,4 +1,4 @@
-"""--xray, --joint-names, --joint-axes, --bones: what is drawn, what is said."""
+"""--xray, --joint-names, --joint-axes, --bones: rendering and messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def rig(tmp_path):
 
 @pytest.fixture
 def render(tmp_path, capsys):
-    """Draw a picture; return its pixels, or None, with what was said to the error stream."""
+    """Render an image; return its pixels or None, and the error output."""
 
     def drawn(*arguments):
         path = tmp_path / "x.png"
@@ -30,7 +30,7 @@ def render(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("option", ["--xray", "--joint-names", "--joint-axes"])
-def test_option_changes_the_picture(render, rig, option):
+def test_option_changes_the_image(render, rig, option):
     plain, _ = render(*rig)
     marked, said = render(*rig, option)
     assert (plain != marked).any() and said == ""
@@ -43,7 +43,7 @@ def test_bones_are_drawn_in_the_given_style(render, rig, style):
     assert (plain != drawn).any() and said == ""
 
 
-def test_names_left_out_are_told(render, tmp_path):
+def test_omitted_names_are_reported(render, tmp_path):
     path = tmp_path / "heap.skel"
     path.write_text("balljoint a { " + "balljoint b { } " * 4 + "}")
     _, said = render(str(path), "--joint-names")
@@ -51,7 +51,7 @@ def test_names_left_out_are_told(render, tmp_path):
     assert said.endswith("warning: 1 of 5 joint names omitted: they would cover another\n")
 
 
-def test_what_no_figure_has_is_told(render, rig):
+def test_missing_joints_are_reported(render, rig):
     _, said = render(rig[1], "--xray", "--joint-names")
     assert "warning: --xray: no figure has a skeleton\n" in said
     assert "warning: --joint-names: no figure has a skeleton\n" in said

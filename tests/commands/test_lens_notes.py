@@ -1,4 +1,4 @@
-"""``viewer render --view`` through a lens that bends: what is left out is said with its size."""
+"""``viewer render --view`` with lens distortion: ignored distortion is reported with its size."""
 
 from __future__ import annotations
 
@@ -59,18 +59,18 @@ NOTE = "warning: camera 02: its lens distortion of up to 35.4 pixels is not draw
 
 
 @pytest.mark.parametrize("view", ["02", "2"])
-def test_lens_that_bends_is_said_with_its_size(recording, tmp_path, capsys, view):
+def test_ignored_lens_distortion_is_reported_with_its_size(recording, tmp_path, capsys, view):
     assert draw(recording, tmp_path / "a.png", "--view", view) == 0
     assert capsys.readouterr().err.endswith(NOTE)
 
 
-def test_pictures_in_motion_say_it_once(recording, tmp_path, capsys):
+def test_sequences_report_distortion_once(recording, tmp_path, capsys):
     assert draw(recording, tmp_path / "a_{frame}.png", "--view", "02") == 0
     assert capsys.readouterr().err.count(NOTE) == 1
 
 
 @pytest.mark.parametrize("options", [[], ["--view", "01"]])
-def test_what_cannot_be_seen_is_not_said(recording, tmp_path, capsys, options):
+def test_invisible_distortion_is_not_reported(recording, tmp_path, capsys, options):
     # 0.0005 * 0.5 * 500 sqrt(2) = 0.18 pixels.
     assert draw(recording, tmp_path / "a.png", *options) == 0
     assert "lens" not in capsys.readouterr().err

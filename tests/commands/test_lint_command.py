@@ -17,13 +17,13 @@ from viewer.loading import bundled_files
 
 @pytest.fixture
 def rig(tmp_path: Path) -> list[str]:
-    """A skeleton and a skin with one wrong sum of weights."""
+    """A skeleton and a skin with one wrong weight sum."""
     (tmp_path / "a.skel").write_text(skel_text.GOOD)
     (tmp_path / "a.skin").write_text(skin_text.GOOD.replace("2 0 0.25", "2 0 0.5", 1))
     return [str(tmp_path / "a.skel"), str(tmp_path / "a.skin")]
 
 
-def test_a_finding_is_a_line_with_its_place_and_a_hint(rig, capsys) -> None:
+def test_a_finding_is_a_line_with_location_and_hint(rig, capsys) -> None:
     assert run(["lint", *rig]) == 0
     lines = capsys.readouterr().out.splitlines()
     at = next(index for index, line in enumerate(lines) if " W001: " in line)
@@ -53,7 +53,7 @@ def test_errors_fail_by_default_and_come_first(rig, tmp_path: Path, capsys) -> N
     assert run(["lint", missing, "--fail-on", "never"]) == 0
 
 
-def test_ignored_codes_do_not_count(rig, capsys) -> None:
+def test_ignored_codes_do_not_affect_the_exit_code(rig, capsys) -> None:
     arguments = ["lint", *rig, "--fail-on", "warning", "--ignore"]
     found = json_of(["lint", *rig], capsys)["findings"]
     heavy = sorted({f["code"] for f in found if f["severity"] != "note"})
@@ -70,7 +70,7 @@ def json_of(arguments: list[str], capsys) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
-def test_json_holds_every_place(rig, capsys) -> None:
+def test_json_holds_every_location(rig, capsys) -> None:
     found = json_of(["lint", *rig], capsys)
     (weights,) = [f for f in found["findings"] if f["code"] == "W001"]
     assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 13, 0)
@@ -98,7 +98,7 @@ def test_the_bundled_figure_has_no_warnings(capsys) -> None:
     assert capsys.readouterr().out.endswith("0 errors, 0 warnings, 3 notes in 2 files\n")
 
 
-def test_a_sound_rig_and_the_body(tmp_path: Path, capsys) -> None:
+def test_valid_rig_and_body_have_no_findings(tmp_path: Path, capsys) -> None:
     assert run(["lint", *map(str, write_rig(tmp_path)), "--body"]) == 0
 
 
@@ -115,7 +115,7 @@ def test_a_size_limit_is_a_finding(rig, capsys) -> None:
     assert run(["lint", *rig, "--max-size", "ten"]) == 2
 
 
-def test_people_of_one_file_are_told_apart(shared_data: Path, capsys) -> None:
+def test_people_in_one_file_are_distinguished(shared_data: Path, capsys) -> None:
     points = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     assert run(["lint", str(points)]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if " C012: " in line]
@@ -137,7 +137,7 @@ def test_the_ground_is_an_option(tmp_path: Path, capsys) -> None:
     assert "--ground" in capsys.readouterr().err
 
 
-def test_frames_of_keys_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
+def test_keyed_frames_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
     still = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
     jump = "0 0 linear linear 1 0 linear linear 1.01 90 linear linear 2 90 linear linear"
     first = f"channel {{ extrapolate constant constant keys 4 {{ {jump} }} }}\n"
@@ -152,7 +152,7 @@ def test_frames_of_keys_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
     assert "1 of 49 frames: root moves" in out and "at frame 24, 1.014 s" in out
 
 
-def test_cures_fit_what_has_no_line(tmp_path: Path, capsys) -> None:
+def test_hints_suit_findings_without_a_line(tmp_path: Path, capsys) -> None:
     (tmp_path / "empty.skel").write_text("")
     (tmp_path / "bad.skel").write_text("balljoint a { offset 1 }")
     run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])

@@ -1,4 +1,4 @@
-"""``viewer info`` of body models: numbers worked out by hand, as text and as JSON."""
+"""``viewer info`` of body models: hand-calculated values, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_box_is_measured(describe, lines, box):
     assert "rest       3.000 m high, 6000.00 litres, 5910.0 kg at 985 kg/m3" in lines(box)
 
 
-def test_inside_out_box_is_measured_alike(describe, tmp_path):
+def test_inside_out_box_is_measured_the_same(describe, tmp_path):
     rows = (write_box(tmp_path / "good") / "faces_vert.txt").read_text().splitlines()
     flipped = "\n".join(" ".join(row.split()[::-1]) for row in rows)
     rest = describe(str(write_box(tmp_path / "box", faces_vert=flipped)))["rest"]
@@ -73,7 +73,7 @@ def test_inside_out_box_is_measured_alike(describe, tmp_path):
 
 
 def test_pose_does_not_change_the_rest_body(describe, box):
-    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # moved, turned, twice as large
+    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # moved, rotated, twice as large
     assert describe(box, "--pose", pose)["rest"]["height"] == pytest.approx(3)
 
 
@@ -94,7 +94,7 @@ def test_shape_changes_the_rest_body(describe, lines, body):
 # Facts and parts
 
 
-def test_facts_of_a_body_are_told(describe, lines, body):
+def test_body_facts_are_reported(describe, lines, body):
     path, _ = body
     found = describe(path)
     assert found["facts"] == {
@@ -110,7 +110,7 @@ def test_facts_of_a_body_are_told(describe, lines, body):
     assert "model      SMPL" in told and "correctives 207 columns" in told
 
 
-def test_expressions_are_a_group_of_their_own(describe, tmp_path):
+def test_expressions_are_a_separate_group(describe, tmp_path):
     np.savez(tmp_path / "face.npz", **model("flame", 32, n_shapes=10, n_expressions=5))
     found = describe(str(tmp_path / "face.npz"))
     assert [shape["group"] for shape in found["shapes"]] == ["shape"] * 10 + ["expression"] * 5
@@ -127,31 +127,33 @@ def test_parts_of_an_animal_are_counted(describe, lines, box):
     found = describe(box)
     assert found["body_parts"] == {"NOT_BODY": 0, "FEET": 4, "BACK": 4}
     assert found["reduced"] == {"vertices": 4, "triangles": 4}
-    assert found["asymmetry"] == 2  # y is 0 and 2, so partners miss the plane y = 0 by 1 each
+    assert (
+        found["asymmetry"] == 2
+    )  # y is 0 and 2, so mirror counterparts miss the plane y = 0 by 1 each
     told = lines(box)
     assert "parts      NOT_BODY 0, FEET 4, BACK 4" in told
     assert "reduced    4 vertices, 4 triangles" in told
     assert "symmetry   left and right differ by 2000 mm" in told
 
 
-def test_place_and_own_numbers_are_told(describe, box):
+def test_placement_and_raw_pose_values_are_reported(describe, box):
     numbers = [1, 2, 3, 0.1, 0.2, 0.3, *[0] * 12, 0, 0, -0.5, 1.5]
     found = describe(box, "--pose", ",".join(map(str, numbers)))
     assert found["figure_translation"] == [1, 2, 3] and found["figure_scale"] == 1.5
     assert found["own_numbers"] == pytest.approx(numbers)
 
 
-def test_plain_rig_has_no_facts(describe, tmp_path):
+def test_plain_rig_has_no_model_facts(describe, tmp_path):
     found = describe(*write_twist(tmp_path))
     assert not {"facts", "shapes", "rest", "body_parts", "keypoints", "asymmetry"} & set(found)
 
 
-# What ways of skinning change
+# Effects of skinning options
 
 
-def test_cut_of_six_influences_is_measured(describe, lines, box):
+def test_limit_of_six_influences_is_measured(describe, lines, box):
     # Vertex 7 follows joint 4 by 0.15; with four influences joints 0 to 3 are left of it.
-    # Whole, its distance from the axis is 1 - 2 * 0.15 of what the cut leaves alone.
+    # Whole, its distance from the axis is 1 - 2 * 0.15 of the distance without the limit.
     options = about_z(4, HALF_TURN)
     effects = describe(box, *options)["effects"]
     assert effects["pruned to 4 influences"] == pytest.approx(0.3 * ACROSS)
@@ -159,7 +161,7 @@ def test_cut_of_six_influences_is_measured(describe, lines, box):
     assert "effect     pruned to 4 influences: up to 671 mm in this pose" in lines(box, *options)
 
 
-def test_cut_of_ten_influences_is_measured_twice(describe, tmp_path):
+def test_limit_of_ten_influences_is_measured_twice(describe, tmp_path):
     weights = [f"0 {vertex} 1" for vertex in range(7)] + [f"{joint} 7 0.1" for joint in range(10)]
     box = write_box(
         tmp_path / "box",
@@ -172,7 +174,7 @@ def test_cut_of_ten_influences_is_measured_twice(describe, tmp_path):
     assert effects["pruned to 8 influences"] == pytest.approx(0.2 * ACROSS)
 
 
-def test_cut_of_a_figure_at_rest_has_no_effect(describe, lines, box):
+def test_limit_on_a_figure_at_rest_has_no_effect(describe, lines, box):
     assert describe(box)["effects"] == {}
     assert not [line for line in lines(box) if line.startswith("effect")]
 
@@ -216,14 +218,14 @@ def test_scaled_figure_shows_scaled_effects(describe, box):
     assert effects["pruned to 4 influences"] == pytest.approx(2 * 0.3 * ACROSS)
 
 
-def test_bundled_body_measures_as_a_grown_person(describe):
+def test_bundled_body_measures_as_an_adult(describe):
     found = describe("--body")
     assert 1.5 < found["rest"]["height"] < 2.0 and 45 < found["rest"]["mass"] < 100
     assert len(found["shapes"]) == 10 and found["facts"]["correctives"] == "207 columns"
     assert found["asymmetry"] < 1e-6
 
 
-def test_rounding_is_no_effect(describe, tmp_path):
+def test_rounding_is_not_an_effect(describe, tmp_path):
     # All turns as one piece, by an angle whose sine is no round number.
     box = str(write_box(tmp_path / "box", skinning_weights="\n".join(f"0 {v} 1" for v in range(8))))
     for angle in (0.1, 0.7, 2.0, 3.0):

@@ -27,7 +27,7 @@ FILES = {
 
 @pytest.fixture(autouse=True)
 def settings(tmp_path, monkeypatch):
-    """The file that remembers is this test's own."""
+    """A separate settings file for this test."""
     path = tmp_path / "settings" / "deeper" / "models.json"
     monkeypatch.setattr(models, "_settings_file", lambda: path)
     monkeypatch.chdir(tmp_path)
@@ -46,7 +46,7 @@ def folder(tmp_path):
 
 
 def told(capsys, *arguments):
-    """Return the name and the kind of the first figure that ``info`` opens."""
+    """Return the name and the family of the first figure that ``info`` opens."""
     assert run(["info", *arguments, "--json"]) == 0
     actor = json.loads(capsys.readouterr().out)["actors"][0]
     return actor["name"], actor["model"]["facts"]["model"]
@@ -76,7 +76,7 @@ def test_relative_folder_is_remembered_from_anywhere(folder, tmp_path, capsys, m
     assert told(capsys, "smplx:neutral")[1] == "SMPL-X"
 
 
-def test_another_folder_takes_its_place(folder, tmp_path, capsys):
+def test_new_folder_replaces_the_remembered_one(folder, tmp_path, capsys):
     (tmp_path / "other").mkdir()
     np.savez(tmp_path / "other" / "SMPL_MALE.npz", **model("smpl", 32))
     assert told(capsys, "mano:left", "--model-path", str(folder))
@@ -103,12 +103,12 @@ def test_model_is_found_by_its_published_name(folder, capsys, name, stem):
     assert told(capsys, name, "--model-path", str(folder))[0] == stem
 
 
-def test_kind_of_which_there_are_several_must_be_told(folder, capsys):
+def test_ambiguous_model_must_be_specified(folder, capsys):
     line = refused(capsys, "info", "mano", "--model-path", str(folder))
     assert "mano:left, mano:right" in line
 
 
-def test_unknown_name_lists_what_is_there(folder, capsys):
+def test_unknown_name_lists_available_models(folder, capsys):
     line = refused(capsys, "info", "smplx:male", "--model-path", str(folder))
     names = ", ".join(sorted(FILES.values()))
     assert line == (
@@ -122,11 +122,11 @@ def test_empty_folder_says_so(tmp_path, capsys):
     assert line.endswith("; available models: none")
 
 
-def test_without_a_folder_a_name_is_a_missing_file(capsys):
+def test_without_a_model_folder_a_name_is_a_missing_file(capsys):
     assert refused(capsys, "info", "smplx") == "smplx: cannot be read: No such file or directory"
 
 
-def test_file_that_exists_goes_before_a_model(folder, tmp_path, capsys):
+def test_existing_file_takes_precedence_over_a_model(folder, tmp_path, capsys):
     np.savez(tmp_path / "smplx", **model("flame", 32))  # numpy adds .npz
     (tmp_path / "smplx.npz").rename(tmp_path / "smplx")
     assert told(capsys, "smplx", "--model-path", str(folder))[1] == "FLAME"
@@ -138,7 +138,7 @@ def test_path_with_folders_is_never_a_model(folder, capsys):
 
 
 @pytest.mark.parametrize("what", ["missing", "file.txt"])
-def test_what_is_no_folder_is_refused_and_not_remembered(folder, tmp_path, settings, capsys, what):
+def test_non_folder_is_refused_and_not_remembered(folder, tmp_path, settings, capsys, what):
     (tmp_path / "file.txt").write_text("x")
     assert run(["info", "smplx", "--model-path", str(folder)]) == 0
     capsys.readouterr()
@@ -158,13 +158,13 @@ def test_what_is_no_folder_is_refused_and_not_remembered(folder, tmp_path, setti
         ("~nobody-of-this-name", "~nobody-of-this-name"),
     ],
 )
-def test_impossible_folder_is_refused(settings, capsys, name, shown):
+def test_invalid_folder_name_is_refused(settings, capsys, name, shown):
     line = refused(capsys, "info", "smplx", f"--model-path={name}")
     assert line == f"viewer: --model-path: expected a folder, found {shown}"
     assert not settings.exists()
 
 
-def test_settings_that_cannot_be_written_are_exit_code_5(folder, tmp_path, capsys):
+def test_unwritable_settings_are_exit_code_5(folder, tmp_path, capsys):
     (tmp_path / "settings").write_text("in the way")
     line = refused(capsys, "info", "smplx", "--model-path", str(folder), code=5)
     assert line.startswith(f"viewer: {tmp_path / 'settings'}")
@@ -173,27 +173,27 @@ def test_settings_that_cannot_be_written_are_exit_code_5(folder, tmp_path, capsy
 @pytest.mark.parametrize(
     "folder", ["5", '"gone"', '""', '"a\\u0000b"', '"\\ud800"', f'"{"x" * 5000}"', "[]"]
 )
-def test_remembered_folder_that_cannot_be_is_as_none(settings, capsys, folder):
+def test_invalid_remembered_folder_is_ignored(settings, capsys, folder):
     settings.parent.mkdir(parents=True)
     settings.write_text(f'{{"folder": {folder}}}')
     assert "smplx: " in refused(capsys, "info", "smplx")
 
 
 @pytest.mark.parametrize("text", ["", "[]", "null", "{}", "{", "\udcff", "[" * 100_000])
-def test_settings_that_make_no_sense_are_as_none(settings, capsys, text):
+def test_invalid_settings_are_ignored(settings, capsys, text):
     settings.parent.mkdir(parents=True)
     settings.write_bytes(text.encode("utf-8", "surrogateescape"))
     assert "smplx: " in refused(capsys, "info", "smplx")
 
 
-def test_npz_goes_before_pkl(tmp_path):
+def test_npz_takes_precedence_over_pkl(tmp_path):
     for name in ("a/SMPL_NEUTRAL.pkl", "b/SMPL_NEUTRAL.npz", "c/SMPL_NEUTRAL.pkl"):
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).touch()
     assert models.known_models(tmp_path) == {"smpl:neutral": tmp_path / "b" / "SMPL_NEUTRAL.npz"}
 
 
-def test_deep_and_unknown_files_are_left_alone(tmp_path):
+def test_deep_and_unknown_files_are_ignored(tmp_path):
     deep = tmp_path / "1" / "2" / "3" / "4"
     (deep / "5").mkdir(parents=True)
     (deep / "SMPL_MALE.npz").touch()
@@ -227,22 +227,20 @@ def test_body_opens_the_bundled_one(capsys):
     assert told(capsys, "--body") == ("body", "SMPL")
 
 
-def test_body_stands_beside_other_files(folder, capsys):
+def test_bundled_body_opens_together_with_other_files(folder, capsys):
     arguments = ["mano:left", "--body", "--model-path", str(folder), "--json"]
     assert run(["info", *arguments]) == 0
     actors = json.loads(capsys.readouterr().out)["actors"]
     assert [actor["name"] for actor in actors] == ["MANO_LEFT", "body"]
 
 
-def test_unknown_name_among_many_comes_with_the_nearest(folder, capsys, monkeypatch):
+def test_unknown_name_among_many_suggests_the_nearest(folder, capsys, monkeypatch):
     monkeypatch.setattr("viewer.commands._scene._MOST_MODELS", 2)
     line = refused(capsys, "info", "smplx:femal", "--model-path", str(folder))
     assert "; did you mean smplx:female" in line and "available models" not in line
 
 
-def test_unknown_name_of_a_model_that_draws_captures_lists_what_is_there(
-    folder, tmp_path, capsys, monkeypatch
-):
+def test_unknown_capture_model_lists_available_models(folder, tmp_path, capsys, monkeypatch):
     motion = tmp_path / "motion.npz"
     np.savez(motion, poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), mocap_framerate=30.0)
     line = refused(capsys, "info", str(motion), "--model", "smplx:mal", "--model-path", str(folder))

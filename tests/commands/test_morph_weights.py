@@ -62,14 +62,14 @@ def test_morphs_need_no_skeleton(folder):
     assert_allclose(moved[11], [0.2, 5, -0.2], atol=1e-12)
 
 
-def test_shapes_of_bodies_have_names_too(folder):
+def test_body_shapes_have_names_too(folder):
     by_place = vertices("smpl.npz", "--shape", "0,2")
     assert np.abs(by_place - vertices("smpl.npz")).max() > 1e-3
     assert (by_place == vertices("smpl.npz", "--shape", "shape 1=2")).all()
 
 
-def test_names_of_a_body_beside_a_morphed_rig(folder):
-    """A list goes to the body, whose coefficients it always meant; names go to who has them."""
+def test_names_of_a_body_opened_with_a_morphed_rig(folder):
+    """A list sets the coefficients of the body; names apply to the figures that have them."""
     first = vertices(*RIG, "smpl.npz", "--shape", "sharp=1")
     assert_allclose(first[11], [0.2, 5, -0.2], atol=1e-12)
     first = vertices(*RIG, "smpl.npz", "--shape", "1")
@@ -95,13 +95,13 @@ def test_names_of_a_body_beside_a_morphed_rig(folder):
         ),
     ],
 )
-def test_wrong_shapes_are_one_line(folder, capsys, files, text, message):
+def test_invalid_shapes_are_one_line(folder, capsys, files, text, message):
     (folder / "sub").mkdir()
     (folder / "sub" / "sharp.morph").write_text(WIDE)
     assert run(["info", *files, f"--shape={text}"]) == 2
     assert capsys.readouterr().err == f"viewer: --shape: {message}\n"
 
 
-def test_many_names_are_cut(folder, capsys):
+def test_long_name_lists_are_truncated(folder, capsys):
     assert run(["info", "smpl.npz", "--shape", "x=1"]) == 2
     assert 'no shape is called "x"; there are 10: ' in capsys.readouterr().err

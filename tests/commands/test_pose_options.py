@@ -1,4 +1,4 @@
-"""Options that shape, pose and skin, given wrongly: one line each, with what was expected."""
+"""Invalid shape, pose and skinning options: one line each, stating what was expected."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def refused(capsys, *arguments):
 
 
 def described(capsys, *arguments):
-    """Return what ``info --json`` says of the first actor, and the warnings on the way."""
+    """Return the ``info --json`` entry of the first actor, and the warnings."""
     assert run(["info", *arguments, "--json"]) == 0
     captured = capsys.readouterr()
     return json.loads(captured.out)["actors"][0], captured.err.splitlines()
@@ -130,7 +130,7 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ),
     ],
 )
-def test_wrong_value_is_refused_in_one_line(folder, capsys, arguments, message):
+def test_invalid_value_is_refused_in_one_line(folder, capsys, arguments, message):
     assert refused(capsys, *arguments.split(" ")) == f"viewer: {message}"
 
 
@@ -149,14 +149,14 @@ def test_wrong_value_is_refused_in_one_line(folder, capsys, arguments, message):
         "--shape",
     ],
 )
-def test_wrong_kind_of_value_names_the_help(folder, capsys, arguments):
+def test_value_of_the_wrong_type_refers_to_the_help(folder, capsys, arguments):
     line = refused(capsys, "smpl.npz", *arguments.split(" "))
     assert arguments.split(" ")[0] in line and "--help" in line
 
 
 @pytest.mark.parametrize("command", ["render", "convert", "view"])
 @pytest.mark.parametrize("options", ["--influences -1", "--shape fat", "--dof nose.x=1"])
-def test_every_command_refuses_alike(folder, capsys, monkeypatch, command, options):
+def test_every_command_refuses_in_the_same_way(folder, capsys, monkeypatch, command, options):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     out = {"render": ["-o", "x.png"], "convert": ["-o", "x.obj"], "view": []}[command]
@@ -167,27 +167,27 @@ def test_every_command_refuses_alike(folder, capsys, monkeypatch, command, optio
     assert sorted(folder.iterdir()) == before
 
 
-def test_long_nonsense_is_cut(folder, capsys):
+def test_long_invalid_input_is_truncated(folder, capsys):
     assert len(refused(capsys, "smpl.npz", "--shape", "x" * 10_000)) < 200
 
 
-def test_coefficients_of_0_beyond_the_last_are_no_fault(folder, capsys):
+def test_trailing_zero_coefficients_are_accepted(folder, capsys):
     actor, notes = described(capsys, "smpl.npz", "--shape", "1" + 15 * ",0")
     assert actor["model"]["shape_weights"] == [1, 0, 0, 0, 0, 0, 0, 0, 0, 0] and notes == []
 
 
 @pytest.mark.parametrize("text", ["1,-2", "1 -2", " 1, -2 ", "1,-2,", "+1,-2e0"])
-def test_numbers_may_be_written_in_any_way(folder, capsys, text):
+def test_numbers_may_use_any_notation(folder, capsys, text):
     actor, _ = described(capsys, "smpl.npz", f"--shape={text}")
     assert actor["model"]["shape_weights"][:3] == [1, -2, 0]
 
 
-def test_negative_number_first_is_no_option(folder, capsys):
+def test_leading_negative_number_is_not_an_option(folder, capsys):
     actor, _ = described(capsys, "smpl.npz", "--shape", "-1,2")
     assert actor["model"]["shape_weights"][:2] == [-1, 2]
 
 
-def test_dofs_beyond_limits_are_clamped_and_told(folder, capsys):
+def test_dofs_beyond_limits_are_clamped_with_a_note(folder, capsys):
     (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 rotylimit 0 0 }")
     actor, notes = described(capsys, "hinge.skel", "--dof", "hinge.x=2", "--dof", "hinge.y=1")
     assert notes == [
@@ -197,7 +197,7 @@ def test_dofs_beyond_limits_are_clamped_and_told(folder, capsys):
     assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
 
 
-def test_pose_numbers_beyond_limits_are_clamped_and_told(folder, capsys):
+def test_pose_values_beyond_limits_are_clamped_with_a_note(folder, capsys):
     (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 }")
     actor, notes = described(capsys, "hinge.skel", "--pose", "0,0,0,2,0,0")
     assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
@@ -217,7 +217,7 @@ def test_first_figure_that_fits_is_posed(folder, capsys):
     assert actors[1]["model"]["shape_weights"][0] == 1
 
 
-# Options of what is drawn
+# Display options
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ def test_first_figure_that_fits_is_posed(folder, capsys):
         ("arms.skel --hide-part HEAD", "--hide-part: no figure has body parts"),
     ],
 )
-def test_unknown_part_is_refused_before_anything_is_drawn(folder, capsys, arguments, message):
+def test_unknown_part_is_refused_before_rendering(folder, capsys, arguments, message):
     assert run(["render", *arguments.split(" "), "-o", "x.png"]) == 2
     assert capsys.readouterr().err == f"viewer: {message}\n"
     assert not (folder / "x.png").exists()
@@ -241,7 +241,7 @@ def test_unknown_part_is_refused_before_anything_is_drawn(folder, capsys, argume
 @pytest.mark.parametrize(
     ("option", "known"), [("--scalar", SCALARS), ("--shading", ["phong", "parts", "scalar"])]
 )
-def test_unknown_view_lists_what_there_is(folder, capsys, option, known):
+def test_unknown_view_lists_available_views(folder, capsys, option, known):
     assert run(["render", "pig", option, "beauty", "-o", "x.png"]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"viewer: argument {option}: ") and error.count("\n") == 1
@@ -283,7 +283,7 @@ def test_pose_file_is_refused_with_its_line(folder, capsys, case, option):
     assert all(word in said for word in words)
 
 
-def test_pose_archive_is_refused_by_its_name(folder, capsys):
+def test_pose_archive_error_names_the_key(folder, capsys):
     np.savez(folder / "p.npz", dofs=np.ones(1), dof_names=np.array(["left_hnd.x"]))
     said = refused(capsys, "arms.skel", "--pose", "p.npz")
     assert said.startswith("p.npz: expected ") and "did you mean left_hand?" in said
@@ -291,7 +291,7 @@ def test_pose_archive_is_refused_by_its_name(folder, capsys):
     assert refused(capsys, "arms.skel", "--pose", "q.npz").startswith("q.npz: expected 18 ")
 
 
-def test_mistyped_key_beside_others_is_a_warning_with_its_line(folder, capsys):
+def test_mistyped_key_among_valid_ones_is_a_warning_with_its_line(folder, capsys):
     (folder / "p.json").write_text('{"betas": [1],\n"trnsl": [1, 2, 3]}')
     _, said = described(capsys, "smpl.npz", "--pose", "p.json")
     assert len(said) == 1 and said[0].startswith("warning: p.json:2: ")

@@ -1,4 +1,4 @@
-"""``viewer render``: every option changes the picture as it says; outputs are never lost."""
+"""``viewer render``: every option has its described effect; outputs are never lost."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def draw(rig, tmp_path):
     return picture
 
 
-def test_picture_is_that_of_the_library(draw, rig):
+def test_image_matches_that_of_the_library(draw, rig):
     scene = viewer.load(*rig)
     assert (draw("--quality", "normal") == viewer.render(scene, size=(64, 48))).all()
 
@@ -67,7 +67,7 @@ def test_size_is_width_by_height(rig, tmp_path, size, capsys):
 @pytest.mark.parametrize(
     "size", ["0x5", "5x0", "-5x5", "5", "x", "5x", "axb", "5x5x5", "999999x9", ""]
 )
-def test_bad_size_is_refused(rig, tmp_path, size, capsys):
+def test_invalid_size_is_refused(rig, tmp_path, size, capsys):
     out = tmp_path / "x.png"
     assert run(["render", str(rig[0]), "-o", str(out), f"--size={size}"]) == 2
     assert "size" in capsys.readouterr().err and not out.exists()
@@ -92,7 +92,7 @@ def test_camera_options_aim_and_fit(draw, rig, options, change):
     assert (draw(*options) == viewer.render(scene, (64, 48), camera, DisplayOptions())).all()
 
 
-def test_distance_is_taken_as_given(draw, rig):
+def test_distance_is_used_as_given(draw, rig):
     scene = viewer.load(*rig)
     camera = Camera()
     fit(camera, scene_points(scene), 64 / 48)
@@ -119,7 +119,7 @@ def test_distance_is_taken_as_given(draw, rig):
         ["--show", "nothing"],
     ],
 )
-def test_bad_value_is_one_line(rig, tmp_path, options, capsys):
+def test_invalid_value_is_one_line(rig, tmp_path, options, capsys):
     out = tmp_path / "x.png"
     assert run(["render", str(rig[0]), "-o", str(out), *options]) in (2, 4)
     error = capsys.readouterr().err
@@ -142,7 +142,7 @@ def test_bad_value_is_one_line(rig, tmp_path, options, capsys):
         (["--samples", "1"], {"samples": 1}),
     ],
 )
-def test_display_options_show_what_they_say(draw, rig, options, change):
+def test_display_options_take_effect(draw, rig, options, change):
     scene, wanted = viewer.load(*rig), DisplayOptions(**change)
     picture = draw(*options)
     assert (picture == viewer.render(scene, (64, 48), options=wanted)).all()
@@ -159,7 +159,7 @@ def test_transparent_background_is_transparent(draw):
     assert picture[0, 0, 3] == 0 and picture[24, 32, 3] == 255
 
 
-def test_coloured_background_is_that_colour(draw):
+def test_coloured_background_has_that_colour(draw):
     picture = draw("--background", "#204060", "--no-grid")
     assert picture[0, 0].tolist() == [0x20, 0x40, 0x60, 255]
 
@@ -229,14 +229,14 @@ def test_dof_beyond_a_limit_is_clamped_with_a_warning(scene, text, value, limits
         ("#7.x=1", "no joint is called"),
     ],
 )
-def test_bad_dof_says_what_was_expected(rig, tmp_path, setting, words, capsys):
+def test_invalid_dof_reports_what_was_expected(rig, tmp_path, setting, words, capsys):
     arguments = ["render", *map(str, rig), "-o", str(tmp_path / "x.png"), "--dof", setting]
     assert run(arguments) == 2
     error = capsys.readouterr().err
     assert error.startswith("viewer: --dof: ") and words in error and error.count("\n") == 1
 
 
-def test_ambiguous_joint_is_told_apart_by_its_index(tmp_path, capsys):
+def test_ambiguous_joint_is_chosen_by_index(tmp_path, capsys):
     path = tmp_path / "twins.skel"
     path.write_text("balljoint a { balljoint knee { } balljoint knee { offset 1 0 0 } }")
     assert run(["info", str(path), "--dof", "knee.x=1"]) == 2
@@ -245,14 +245,14 @@ def test_ambiguous_joint_is_told_apart_by_its_index(tmp_path, capsys):
     assert "knee#2.x" in capsys.readouterr().out
 
 
-def test_dof_moves_the_figure_in_the_picture(draw):
+def test_dof_moves_the_figure_in_the_image(draw):
     assert (draw("--dof", "arm.z=90deg", "--dof", "root.x=-1") != draw()).any()
 
 
 # Outputs
 
 
-def test_existing_picture_is_replaced_only_with_force(rig, tmp_path, capsys):
+def test_existing_image_is_replaced_only_with_force(rig, tmp_path, capsys):
     out = tmp_path / "x.png"
     out.write_bytes(b"precious")
     arguments = ["render", *map(str, rig), "-o", str(out), "--size", "40x30"]
@@ -281,7 +281,7 @@ def test_input_is_never_replaced(rig, tmp_path, capsys):
         ("x" * 300 + ".png", "too long"),
     ],
 )
-def test_impossible_output_is_exit_code_5(rig, tmp_path, out, words, capsys):
+def test_unwritable_output_is_exit_code_5(rig, tmp_path, out, words, capsys):
     before = sorted(tmp_path.iterdir())
     assert run(["render", *map(str, rig), "-o", str(tmp_path / out), "--size", "40x30"]) == 5
     error = capsys.readouterr().err
@@ -304,7 +304,7 @@ def test_suffix_chooses_the_format(rig, tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".psd", ".fits"])
-def test_suffix_of_no_picture_is_refused_before_anything_is_read(tmp_path, suffix, capsys):
+def test_non_image_suffix_is_refused_before_anything_is_read(tmp_path, suffix, capsys):
     out = tmp_path / f"x{suffix}"
     assert run(["render", "missing.skel", "-o", str(out), "--size", "40x30"]) == 2
     error = capsys.readouterr().err
@@ -312,7 +312,7 @@ def test_suffix_of_no_picture_is_refused_before_anything_is_read(tmp_path, suffi
     assert not out.exists()
 
 
-def test_suffix_of_no_picture_goes_before_a_file_that_exists(tmp_path, capsys):
+def test_non_image_suffix_is_reported_before_an_existing_file(tmp_path, capsys):
     out = tmp_path / "x.psd"
     out.write_text("precious")
     assert run(["render", "missing.skel", "-o", str(out)]) == 2
@@ -322,7 +322,7 @@ def test_suffix_of_no_picture_goes_before_a_file_that_exists(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("suffix", [".xyz", ".svg", ".skin", ".avi"])
-def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, capsys):
+def test_image_with_a_wrong_suffix_is_refused(rig, tmp_path, suffix, capsys):
     out = tmp_path / f"x{suffix}"
     out.write_text("precious")
     assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 2
@@ -333,7 +333,7 @@ def test_picture_under_another_kind_of_name_is_refused(rig, tmp_path, suffix, ca
     assert out.read_text() == "precious"
 
 
-def test_kinds_of_video_are_listed_also_where_frames_are_asked_for(rig, tmp_path, capsys):
+def test_video_formats_are_listed_for_frame_ranges_too(rig, tmp_path, capsys):
     out = tmp_path / "x.mov"
     assert run(["render", *map(str, rig), "-o", str(out), "--frames", "0:5"]) == 2
     assert " or a video (.mp4, .webm, .gif), found .mov\n" in capsys.readouterr().err
@@ -347,7 +347,7 @@ def test_transparency_that_the_format_lacks_is_a_warning(rig, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("into", ["pipe", "file"])
-def test_picture_goes_through_standard_output(rig, tmp_path, into):
+def test_image_can_be_written_to_standard_output(rig, tmp_path, into):
     command = [
         sys.executable,
         "-m",
@@ -369,7 +369,7 @@ def test_picture_goes_through_standard_output(rig, tmp_path, into):
     assert done.returncode == 0
     data = target.read_bytes() if into == "file" else done.stdout
     assert Image.open(io.BytesIO(data)).size == (40, 30)
-    assert data.endswith(b"IEND\xaeB`\x82")  # no words after the picture
+    assert data.endswith(b"IEND\xaeB`\x82")  # no text after the image
     assert b"40 x 30" in done.stderr
 
 
@@ -384,7 +384,7 @@ def test_panels_draw_the_whole_interface(draw, rig, tmp_path):
     assert picture[240, 20, :3].max() < 100  # the Joints panel is dark
 
 
-def test_panels_take_the_distance_as_given(rig, tmp_path):
+def test_panels_keep_the_given_distance(rig, tmp_path):
     pictures = []
     for distance in ("2", "30"):
         out = tmp_path / f"{distance}.png"
@@ -394,7 +394,7 @@ def test_panels_take_the_distance_as_given(rig, tmp_path):
     assert np.abs(pictures[0] - pictures[1]).mean() > 3
 
 
-def test_panels_need_room(rig, tmp_path, capsys):
+def test_panels_need_a_minimum_size(rig, tmp_path, capsys):
     out = tmp_path / "x.png"
     assert run(["render", str(rig[0]), "-o", str(out), "--panels", "--size", "100x100"]) == 2
     assert "200 x 200" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""``viewer render`` of body models: each option changes the picture where it should."""
+"""``viewer render`` of body models: each option changes the expected part of the image."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def covered(picture):
 
 
 def rows(mask):
-    """Return the first and the last row in which something is."""
+    """Return the first and last non-empty row."""
     found = np.flatnonzero(mask.any(axis=1))
     return found[0], found[-1]
 
@@ -60,7 +60,7 @@ def hues(pixels):
 # Body parts
 
 
-def test_hidden_part_leaves_the_other(draw, tmp_path):
+def test_hiding_one_part_keeps_the_other(draw, tmp_path):
     # Two flags on one pole: one below, one above.
     flags = write_box(
         tmp_path / "flags",
@@ -89,7 +89,7 @@ def test_triangle_with_a_corner_in_a_shown_part_stays(draw, box):
     assert (covered(whole) == covered(open_box)).all()  # the inside is seen instead
 
 
-def test_all_parts_hidden_leave_nothing(draw, box):
+def test_hiding_all_parts_leaves_nothing(draw, box):
     picture = draw(box, "--hide-part", "FEET", "--hide-part", "back")
     assert not covered(picture).any()
 
@@ -109,13 +109,13 @@ def test_parts_have_colours(draw, box):
     assert np.abs(hues(picture[top + 2][mask[top + 2]]) - upper).max() < 0.1
 
 
-def test_parts_of_a_figure_without_any_are_plain(draw, tmp_path):
+def test_part_shading_without_parts_is_plain(draw, tmp_path):
     picture = draw(*write_rig(tmp_path), "--shading", "parts")
     found = hues(picture[covered(picture)])
     assert len(found) and np.ptp(found, axis=0).max() < 0.02
 
 
-# A coarser mesh
+# Reduced meshes
 
 
 def test_reduced_mesh_is_a_corner_of_the_box(draw, box):
@@ -124,10 +124,10 @@ def test_reduced_mesh_is_a_corner_of_the_box(draw, box):
     assert not (covered(reduced) & ~covered(whole)).any()
     # Seen along an axis, four corners of a box are half of its rectangle.
     assert covered(reduced).sum() / covered(whole).sum() == pytest.approx(0.5, abs=0.03)
-    assert rows(covered(reduced))[1] == rows(covered(whole))[1]  # all of its foot is there
+    assert rows(covered(reduced))[1] == rows(covered(whole))[1]  # its base is complete
 
 
-def test_reduced_mesh_changes_no_figure_that_has_none(draw, tmp_path):
+def test_reduced_mesh_option_does_not_affect_other_figures(draw, tmp_path):
     rig = write_rig(tmp_path)
     assert not differing(draw(*rig), draw(*rig, "--reduced")).any()
 
@@ -135,7 +135,7 @@ def test_reduced_mesh_changes_no_figure_that_has_none(draw, tmp_path):
 # Numbers as colours
 
 
-def test_cut_is_shown_where_there_are_many_influences(draw, box):
+def test_influence_limit_error_is_shown_where_there_are_many_influences(draw, box):
     # Joint 4 turns the corner (1, 2, 3), which alone has more than four influences.
     posed = [box, *SIDE, "--pose", pose_190(6, n17=math.pi)]
     changed = []
@@ -155,7 +155,7 @@ MOVING = [name for name, view in SCALARS.items() if view.moves and name not in L
 
 
 @pytest.mark.parametrize("name", MOVING)
-def test_every_number_of_a_figure_at_rest_is_0(draw, tmp_path, name):
+def test_every_error_of_a_figure_at_rest_is_0(draw, tmp_path, name):
     rig = [*write_rig(tmp_path), "--dof", "arm.x=0", "--dof", "arm.z=0"]
     picture = draw(*rig, "--scalar", name, "--flat")
     found = hues(picture[covered(picture)])
@@ -163,13 +163,13 @@ def test_every_number_of_a_figure_at_rest_is_0(draw, tmp_path, name):
     assert len(found) and np.ptp(found, axis=0).max() < 0.04
 
 
-def test_numbers_go_before_the_shading(draw, box):
+def test_scalar_view_overrides_the_shading(draw, box):
     one = draw(box, "--scalar", "asymmetry")
     assert not differing(one, draw(box, "--scalar", "asymmetry", "--shading", "parts")).any()
     assert differing(one, draw(box, "--shading", "parts")).any()
 
 
-def test_normalising_changes_numbers_and_mesh(draw, tmp_path):
+def test_normalising_changes_values_and_mesh(draw, tmp_path):
     rows_of = [f"0 {vertex} 1" for vertex in range(7)]
     box = write_box(tmp_path / "box", skinning_weights="\n".join([*rows_of, "0 7 0.5"]))
     raw, normal = (draw(box, *SIDE, *o, "--distance", "9") for o in ([], ["--normalize"]))
@@ -182,7 +182,7 @@ def test_normalising_changes_numbers_and_mesh(draw, tmp_path):
 # Keypoints
 
 
-def test_keypoints_are_small_marks(draw, tmp_path):
+def test_keypoints_are_drawn_as_small_markers(draw, tmp_path):
     np.savez(tmp_path / "body.npz", **model("smplx", 96))
     plain, marked = draw(tmp_path / "body.npz"), draw(tmp_path / "body.npz", "--keypoints")
     changed = differing(plain, marked)
@@ -202,7 +202,7 @@ def test_keypoints_follow_the_pose(draw, tmp_path):
     assert changed.any() and (changed & covered(plain)).sum() > 0.7 * changed.sum()
 
 
-def test_keypoints_change_no_figure_that_has_none(draw, box):
+def test_keypoint_option_does_not_affect_other_figures(draw, box):
     assert not differing(draw(box), draw(box, "--keypoints")).any()
 
 
@@ -225,7 +225,7 @@ def test_shape_and_pose_change_the_silhouette(draw, tmp_path, options):
     assert (covered(plain) != covered(changed)).sum() > 50
 
 
-def test_method_changes_the_picture(draw, tmp_path):
+def test_method_changes_the_image(draw, tmp_path):
     twisted = [*write_rig(tmp_path), "--dof", "arm.y=150deg"]
     lbs, dqs, mix = (draw(*twisted, "--method", name) for name in ("lbs", "dqs", "mix"))
     assert differing(lbs, dqs).any() and differing(lbs, mix).any() and differing(mix, dqs).any()

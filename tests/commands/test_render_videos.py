@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture
 def fox(tmp_path) -> list[str]:
-    """The bundled fox's files, and a clip of half a second that turns its head."""
+    """The bundled fox's files, and a half-second clip that rotates its head."""
     from viewer.loading import bundled_files
 
     channels = 3 + 3 * viewer.load().actors[0].figure.skeleton.n_joints
@@ -74,14 +74,14 @@ def test_video_shows_the_whole_clip(draw, fox, tmp_path, suffix):
         (["--turntable", "1", "--fps", "12.5"], 12, 12.5),
     ],
 )
-def test_video_has_as_many_frames_as_asked_for(draw, walk, tmp_path, options, count, rate):
+def test_video_has_the_requested_number_of_frames(draw, walk, tmp_path, options, count, rate):
     draw(walk, "x.mp4", *options, size="32x32")
     with av.open(str(tmp_path / "x.mp4")) as container:
         assert float(container.streams.video[0].average_rate) == rate
     assert len(frames(tmp_path / "x.mp4")) == count
 
 
-def test_video_that_skips_frames_keeps_the_motions_pace(draw, walk):
+def test_video_that_skips_frames_keeps_the_speed(draw, walk):
     said = draw(walk, "x.mp4", "--frames", "0:30:3", size="32x32")
     wanted = "10 frames, 1 s, 32 x 32, 10 frames per second (one of 3 frames, at the motion's own "
     assert f"{wanted}speed; --fps sets it), " in said.out and said.err == ""
@@ -90,7 +90,7 @@ def test_video_that_skips_frames_keeps_the_motions_pace(draw, walk):
     said = draw(walk, "z.gif", "--frames", "0:31:3", size="32x32")
     assert "11 frames, 1.1 s, 32 x 32, 10 frames per second (one of 3 frames" in said.out
     said = draw(walk, "{frame}.png", "--frames", "0:31:3", size="16x16")
-    assert "one of" not in said.out  # nobody plays pictures
+    assert "one of" not in said.out  # images are not played
 
 
 def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
@@ -101,7 +101,7 @@ def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
     assert np.abs(there[0] - back[0]).mean() > 4.0
 
 
-def test_turntable_needs_no_motion_and_ends_where_it_begins(draw, tmp_path):
+def test_turntable_needs_no_motion_and_loops(draw, tmp_path):
     draw([], "x.mp4", "--turntable", "1", "--no-grid", "--video-quality", "95")
     shown = frames(tmp_path / "x.mp4")
     assert len(shown) == 30
@@ -116,7 +116,7 @@ def test_turntable_of_one_frame_of_a_motion(draw, walk, tmp_path):
     assert len(frames(tmp_path / "x.mp4")) == 6
 
 
-def test_gif_of_what_does_not_move_is_a_picture(draw, walk, tmp_path):
+def test_gif_of_a_still_scene_is_a_single_image(draw, walk, tmp_path):
     draw(walk[:2], "still.gif")
     draw(walk, "frame.gif", "--frame", "3")
     draw(walk, "moving.gif", size="32x32")
@@ -124,7 +124,7 @@ def test_gif_of_what_does_not_move_is_a_picture(draw, walk, tmp_path):
     assert found == [1, 1, 31]
 
 
-def test_gif_of_many_frames_a_second_says_how_many_it_shows(draw, walk, tmp_path):
+def test_gif_at_a_high_rate_reports_its_effective_rate(draw, walk, tmp_path):
     said = draw(walk, "x.gif", "--fps", "100", size="32x32")
     assert said.err == ("warning: GIFs show at most 50 frames per second: drawn at 50, not 100\n")
     assert "51 frames, 1.02 s" in said.out and n_frames(tmp_path / "x.gif") == 51
@@ -149,7 +149,7 @@ def test_missing_library_is_one_line(draw, walk, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     said = draw(walk, "x.mp4", code=2)
     assert said.err == ("viewer: videos need PyAV, which is not installed: pip install av\n")
-    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # pictures need no such thing
+    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # images do not need it
 
 
 @pytest.mark.parametrize("name", ["x.mp4", "x.gif", "x.webm"])
@@ -181,7 +181,7 @@ def wait_for(condition) -> None:
     [(signal.SIGINT, 130, b"interrupted"), (signal.SIGTERM, 143, b"terminated")],
 )
 @pytest.mark.parametrize("name", ["x.mp4", "x.webm", "x.gif"])
-def test_interrupted_video_leaves_nothing(walk, tmp_path, name, number, code, word):
+def test_interrupted_video_leaves_no_file(walk, tmp_path, name, number, code, word):
     (tmp_path / name).write_bytes(b"precious")
     process = start(walk, tmp_path, name)
     suffix = name[1:]
@@ -193,7 +193,7 @@ def test_interrupted_video_leaves_nothing(walk, tmp_path, name, number, code, wo
     assert names(tmp_path, suffix) == [name] and (tmp_path / name).read_bytes() == b"precious"
 
 
-def test_interrupted_sequence_leaves_whole_pictures(walk, tmp_path):
+def test_interrupted_sequence_leaves_complete_images(walk, tmp_path):
     process = start(walk, tmp_path, "{frame:04}.png")
     wait_for(lambda: (tmp_path / "0005.png").exists())
     process.send_signal(signal.SIGINT)

@@ -1,4 +1,4 @@
-"""``viewer rig``: a mesh goes in, a figure that moves comes out."""
+"""``viewer rig``: from a bare mesh to an animatable figure."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A fox in centimetres, turned by a quarter about y, and the fox's pose."""
+    """A fox in centimetres, rotated by 90 degrees about y, and the fox's pose."""
     folder = tmp_path_factory.mktemp("rig")
     fox = viewer.load().actors[0]
     positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0][:, [2, 1, 0]] * [1, 1, -1]
@@ -54,7 +54,7 @@ def rigged(folder, tmp_path, name, *options):
     return out
 
 
-def test_npz_opens_again_and_moves_as_the_template(folder, tmp_path, capsys):
+def test_npz_opens_again_and_moves_like_the_template(folder, tmp_path, capsys):
     out = rigged(folder, tmp_path, "scan.npz")
     said = capsys.readouterr()
     assert said.err == ""
@@ -84,7 +84,7 @@ def test_npz_opens_again_and_moves_as_the_template(folder, tmp_path, capsys):
                         [-1, 0, 0]]), atol=1e-9)  # fmt: skip
 
 
-def test_course_rig_opens_again_and_its_pose_is_the_target(folder, tmp_path, capsys):
+def test_skel_rig_opens_again_and_its_pose_matches_the_target(folder, tmp_path, capsys):
     out = rigged(folder, tmp_path, "scan.skel")
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "scan.json",
@@ -105,7 +105,7 @@ def test_course_rig_opens_again_and_its_pose_is_the_target(folder, tmp_path, cap
     assert capsys.readouterr().out.splitlines()[-1].endswith("the target's pose")
 
 
-def test_template_is_posed_by_the_same_options_as_everywhere(folder, tmp_path, capsys):
+def test_template_is_posed_by_the_usual_options(folder, tmp_path, capsys):
     # In its rest pose the template fits less well than in the pose of the target.
     options = ["--pose", ",".join(["0"] * 114), "--method", "robust", "--no-fit"]
     out = tmp_path / "scan.npz"
@@ -138,7 +138,7 @@ def test_template_may_be_posed_by_a_frame_of_a_sequence(tmp_path, capsys, monkey
 
 
 @pytest.mark.parametrize("option", ["--template-frame", "--frame"])
-def test_frame_that_is_not_there_is_refused_by_the_name_it_was_given(tmp_path, capsys, option):
+def test_missing_frame_is_refused_by_option_name(tmp_path, capsys, option):
     poses = {"poses": np.zeros((5, 72)), "trans": np.zeros((5, 3)), "mocap_framerate": 30.0}
     np.savez(tmp_path / "walk.npz", **poses)
     body = viewer.load(bundled_body()).actors[0].figure
@@ -184,7 +184,7 @@ def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
     assert weights.match.max_distance == 0.02 and seen["name"] == "scan"
 
 
-def test_target_with_a_rig_of_its_own_is_taken_as_posed(tmp_path, monkeypatch, capsys):
+def test_rigged_target_is_used_as_posed(tmp_path, monkeypatch, capsys):
     seen = {}
 
     def instead(figure, pose, target, settings, report, name):
@@ -259,7 +259,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("options", "code", "message"), REFUSED.values(), ids=REFUSED)
-def test_what_makes_no_sense_is_refused_in_one_line(
+def test_invalid_combinations_are_refused_in_one_line(
     folder, tmp_path, capsys, options, code, message
 ):
     names = {"tmp": tmp_path, "scan": folder / "scan.obj"}
@@ -279,7 +279,7 @@ def test_the_target_is_never_replaced(folder, capsys):
     assert target.read_bytes() == before
 
 
-def test_existing_files_stay_without_force(folder, tmp_path, capsys):
+def test_existing_files_are_kept_without_force(folder, tmp_path, capsys):
     (tmp_path / "x.json").write_text("mine")
     assert run(["rig", str(folder / "scan.obj"), "-o", str(tmp_path / "x.skel")]) == 5
     assert capsys.readouterr().err == (
@@ -287,7 +287,7 @@ def test_existing_files_stay_without_force(folder, tmp_path, capsys):
     )
 
 
-def test_two_meshes_are_one_too_many(folder, tmp_path, capsys):
+def test_two_target_meshes_are_refused(folder, tmp_path, capsys):
     other = tmp_path / "other.obj"
     other.write_bytes((folder / "scan.obj").read_bytes())
     assert run(["rig", str(folder / "scan.obj"), str(other)]) == 2
@@ -304,7 +304,7 @@ def landmarks(tmp_path, text):
     return read_landmarks(Source.open(path), actor.figure, actor.pose)
 
 
-def test_landmarks_are_points_or_joints_where_the_pose_has_them(tmp_path):
+def test_landmarks_are_points_or_posed_joints(tmp_path):
     from viewer.rig.skinning import joint_matrices
 
     actor = viewer.load().actors[0]
@@ -330,7 +330,7 @@ def test_landmarks_are_points_or_joints_where_the_pose_has_them(tmp_path):
             'expected a joint of fox, found "hed"; did you mean head?',
         ),
         (
-            "head 1 2 1_0\n",  # Python would take it for 10
+            "head 1 2 1_0\n",  # Python would parse it as 10
             1,
             'expected six numbers, or a joint and three numbers, found "head 1 2 1_0"',
         ),
@@ -354,7 +354,7 @@ def test_landmarks_are_points_or_joints_where_the_pose_has_them(tmp_path):
         ("\nhead 1 2 3\n", 2, "expected at least 3 pairs of points, found 1"),
     ],
 )
-def test_landmarks_that_are_none_are_named_by_line(tmp_path, text, line, message):
+def test_invalid_landmarks_are_reported_with_their_line(tmp_path, text, line, message):
     with pytest.raises(FormatError) as problem:
         landmarks(tmp_path, text)
     where = tmp_path / "pairs.txt"

@@ -1,4 +1,4 @@
-"""Scalar quantities on the command line: what is drawn, what is said, what is refused."""
+"""Scalar quantities on the command line: rendering, messages and refusals."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def rig(tmp_path):
 
 @pytest.fixture
 def render(tmp_path, capsys):
-    """Draw a small picture; return its pixels, or None, with what was said."""
+    """Render a small image; return its pixels or None, and the messages."""
 
     def drawn(*arguments):
         path = tmp_path / "x.png"
@@ -48,7 +48,7 @@ def render(tmp_path, capsys):
     return drawn
 
 
-def test_line_says_what_the_numbers_are(render, body):
+def test_summary_line_describes_the_values(render, body):
     for name, text in (
         ("weight:LEFT_KNEE", "Weight of left_knee: 0 to 1"),
         ("influences", "Number of influences: 0 to 4"),
@@ -80,7 +80,7 @@ def test_joint_by_index_is_the_joint_by_name(render, body):
     assert (by_name != render(body, "--scalar", "weight:right_knee")[0]).any()
 
 
-def test_legend_lines_and_range_change_the_picture(render, body):
+def test_legend_isolines_and_range_change_the_image(render, body):
     view = [body, "--scalar", "weight:left_knee"]
     plain = render(*view)[0]
     for option in ("--legend", "--no-isolines", "--scalar-range=0:0.5"):
@@ -135,7 +135,7 @@ def test_legend_stays_in_its_corner(render, body):
         ),
     ],
 )  # fmt: skip
-def test_what_makes_no_sense_is_refused_in_one_line(render, body, arguments, message):
+def test_invalid_combinations_are_refused_in_one_line(render, body, arguments, message):
     if message is None:
         assert render(body, *arguments)[0].shape == (120, 160, 3)
         return
@@ -154,7 +154,7 @@ def test_what_makes_no_sense_is_refused_in_one_line(render, body, arguments, mes
                         "correctives"),
     ],
 )  # fmt: skip
-def test_figure_without_what_is_asked_is_drawn_with_one_line(render, name, note):
+def test_figure_without_the_requested_data_is_drawn_with_a_note(render, name, note):
     picture, said = render("--scalar", name, "--legend")
     assert picture.shape[:2] == (120, 160)
     assert said.splitlines()[-1] == f"warning: {note}"
@@ -169,7 +169,7 @@ def test_skeleton_alone_has_no_weights(render, tmp_path):
     assert said.splitlines()[-1] == f"warning: {note}"
 
 
-def test_numbers_of_a_sequence_are_drawn_with_their_legend(body, tmp_path):
+def test_scalar_values_of_a_sequence_are_drawn_with_a_legend(body, tmp_path):
     sheets = []
     for option in ("--legend", "--samples=4"):
         path = tmp_path / "sheet.png"
@@ -184,7 +184,7 @@ def test_numbers_of_a_sequence_are_drawn_with_their_legend(body, tmp_path):
         assert rows.min() <= 3 and columns.min() <= 3 and columns.max() < 0.7 * half
 
 
-def test_unknown_field_is_refused_with_the_nearest_name():
+def test_unknown_field_suggests_the_nearest_name():
     far = VertexField("distance", "Distance", np.zeros(3), "length")
     matched = VertexField("match", "Match", np.zeros(3), names=("matched",))
     scene = Scene([Actor(Figure("scan", mesh(np.eye(3)), fields=(far, matched)))])
@@ -197,7 +197,7 @@ def test_unknown_field_is_refused_with_the_nearest_name():
         assert str(caught.value) == f"--scalar {name}: {hint}"
 
 
-def test_unknown_joint_is_looked_for_in_every_figure(render, body):
+def test_unknown_joint_is_searched_for_in_every_figure(render, body):
     fox = [str(resource("assets", "samples", name)) for name in ("fox.skel", "fox.skin")]
     _, said = render(*fox, body, "--scalar", "weight:left_kne")
     assert "did you mean left_knee?" in said

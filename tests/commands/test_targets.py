@@ -1,4 +1,4 @@
-"""No way of writing replaces a file that nobody said may be replaced, nor ever an input."""
+"""No output replaces an existing file without --force, and never an input."""
 
 from __future__ import annotations
 
@@ -92,13 +92,13 @@ def test_convert_checks_all_of_its_files(inputs, folder, refuse, case):
 
 
 @pytest.mark.parametrize("case", DRAWING)
-def test_pictures_and_videos_are_checked(inputs, folder, refuse, case):
+def test_images_and_videos_are_checked(inputs, folder, refuse, case):
     if case.startswith("v."):
         pytest.importorskip("av")
     check_command(drawing(inputs)[case], inputs, folder, refuse)
 
 
-def test_files_of_a_rigged_mesh_are_checked(inputs, folder, refuse):
+def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
     pytest.importorskip("scipy")
     mesh = folder.parent / "mesh.obj"
     assert run(["convert", *inputs.roof, "-o", str(mesh)]) == 0
@@ -117,7 +117,7 @@ def test_files_of_a_rigged_mesh_are_checked(inputs, folder, refuse):
             target.unlink()
 
 
-def test_old_files_stay_where_companions_find_other_names(inputs, folder):
+def test_companion_files_avoid_existing_names(inputs, folder):
     for name in ("p.mtl", "p_0.png", "p_1.png"):
         (folder / name).write_bytes(b"precious")
     (folder / "p-2.mtl").symlink_to(folder / "elsewhere.mtl")
@@ -128,7 +128,7 @@ def test_old_files_stay_where_companions_find_other_names(inputs, folder):
     assert not (folder / "elsewhere.mtl").exists()
 
 
-def test_two_files_of_one_run_that_are_the_same_are_refused(inputs, folder, refuse):
+def test_writing_one_file_twice_in_a_run_is_refused(inputs, folder, refuse):
     command = ["convert", *inputs.recording, "-o", f"{folder}/m.bvh", "--force"]
     (folder / "m-7.bvh").symlink_to("m-0.bvh")
     refuse(command, f"{folder}/m-7.bvh: is the same file as {folder}/m-0.bvh")
@@ -144,7 +144,7 @@ def test_missing_folder_is_refused_before_anything(inputs, folder, refuse):
     assert not contents(folder)
 
 
-def test_one_old_frame_among_many_keeps_them_all(inputs, folder, refuse):
+def test_one_existing_frame_stops_the_whole_sequence(inputs, folder, refuse):
     (folder / "w_002.obj").write_bytes(b"precious")
     command = into(folder, converting(inputs)["a motion as w_{frame:03}.obj"])
     refuse(command, f"{folder}/w_002.obj: exists already")
@@ -176,7 +176,7 @@ def test_folder_of_frames_is_an_input(inputs, folder, refuse):
     refuse([*command, f"{folder}/new"], f"{folder}/new/smpl: exists already")
 
 
-def test_another_picture_of_a_skin_stays(inputs, folder, refuse):
+def test_other_textures_of_a_skin_are_kept(inputs, folder, refuse):
     """A ``.skin`` names its pictures, so another one cannot give way."""
     (folder / "cloth1.png").write_bytes(b"precious")
     for more in ([], ["--force"]):

@@ -26,7 +26,7 @@ def terminal(monkeypatch) -> Terminal:
     return Terminal()
 
 
-def test_progress_shows_title_and_count_and_leaves_nothing(terminal, monkeypatch):
+def test_progress_shows_title_and_count_and_is_erased(terminal, monkeypatch):
     monkeypatch.setattr("sys.stderr", terminal)
     with Progress("reading [b]walk[/b]", 1200) as progress:
         progress.show(300)
@@ -38,7 +38,7 @@ def test_progress_shows_title_and_count_and_leaves_nothing(terminal, monkeypatch
     assert text.endswith("\x1b[2K")  # the line is erased
 
 
-def test_progress_is_silent_in_pipes_and_when_it_is_quick(terminal, monkeypatch):
+def test_progress_is_silent_in_pipes_and_for_short_jobs(terminal, monkeypatch):
     monkeypatch.setattr("sys.stderr", pipe := io.StringIO())
     with Progress("reading", 2) as progress:
         progress.show(1)
@@ -50,7 +50,7 @@ def test_progress_is_silent_in_pipes_and_when_it_is_quick(terminal, monkeypatch)
     assert terminal.getvalue() == ""
 
 
-def test_lines_have_colours_at_a_terminal_alone(monkeypatch):
+def test_lines_are_coloured_only_at_a_terminal(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setattr("sys.stdout", pipe := io.StringIO())
@@ -60,7 +60,7 @@ def test_lines_have_colours_at_a_terminal_alone(monkeypatch):
     assert screen.getvalue() == "\x1b[31mmissing \x1b[0m[x] " + 200 * "a" + "\n"
 
 
-def test_tables_are_as_wide_as_their_cells_and_end_with_them():
+def test_tables_are_as_wide_as_their_cells_without_trailing_blanks():
     rows = [["", "joints", "result"], ["a" * 150, "1 mm", ""], ["[red]b", "-", "DIFFERS"]]
     assert table_lines(rows, right=[1]) == [
         f"{'':150}  joints  result",

@@ -43,7 +43,7 @@ def rig(folder, *options):
     return run(["rig", str(folder / "scan.obj"), "--from", "fox", *map(str, options)])
 
 
-def test_path_of_the_template_is_scaled_with_the_figure(folder, tmp_path, capsys):
+def test_template_path_is_scaled_with_the_figure(folder, tmp_path, capsys):
     out = tmp_path / "cat.npz"
     assert rig(folder, "-o", out, "--clip", folder / "walk.anim") == 0
     said = capsys.readouterr()
@@ -73,7 +73,7 @@ def test_path_of_the_template_is_scaled_with_the_figure(folder, tmp_path, capsys
          "viewer: --clip: expected a motion of the template, found none in scan.obj"),
     ],
 )  # fmt: skip
-def test_clips_that_cannot_be_carried_are_refused(
+def test_clips_that_cannot_be_transferred_are_refused(
     folder, tmp_path, capsys, monkeypatch, options, message
 ):
     monkeypatch.chdir(folder)
@@ -83,7 +83,7 @@ def test_clips_that_cannot_be_carried_are_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_clip_that_is_there_is_not_replaced(folder, tmp_path, capsys):
+def test_existing_clip_is_not_replaced(folder, tmp_path, capsys):
     out = tmp_path / "cat.npz"
     (tmp_path / "cat-walk.anim").write_text("mine")
     assert rig(folder, "-o", out, "--clip", folder / "walk.anim") == 5

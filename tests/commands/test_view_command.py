@@ -19,7 +19,7 @@ def _no_display(monkeypatch):
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
 
 
-def test_without_display_the_figure_is_drawn_under_a_new_name(tmp_path, monkeypatch, capsys):
+def test_without_display_the_figure_is_rendered_to_a_new_file(tmp_path, monkeypatch, capsys):
     rig = write_rig(tmp_path)
     folder = tmp_path / "here"
     folder.mkdir()
@@ -36,19 +36,19 @@ def test_without_display_the_figure_is_drawn_under_a_new_name(tmp_path, monkeypa
     assert (picture == viewer.render(viewer.load(*rig), (1280, 720))).all()
 
 
-def test_without_display_and_files_the_fox_is_drawn(tmp_path, monkeypatch, capsys):
+def test_without_display_and_files_the_fox_is_rendered(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run([]) == 0
     assert "fox.png" in capsys.readouterr().out and (tmp_path / "fox.png").is_file()
 
 
-def test_without_display_the_wasp_is_drawn(tmp_path, monkeypatch, shared):
+def test_without_display_the_wasp_is_rendered(tmp_path, monkeypatch, shared):
     monkeypatch.chdir(tmp_path)
     assert run([str(shared / "wasp.skel"), str(shared / "wasp.skin")]) == 0
     assert (tmp_path / "wasp.png").is_file()
 
 
-def test_without_display_a_bad_file_is_exit_code_2(tmp_path, monkeypatch, capsys):
+def test_without_display_an_invalid_file_is_exit_code_2(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run([str(tmp_path / "missing.skel")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -63,7 +63,7 @@ def test_display_that_does_not_answer_is_one_line(tmp_path, monkeypatch, capsys)
     assert captured.out.count("\n") == 1 and "DISPLAY=:987" in captured.out
 
 
-def test_current_folder_that_is_gone_is_exit_code_5(tmp_path, monkeypatch, capsys):
+def test_deleted_current_folder_is_exit_code_5(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "gone"
     folder.mkdir()
     monkeypatch.chdir(folder)

@@ -82,7 +82,7 @@ def refused(code: int, capsys, folder: Path) -> None:
 
 @pytest.mark.parametrize("is_there", [False, True], ids=["new", "replaced"])
 @pytest.mark.parametrize("case", CONVERTING + PICTURES)
-def test_fault_at_every_write_changes_nothing(
+def test_failure_at_any_write_changes_nothing(
     inputs, tmp_path, monkeypatch, capsys, case, is_there
 ):
     folder = tmp_path / "out"
@@ -113,7 +113,7 @@ def test_fault_at_every_write_changes_nothing(
 
 
 @pytest.mark.parametrize("case", CONVERTING)
-def test_every_fill_level_keeps_what_is_there(inputs, tiny_disk, capsys, case):
+def test_every_disk_fill_level_keeps_existing_files(inputs, tiny_disk, capsys, case):
     folder, codes = tiny_disk / "out", []
     command = command_of(inputs, case, folder)
     for level in range(17):

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, described
 
 
-def test_a_diagnostic_gives_all_that_it_knows() -> None:
+def test_a_diagnostic_describes_all_its_data() -> None:
     values = {"n": np.int64(2), "joint": "hip", "weight": np.float32(-0.5), "vertex": 7}
     places = np.array([3, 7], dtype=np.int32)
     found = Diagnostic(
@@ -54,7 +54,7 @@ def test_every_kind_of_value_can_be_written_as_json() -> None:
     assert told["problem"]["code"] == "F001"
 
 
-def test_many_places_are_cut_but_counted() -> None:
+def test_long_location_lists_are_truncated_but_counted() -> None:
     found = Diagnostic("C013.no-height", part="joints", places=np.arange(300, dtype=np.int32))
     told = described(found)
     assert told["places"] == list(range(100)) and told["n_places"] == 300

@@ -78,7 +78,7 @@ def calls() -> list[tuple[str, str, set[str]]]:
     return found
 
 
-def test_every_call_gives_the_values_that_its_template_shows() -> None:
+def test_every_call_supplies_the_values_of_its_template() -> None:
     wrong = []
     for place, key, names in calls():
         wanted = set(fields({**MESSAGES, **PHRASES}[key]))
@@ -93,10 +93,10 @@ def test_no_key_is_in_two_tables() -> None:
         assert len(keys) == len(set(keys)) > 0
 
 
-def test_a_sign_is_no_condition() -> None:
+def test_a_sign_is_not_a_condition() -> None:
     assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 4.0, "more": ""}) == "+4 %"
     assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 0.0, "more": "a"}) == "+0 %; a"
 
 
-def test_no_names_are_none() -> None:
+def test_empty_name_list_renders_as_none() -> None:
     assert rendered("{names:all}, {names:list}", {"names": []}) == "none, none"

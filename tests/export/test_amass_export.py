@@ -81,7 +81,7 @@ def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
         assert_allclose(found, expected, rtol=0, atol=ATOL)
 
 
-def test_transl_is_the_formula_of_the_specification(family, tmp_path):
+def test_transl_follows_the_formula_of_the_specification(family, tmp_path):
     motion = family_motion(24)
     arrays, _ = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     numbers = model("smpl")
@@ -122,7 +122,7 @@ def test_large_angles_keep_their_rotation(family, tmp_path):
     assert_allclose(found[2], [0, 0, 1e-9], rtol=1e-12, atol=0)
 
 
-def test_other_up_axis_turns_the_world(family, tmp_path):
+def test_other_up_axis_rotates_the_world(family, tmp_path):
     motion = family_motion(24)
     animation = family_animation(family("smpl"), motion)
     plain, _ = written(animation, tmp_path / "y.npz", world_up="y")
@@ -140,7 +140,7 @@ def test_other_up_axis_turns_the_world(family, tmp_path):
         assert_allclose(after, expected, rtol=0, atol=ATOL)
 
 
-def test_changing_shapes_have_a_row_a_frame(family, tmp_path):
+def test_changing_shapes_have_a_row_per_frame(family, tmp_path):
     shapes = waves(4, 10, seed=7.0)
     motion = family_motion(24, shape=shapes)
     arrays, notes = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
@@ -208,7 +208,7 @@ def test_gaps_split_the_file(family, tmp_path):
 # What the format cannot hold
 
 
-def test_losses_are_told(family, tmp_path):
+def test_losses_are_reported(family, tmp_path):
     figure = family("smpl")
     rotations = np.tile([0.0, 0, 0, 1], (2, 24, 1))
     moved = np.zeros((2, 24, 3))
@@ -225,7 +225,7 @@ def test_losses_are_told(family, tmp_path):
     ]
 
 
-def test_bundled_body_says_whose_shape_it_is(tmp_path):
+def test_bundled_body_export_names_the_model_of_its_shape(tmp_path):
     from viewer.loading.bundled import bundled_body
 
     figure = viewer.load(bundled_body()).actors[0].figure
@@ -234,7 +234,7 @@ def test_bundled_body_says_whose_shape_it_is(tmp_path):
     assert notes[1].startswith(f"shape and translation are those of {figure.name}, which is no")
 
 
-def test_figures_of_other_kinds_are_refused(family, tmp_path):
+def test_figures_of_other_families_are_refused(family, tmp_path):
     rotations = np.tile([0.0, 0, 0, 1], (1, 16, 1))
     hand = SampledClip("a", Timing(30.0, np.arange(1)), rotations)
     with pytest.raises(RigError) as caught:
@@ -246,7 +246,7 @@ def test_figures_of_other_kinds_are_refused(family, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_options_and_empty_motions_are_refused(family, tmp_path):
+def test_unknown_options_and_empty_motions_are_refused(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24, rows=np.array([0, -1, 1])))
     for words, message in (
         (
@@ -266,7 +266,7 @@ def test_options_and_empty_motions_are_refused(family, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_folder_that_is_not_there(family, tmp_path):
+def test_missing_folder_is_refused(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     with pytest.raises(OutputError):
         written(animation, tmp_path / "none" / "a.npz")

@@ -70,7 +70,7 @@ def written(actor, path, **settings):
     return read(Source.open(path)) if path.exists() else None, notes
 
 
-def test_clip_is_written_as_it_is(tmp_path):
+def test_clip_is_written_unchanged(tmp_path):
     path, clip = tmp_path / "a.anim", keyed(0.99)
     again, notes = written(Actor(rig(), clip=clip), path)
     assert notes == [f"{path}: 9 channels with 4 keys, 0 to 0.99 s, the clip's own"]
@@ -82,7 +82,7 @@ def test_clip_is_written_as_it_is(tmp_path):
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
-def test_walk_is_written_as_it_is(tmp_path):
+def test_walk_is_written_unchanged(tmp_path):
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     actor = scene.actors[0]
     again, _ = written(actor, tmp_path / "walk.anim")
@@ -103,7 +103,7 @@ def test_part_of_a_clip_becomes_keys_on_its_frames(tmp_path):
     assert len(notes) == 2 and "differ from the motion between frames" in notes[1]
 
 
-def test_error_between_frames_is_the_one_by_hand(tmp_path):
+def test_error_between_frames_matches_hand_calculation(tmp_path):
     """Frames at 0 and 1: with slopes of the only span, straight; the clip is there at 1.5."""
     clip = Clip(
         "bump",
@@ -123,7 +123,7 @@ def test_error_between_frames_is_the_one_by_hand(tmp_path):
     ]
 
 
-def test_sampled_angles_run_on_beyond_half_a_turn(tmp_path):
+def test_sampled_angles_are_unwrapped_beyond_180_degrees(tmp_path):
     angles = np.arange(12) * 1.5
     again, notes = written(Actor(rig(), clip=turning(angles)), tmp_path / "a.anim")
     assert_allclose(again.channels[8].values, angles, atol=1e-9)
@@ -132,7 +132,7 @@ def test_sampled_angles_run_on_beyond_half_a_turn(tmp_path):
     assert notes[0].endswith(", linear tangents") and len(notes) == 1
 
 
-def test_angles_of_limited_joints_stay_within(tmp_path):
+def test_angles_of_limited_joints_stay_within_limits(tmp_path):
     figure = rig(limits={"z": (-1.0, 1.0)})
     again, notes = written(Actor(figure, clip=turning([0.5, 2.0])), tmp_path / "a.anim")
     assert_allclose(again.channels[8].values, [0.5, 1.0], atol=1e-12)
@@ -145,7 +145,7 @@ def test_angles_of_limited_joints_stay_within(tmp_path):
     [("hold", [0.2, 0.2, 0.2, 0.5], "the last pose is held"),
      ("interpolate", [0.2, 0.3, 0.4, 0.5], "interpolated")],
 )  # fmt: skip
-def test_gaps_are_closed_as_asked(tmp_path, gaps, values, done):
+def test_gaps_are_closed_as_requested(tmp_path, gaps, values, done):
     clip = turning([0.2, 0.5], rows=[0, -1, -1, 1])
     again, notes = written(Actor(rig(), clip=clip), tmp_path / "a.anim", gaps=gaps)
     assert_allclose(again.channels[8].values, values, atol=1e-12)
@@ -167,7 +167,7 @@ def test_gaps_split_into_files(tmp_path):
     assert not (tmp_path / "a.anim").exists()
 
 
-def test_place_of_the_figure_moves_the_root_and_what_does_not_fit_is_said(tmp_path):
+def test_placement_moves_the_root_and_leftovers_are_reported(tmp_path):
     places = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 6.0]])
     inner = np.zeros((2, 2, 3))
     inner[:, 1, 0] = 0.5
@@ -194,7 +194,7 @@ def test_place_of_the_figure_moves_the_root_and_what_does_not_fit_is_said(tmp_pa
     assert "(j1, frame 1)" in notes[1]
 
 
-def test_place_of_a_figure_with_keys_is_left_out_and_said(tmp_path):
+def test_placement_of_a_keyed_figure_is_omitted_with_a_note(tmp_path):
     actor = Actor(rig(), clip=keyed())
     actor.pose.figure_translation[0] = 1.0
     _, notes = written(actor, tmp_path / "a.anim")
@@ -202,7 +202,7 @@ def test_place_of_a_figure_with_keys_is_left_out_and_said(tmp_path):
     assert notes[-1] == "the placement of the whole figure is not part of its clip and is omitted"
 
 
-def test_figures_that_move_otherwise_are_refused(tmp_path):
+def test_figures_without_dofs_are_refused(tmp_path):
     rows = [(joint, axis, 0.0) for joint in (0, 1) for axis in "xyz"]
     body = Figure("body", skeleton=hand_made.skeleton([-1, 0], rows))
     with pytest.raises(RigError) as caught:
@@ -214,7 +214,7 @@ def test_figures_that_move_otherwise_are_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_motion_without_a_frame_and_unknown_options_are_refused(tmp_path):
+def test_empty_motions_and_unknown_options_are_refused(tmp_path):
     with pytest.raises(RigError, match="every frame is missing"):
         written(Actor(rig(), clip=turning([0.0], rows=[-1, -1])), tmp_path / "a.anim")
     with pytest.raises(RigError, match='expected one of hold, interpolate, split, found "jump"'):
@@ -233,7 +233,7 @@ def test_exporter_is_found_by_its_suffix():
     assert motion_exporters("walk.anim") == ["anim"]
 
 
-def test_poses_by_the_written_clip_are_those_of_the_frames(tmp_path):
+def test_written_clip_reproduces_the_poses_of_the_frames(tmp_path):
     """All three axes, against rotations multiplied by hand."""
     rng = np.random.default_rng(4)
     angles = rng.uniform(-1.4, 1.4, (6, 3))

@@ -114,7 +114,7 @@ def test_bounds_hold_for_every_vertex(case):
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
 @pytest.mark.parametrize("least", [0.0, 1e-4])
-def test_the_farthest_is_that_of_all_frames_and_vertices(case, least):
+def test_the_maximum_is_over_all_frames_and_vertices(case, least):
     _, first, one, second, other = case
     sides = [
         Side(of, lambda rows, by=by: poses_of(by, rows))
@@ -133,7 +133,7 @@ def test_the_farthest_is_that_of_all_frames_and_vertices(case, least):
     assert (found.looked, found.frames) == (FRAMES, FRAMES)
 
 
-def test_what_is_less_than_rounding_is_nothing():
+def test_differences_below_rounding_are_zero():
     rng = np.random.default_rng(1)
     plain = body(rng)
     own = poses(rng, plain)

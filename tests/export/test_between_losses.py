@@ -64,28 +64,28 @@ def between(notes: list[Diagnostic]) -> float:
 
 
 @pytest.mark.parametrize(("kind", "name"), [("bvh", "a.bvh"), ("gltf", "a.glb")])
-def test_curves_between_keys_that_lie_on_frames_are_told(tmp_path, kind, name):
+def test_loss_between_keys_on_frames_is_reported(tmp_path, kind, name):
     """From 0 to 2 with slopes 2 and 0: 2 u^2 (1 - u) above the line, 8/27 where u is 2/3."""
     notes = write(sample_animation(swinging(), 1.0), tmp_path, kind, name)
     assert between(notes) == pytest.approx(2.0 * np.sin(4.0 / 27.0), rel=TOLD)
 
 
 @pytest.mark.parametrize("rate", [0.99, 2.0, 2.7, 30.0])
-def test_curves_between_frames_are_told_as_dense_samples_have_them(tmp_path, rate):
+def test_loss_between_frames_matches_dense_sampling(tmp_path, rate):
     actor = swinging()
     size = pytest.approx(densest(actor, rate), rel=TOLD)
     assert between(write(sample_animation(actor, rate), tmp_path, "bvh", "a.bvh")) == size
 
 
 @pytest.mark.parametrize("mode", ["cycle", "cycle_offset", "bounce"])
-def test_curves_that_repeat_are_told_where_their_keys_do(tmp_path, mode):
+def test_loss_of_repeating_curves_is_reported(tmp_path, mode):
     """Three keys within 1.9 s, of which a clip of 40 s repeats kinks and jumps."""
     actor = swinging((mode, mode), 40.0, (0.0, 0.3, 1.9))
     size = pytest.approx(densest(actor, 1.0), rel=TOLD)
     assert between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
 
 
-def test_vertices_between_frames_are_told_too(tmp_path):
+def test_vertex_loss_between_frames_is_reported_too(tmp_path):
     """A vertex three metres out, on the joint that turns."""
     actor = swinging()
     mesh = Mesh(np.diag([3.0, 1, 1]), np.eye(3), np.array([[0, 1, 2]]))
@@ -101,7 +101,7 @@ def test_vertices_between_frames_are_told_too(tmp_path):
 
 
 @pytest.mark.slow
-def test_motions_too_long_to_be_sure_of_say_so(tmp_path):
+def test_motions_too_long_to_check_say_so(tmp_path):
     """Two minutes at 20 fps: more spans between frames than are all sampled."""
     actor = swinging(end=120.0)
     notes = write(sample_animation(actor, 20.0), tmp_path, "bvh", "a.bvh")

@@ -32,7 +32,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
 
-def test_joints_turned_at_rest_rest_without_rotation(tmp_path: Path) -> None:
+def test_rest_rotations_are_removed_from_the_rest_pose(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     skeleton = chain(4)
     skeleton = replace(skeleton, rest_rotations=quaternions(rng.uniform(-2, 2, (4, 3))))
@@ -90,7 +90,7 @@ def test_scaled_figures(tmp_path: Path) -> None:
     assert notes[2] == ("the figure's scale changes from 1 to 2: bone lengths are written with 1")
 
 
-def test_several_roots_hang_from_one(tmp_path: Path) -> None:
+def test_several_roots_get_a_common_parent(tmp_path: Path) -> None:
     skeleton = replace(chain(4), parents=np.array([-1, 0, -1, 2]), names=("root", "b", "c", "d"))
     shifts = np.zeros((6, 4, 3))
     shifts[:, 2, 1] = np.arange(6)
@@ -102,13 +102,13 @@ def test_several_roots_hang_from_one(tmp_path: Path) -> None:
     assert notes[1] == "several roots: a common parent joint common_root was added"
 
 
-def test_names_become_unique_and_plain(tmp_path: Path) -> None:
+def test_names_are_made_unique_and_ascii(tmp_path: Path) -> None:
     skeleton = replace(chain(4), names=("left leg", "", "left leg", "é:x"))
     found, _ = write(rig_animation(skeleton), tmp_path)
     assert found.names == ["left_leg", "joint1", "left_leg_2", "e_x"]
 
 
-def test_lengths_of_a_figure_without_a_unit_stay(tmp_path: Path) -> None:
+def test_lengths_of_a_figure_without_a_unit_are_unscaled(tmp_path: Path) -> None:
     animation = rig_animation(chain())
     found, notes = write(animation, tmp_path, unit="cm")
     assert_places(found, animation)
@@ -127,7 +127,7 @@ def test_end_sites_are_half_the_last_bone_or_reach_to_the_skin(tmp_path: Path) -
     np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone to go by
 
 
-def test_end_sites_of_the_bundled_body_lie_at_its_skin(tmp_path: Path) -> None:
+def test_end_sites_of_the_bundled_body_lie_on_its_skin(tmp_path: Path) -> None:
     figure = viewer.load(bundled_body()).actors[0].figure
     found, _ = write(body_animation(figure, 2), tmp_path, unit="m")
     head = found.ends[found.names.index("head")]
@@ -151,7 +151,7 @@ angle = quarter | st.floats(-7, 7)
     st.sampled_from(ROTATION_ORDERS),
     st.lists(st.tuples(angle, angle, angle), min_size=1, max_size=8),
 )
-def test_angles_give_the_rotations_back_also_where_axes_coincide(order: str, rows: list) -> None:
+def test_angles_reproduce_rotations_even_at_gimbal_lock(order: str, rows: list) -> None:
     turns = np.array([angle_product(order, row) for row in rows])
     for angles in (euler_angles(turns, order), unrolled(euler_angles(turns, order), order)):
         for row, turn in zip(angles, turns, strict=True):
@@ -160,7 +160,7 @@ def test_angles_give_the_rotations_back_also_where_axes_coincide(order: str, row
 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
 @pytest.mark.parametrize("which", [0, 1, 2])
-def test_angles_run_on_without_jumps(order: str, which: int) -> None:
+def test_angles_are_unwrapped(order: str, which: int) -> None:
     # One axis turns round several times, through where the middle angle passes 90 degrees.
     wanted = np.tile([0.3, 0.2, -0.4], (400, 1))
     wanted[:, which] += np.linspace(0, 15, 400)
@@ -169,7 +169,7 @@ def test_angles_run_on_without_jumps(order: str, which: int) -> None:
     np.testing.assert_allclose(np.diff(found, axis=0), np.diff(wanted, axis=0), atol=1e-9)
 
 
-def test_a_locked_frame_keeps_the_angles_of_the_one_before() -> None:
+def test_a_gimbal_locked_frame_keeps_the_previous_angles() -> None:
     wanted = np.array([[1.0, 1.2, 0.5], [1.0, np.pi / 2, 0.5], [1.0, 1.3, 0.5]])
     for order in ROTATION_ORDERS:
         turns = np.array([angle_product(order, row) for row in wanted])

@@ -91,7 +91,7 @@ def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
         assert_allclose(record["Rh"][0], motion.vectors[frame, 0], rtol=0, atol=1e-7)
 
 
-def test_text_is_as_easymocap_writes_it(family, tmp_path):
+def test_text_matches_easymocap_output(family, tmp_path):
     motion = family_motion(24, frames=1)
     written(family_animation(family("smpl"), motion), tmp_path / "out")
     data = (tmp_path / "out" / "smpl" / "000000.json").read_bytes()
@@ -121,7 +121,7 @@ def animation_of_clip(figure, clip):
     return sample_animation(Actor(figure, clip=clip))
 
 
-def test_recording_comes_back(shared_data, tmp_path):
+def test_recording_round_trips(shared_data, tmp_path):
     folder = shared_data / "smpl_synthetic"
     if not folder.is_dir():
         pytest.skip("no synthetic recording")
@@ -145,7 +145,7 @@ def test_recording_comes_back(shared_data, tmp_path):
                 assert_allclose(other[key], record[key], rtol=0, atol=ATOL)
 
 
-def test_people_and_gaps_land_in_the_same_files(family, tmp_path):
+def test_people_and_gaps_end_up_in_the_same_files(family, tmp_path):
     figure = family("smpl")
     first = family_animation(figure, family_motion(24, rows=np.array([0, -1, 1]), first_frame=5))
     second = family_animation(
@@ -172,7 +172,7 @@ def test_expression_is_written(family, tmp_path):
     assert_allclose(found, waves(4, 10, seed=5.0), rtol=0, atol=1e-7)
 
 
-def test_other_up_axis_turns_rh_and_th(family, tmp_path):
+def test_other_up_axis_rotates_rh_and_th(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     frames, notes = written(animation, tmp_path / "out", up="z")
     quarter = rotation([np.pi / 2, 0, 0])
@@ -188,7 +188,7 @@ def test_other_up_axis_turns_rh_and_th(family, tmp_path):
 # Folders
 
 
-def test_older_frames_do_not_stay(family, tmp_path):
+def test_older_frames_are_removed(family, tmp_path):
     long = family_animation(family("smpl"), family_motion(24, frames=6))
     short = family_animation(family("smpl"), family_motion(24, frames=2))
     written(long, tmp_path / "out")
@@ -248,7 +248,7 @@ def test_interrupted_export_leaves_what_was_there(family, tmp_path, monkeypatch,
 # Refusals
 
 
-def test_people_must_fit_each_other(family, tmp_path):
+def test_people_must_be_compatible(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     other = replace(animation, frame_rate=25.0)
     for animations, persons, message in (

@@ -43,11 +43,11 @@ def body(tmp_path_factory) -> Figure:
     return family_figure("smpl", tmp_path_factory.mktemp("model"))
 
 
-def test_registry_knows_it() -> None:
+def test_bvh_is_registered() -> None:
     assert motion_exporters("walk.bvh") == ["bvh"]
 
 
-def test_a_body_s_joints_are_where_a_second_reader_finds_them(body: Figure, tmp_path: Path) -> None:
+def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     found, notes = write(animation, tmp_path)
     assert_places(found, animation, 100.0)
@@ -57,7 +57,7 @@ def test_a_body_s_joints_are_where_a_second_reader_finds_them(body: Figure, tmp_
     assert len(notes) == 1  # nothing is lost, so nothing is said
 
 
-def test_the_file_is_what_every_reader_takes(body: Figure, tmp_path: Path) -> None:
+def test_the_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
     found, _ = write(body_animation(body), tmp_path)  # the second reader checks the grammar
     assert found.offsets[0] == [0.0, 0.0, 0.0]
     positions = ["Xposition", "Yposition", "Zposition"]
@@ -145,7 +145,7 @@ def test_offsets_are_those_of_the_shape(body: Figure, tmp_path: Path) -> None:
         np.testing.assert_allclose(offset, 100 * shaped.rest_translations[joint], atol=1e-6)
 
 
-def test_a_shape_that_changes_is_said_with_its_size(tmp_path: Path) -> None:
+def test_a_changing_shape_is_reported_with_its_size(tmp_path: Path) -> None:
     figure = family_figure("smpl", tmp_path)
     animation = body_animation(figure)
     weights = np.repeat(animation.frames.shape_weights, 12, axis=0)
@@ -226,7 +226,7 @@ def test_gaps_split_into_files(body: Figure, tmp_path: Path) -> None:
     assert notes[-1] == "missing frames 2 to 3, 6, 8: one file for each run of frames"
 
 
-def test_a_failing_file_of_several_leaves_none(body: Figure, tmp_path: Path) -> None:
+def test_one_failing_file_of_several_leaves_none(body: Figure, tmp_path: Path) -> None:
     (tmp_path / "out-1.bvh").write_text("old")
     (tmp_path / "out-3.bvh").mkdir()
     with pytest.raises(OutputError):
@@ -256,7 +256,7 @@ def test_the_wasp_walks_in_and_out(shared: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(joints_of(again), joints_of(animation), atol=1e-6)
 
 
-def test_a_bvh_comes_back_with_its_end_sites(tmp_path: Path) -> None:
+def test_a_bvh_round_trips_with_its_end_sites(tmp_path: Path) -> None:
     first, _ = write(rig_animation(chain(4)), tmp_path)
     motion = bvh.read(Source.open(tmp_path / "out.bvh"))
     animation = sample_animation(Actor(motion.figure, clip=motion.clip))
@@ -281,7 +281,7 @@ def test_keyed_clips_with_root_translation(tmp_path: Path) -> None:
     assert not [note for note in notes[1:] if " between frames " not in note]
 
 
-def test_fewer_digits_are_less_exact_and_said(body: Figure, tmp_path: Path) -> None:
+def test_fewer_digits_lose_precision_with_a_note(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, digits=2)
     wanted = joints_of(animation) * 100
@@ -328,7 +328,7 @@ def test_unknown_options_are_refused(options: dict, message: str, tmp_path: Path
     assert str(caught.value) == message
 
 
-def test_nothing_present_or_not_finite_is_refused(body: Figure, tmp_path: Path) -> None:
+def test_absent_or_non_finite_motion_is_refused(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     none = replace(animation, frames=replace(animation.frames, present=np.zeros(12, dtype=bool)))
     with pytest.raises(RigError, match="every frame is missing, there is nothing to write"):

@@ -60,7 +60,7 @@ def test_world_matrices_hold_the_joints(tmp_path):
     assert_array_equal(arrays["world"][:, 3], [[0, 0, 0, 1]] * 2)
 
 
-def test_body_model_gives_its_own_numbers(tmp_path):
+def test_body_model_writes_raw_pose_values(tmp_path):
     body = model("smpl", 32)
     np.savez(tmp_path / "body.npz", **body)
     actor = viewer.load(tmp_path / "body.npz").actors[0]
@@ -105,7 +105,7 @@ def test_odd_names_are_kept(tmp_path, name):
     assert str(write(tmp_path, seamed_actor(name))["name"]) == name
 
 
-def test_the_same_pose_gives_the_same_bytes(tmp_path):
+def test_same_pose_gives_the_same_bytes(tmp_path):
     write(tmp_path, seamed_actor(), "a.npz")
     write(tmp_path, seamed_actor(), "b.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
@@ -163,7 +163,7 @@ def test_points_of_all_frames(tmp_path):
         (MotionOptions(), False, "two 4: every frame is missing, there is nothing to write"),
     ],
 )
-def test_points_that_cannot_be_written_are_refused(tmp_path, options, present, message):
+def test_unsupported_point_options_are_refused(tmp_path, options, present, message):
     with pytest.raises(RigError) as caught:
         export_points(sampled_points((present, False)), tmp_path / "two.npz", options)
     assert str(caught.value) == message and not any(tmp_path.iterdir())

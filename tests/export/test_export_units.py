@@ -58,7 +58,7 @@ def bvh_places(path, frame=1):
         (["--to-unit", "in"], 1 / 0.0254, "inches"),
     ],
 )
-def test_a_guessed_unit_counts_for_bvh_and_is_said_once(
+def test_a_guessed_unit_is_used_for_bvh_and_reported_once(
     walk, tmp_path, capsys, options, factor, word
 ):
     out = tmp_path / "out.bvh"
@@ -73,7 +73,7 @@ def test_a_guessed_unit_counts_for_bvh_and_is_said_once(
 @pytest.mark.parametrize(
     ("unit", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)]
 )
-def test_a_unit_that_is_asked_for_counts_without_a_word(walk, tmp_path, capsys, unit, metres):
+def test_a_requested_unit_is_used_without_a_note(walk, tmp_path, capsys, unit, metres):
     out = tmp_path / "out.bvh"
     assert run(["convert", str(walk), "--unit", unit, "--to-unit", "m", "-o", str(out)]) == 0
     wanted = 100.0 * metres * np.array(PERSON_TURNED)
@@ -82,7 +82,7 @@ def test_a_unit_that_is_asked_for_counts_without_a_word(walk, tmp_path, capsys, 
     assert error == "" and "differ" not in text
 
 
-def test_the_error_in_millimetres_is_that_of_the_file(tmp_path):
+def test_the_error_in_millimetres_uses_the_unit_of_the_file(tmp_path):
     # 0.04 of a centimetre is rounded away from each place: 0.4 mm along each axis that has it.
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.array([[0, 0, 0], [0, 100.0, 0]]))
     turns = np.tile([0.0, 0, 0, 1], (1, 2, 1))
@@ -110,7 +110,7 @@ def test_gltf_of_centimetres_is_in_metres(walk, tmp_path, capsys):
         assert gltf.nodes[gltf.top(gltf.named("pelvis"))]["name"] == "centimetres"
 
 
-def test_gltf_of_metres_that_were_asked_for_has_no_such_node(walk, tmp_path, capsys):
+def test_gltf_in_requested_metres_has_no_scale_node(walk, tmp_path, capsys):
     assert run(["convert", str(walk), "--unit", "cm", "-o", str(tmp_path / "a.glb")]) == 0
     gltf = Gltf(tmp_path / "a.glb")
     assert gltf.nodes[0]["name"] == "walk" and gltf.top(gltf.named("pelvis")) == 0
@@ -120,7 +120,7 @@ def test_gltf_of_metres_that_were_asked_for_has_no_such_node(walk, tmp_path, cap
     assert capsys.readouterr().err == ""
 
 
-def test_gltf_turns_and_scales_a_skinned_mesh_at_once(tmp_path):
+def test_gltf_rotates_and_scales_a_skinned_mesh_with_one_node(tmp_path):
     actor = seamed_actor(unit="in", up="z")
     actor.pose.figure_translation[:], actor.pose.figure_scale = [1, 2, 3], 2.0
     notes = faults.lines(export(actor, tmp_path / "a.glb"))
@@ -175,7 +175,7 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
     ]
 
 
-def test_easymocap_of_a_skeleton_turns_about_the_origin(tmp_path):
+def test_easymocap_of_a_skeleton_rotates_about_the_origin(tmp_path):
     animation, vectors, places = smpl_animation()
     notes = faults.lines(
         export_animation(animation, tmp_path / "out", "easymocap", MotionOptions())
@@ -221,7 +221,7 @@ def test_obj_says_its_unit(tmp_path):
     assert (tmp_path / "a.obj").read_text().startswith("# roof: y up\n")
 
 
-def test_ends_of_a_skeleton_without_bones_are_a_hand_long_in_any_unit(tmp_path):
+def test_end_sites_without_bones_have_one_length_in_any_unit(tmp_path):
     skeleton = ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3)))
     turns = np.tile([0.0, 0, 0, 1], (1, 1, 1))
     clip = SampledClip("a", Timing(30.0, np.arange(1)), turns)

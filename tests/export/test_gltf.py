@@ -39,7 +39,7 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
 
 
-def test_roof_comes_back(tmp_path):
+def test_roof_round_trips(tmp_path):
     gltf, notes = write(tmp_path, seamed_actor(unit="m"))
     assert_drawn(gltf, seamed_actor().figure, None)
     assert_array_equal(corners(gltf, gltf.vertices()[0]), POSITIONS[TRIANGLES])
@@ -56,7 +56,7 @@ def test_roof_comes_back(tmp_path):
     assert gltf.nodes[gltf.parents[gltf.named("tip")]]["name"] == "root"
 
 
-def test_two_joints_bend_by_hand(tmp_path):
+def test_two_bent_joints_match_hand_calculation(tmp_path):
     actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
     actor.pose.dofs[:] = 0, 0, 0, 0, 0, np.pi / 2  # the tip, at (1, 0, 0), about z
     gltf, _ = write(tmp_path, actor)
@@ -68,7 +68,7 @@ def test_two_joints_bend_by_hand(tmp_path):
     assert tip["translation"] == [1, 0, 0]
 
 
-def test_fox_is_drawn_as_it_is_skinned(tmp_path):
+def test_fox_positions_match_skinning(tmp_path):
     actor = viewer.load().actors[0]
     actor.pose.dofs[:] = np.linspace(-0.5, 0.5, len(actor.pose.dofs))
     gltf, notes = write(tmp_path, actor)
@@ -133,7 +133,7 @@ def test_shaped_body_agrees_with_the_plain_formula(tmp_path):
     assert_allclose(found, joints, rtol=0, atol=1e-12)
 
 
-def test_course_rig_of_text_files(tmp_path):
+def test_skel_and_skin_rig_is_exported(tmp_path):
     actor = viewer.load(*write_twist(tmp_path)).actors[0]
     knee = actor.figure.skeleton.names.index("high")
     turn = np.flatnonzero(
@@ -144,7 +144,7 @@ def test_course_rig_of_text_files(tmp_path):
     assert_allclose(gltf.vertices()[0], [[1, 0, 0], [0.5, 1, -0.5], [0, 2, -1]], rtol=0, atol=EXACT)
 
 
-def test_z_up_is_turned_by_a_node(tmp_path):
+def test_z_up_is_rotated_by_a_node(tmp_path):
     actor = seamed_actor(unit="m", up="z")
     actor.pose.dofs[:] = 0.1, 0.2, 0.3, 0.4, 0.5, 0.6
     actor.pose.figure_translation[:] = 1, 2, 3
@@ -154,7 +154,7 @@ def test_z_up_is_turned_by_a_node(tmp_path):
     assert notes[1:] == ["z is up: a node above the figure rotates it by -90 degrees about x"]
 
 
-def test_materials_are_primitives_with_their_pictures(tmp_path):
+def test_materials_become_primitives_with_textures(tmp_path):
     pictures = (PICTURE, None, OTHER_PICTURE, PICTURE)
     mesh = seamed_mesh(pictures=pictures, of_triangle=np.array([2, -1, 0]))
     actor = seamed_actor(mesh=mesh, unit="m")
@@ -172,14 +172,14 @@ def test_materials_are_primitives_with_their_pictures(tmp_path):
     assert gltf.root["samplers"][0]["wrapS"] == 33071  # clamped at the edges, as the viewer does
 
 
-def test_shared_picture_is_written_once(tmp_path):
+def test_shared_texture_is_written_once(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, int))
     mesh = replace(mesh, materials=mesh.materials * 2, triangle_materials=np.array([0, 1, 1]))
     gltf, _ = write(tmp_path, seamed_actor(mesh=mesh))
     assert len(gltf.root["images"]) == 1 and len(gltf.root["materials"]) == 2
 
 
-def test_picture_without_coordinates_is_left_out(tmp_path):
+def test_texture_without_coordinates_is_omitted(tmp_path):
     mesh = seamed_mesh(uvs=False, pictures=(PICTURE,), of_triangle=np.zeros(3, int))
     gltf, _ = write(tmp_path, seamed_actor(mesh=mesh))
     assert "textures" not in gltf.root and "TEXCOORD_0" not in gltf.primitives[0]["attributes"]
@@ -239,7 +239,7 @@ def test_mesh_alone_and_mesh_that_is_not_bound(tmp_path):
     assert_allclose(corners(gltf, gltf.vertices()[0])[..., 1], POSITIONS[TRIANGLES][..., 1] + 7)
 
 
-def test_points_without_triangles_and_nothing_at_all(tmp_path):
+def test_points_without_triangles_and_empty_figures(tmp_path):
     actor = seamed_actor(mesh=Mesh(POSITIONS, np.zeros((5, 3)), np.zeros((0, 3))), unit="m")
     gltf, _ = write(tmp_path, actor)
     assert_allclose(gltf.vertices()[0], POSITIONS, rtol=0, atol=0)
@@ -252,7 +252,7 @@ def test_points_without_triangles_and_nothing_at_all(tmp_path):
     assert notes[1] == "the mesh has no vertices and is omitted"
 
 
-def test_text_and_arrays_in_two_files(tmp_path):
+def test_gltf_and_bin_files_are_written_together(tmp_path):
     actor = seamed_actor(name="ro\udc80of")
     notes = faults.lines(export(actor, tmp_path / "a roof%1.gltf"))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a roof%1.bin", "a roof%1.gltf"]
@@ -264,7 +264,7 @@ def test_text_and_arrays_in_two_files(tmp_path):
     assert files_written("x.gltf")[1].name == "x.bin" and len(files_written("x.glb")) == 1
 
 
-def test_both_files_or_none(tmp_path):
+def test_both_files_are_written_or_none(tmp_path):
     (tmp_path / "roof.gltf").write_text("before")
     (tmp_path / "roof.bin").mkdir()
     with pytest.raises(OutputError, match=r"roof\.bin: is a folder"):
@@ -272,7 +272,7 @@ def test_both_files_or_none(tmp_path):
     assert (tmp_path / "roof.gltf").read_text() == "before"
 
 
-def test_what_cannot_be_written(tmp_path):
+def test_unsupported_data_is_refused(tmp_path):
     mesh = replace(seamed_mesh(), positions=POSITIONS * 1e300)
     message = "huge: expected numbers that fit glTF's single precision, found 1e+300"
     with pytest.raises(RigError, match=f"^{message.replace('+', '.')}$"):

@@ -87,7 +87,7 @@ def test_frames_are_keys(tmp_path):
     assert_drawn(gltf, animation.figure, Actor(animation.figure).pose)
 
 
-def test_rows_that_move_get_channels(tmp_path):
+def test_moving_rows_get_channels(tmp_path):
     moves = np.zeros((4, 2, 3))
     moves[:, 0, 0] = [0, 1, 2, 3]
     moves[:, 1] = 0, 0, 4  # shifted, but still
@@ -110,7 +110,7 @@ def test_rows_that_move_get_channels(tmp_path):
     assert notes[1:] == ["1 joint below the root translates: tip"]
 
 
-def test_place_that_stays_is_no_channel(tmp_path):
+def test_constant_placement_gets_no_channel(tmp_path):
     animation = roof_animation(figure_translations=np.tile([1.0, 2, 3], (4, 1)))
     gltf, _ = write(tmp_path, animation)
     assert gltf.nodes[gltf.named("roof")]["translation"] == [1, 2, 3]
@@ -157,7 +157,7 @@ def test_gaps_split_into_files(tmp_path):
     assert notes[4] == "missing frames 7, 10 to 11, 13: one file for each run of frames"
 
 
-def test_one_run_is_one_file(tmp_path):
+def test_one_run_of_frames_is_one_file(tmp_path):
     gltf, _ = write(tmp_path, roof_animation(rows=[-1, 0, 1, 2]), gaps="split")
     assert abs(gltf.duration() - 0.2) < 1e-7
 
@@ -217,7 +217,7 @@ def test_body_with_correctives_and_shape(tmp_path):
     ]
 
 
-def test_changing_shape_is_the_first_one(tmp_path):
+def test_changing_shape_is_written_as_its_first_frame(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
     motion = family_motion(24, frames=3, rows=[-1, 1, 2], shape=waves(3, 10))
     animation = family_animation(figure, motion)
@@ -256,7 +256,7 @@ def test_changing_morphs_are_animated(tmp_path):
     assert gltf.root["meshes"][0]["weights"] == [0.5]
 
 
-def test_world_of_the_frames_says_what_is_up(tmp_path):
+def test_up_axis_is_taken_from_the_frames(tmp_path):
     animation = roof_animation(figure_translations=np.arange(12.0).reshape(4, 3))
     gltf, notes = write(tmp_path, animation, world_up="z")
     assert_played(gltf, animation, TO_Y)
@@ -274,7 +274,7 @@ def test_skeleton_alone_moves(tmp_path):
     assert_allclose(place, [-np.sin(1.0), 1 + np.cos(1.0), 0], rtol=0, atol=EXACT)
 
 
-def test_other_skinning_is_compared_with(tmp_path):
+def test_other_skinning_is_the_reference_for_losses(tmp_path):
     animation = roof_animation(figure=seamed_actor(unit="m", mesh=seamed_mesh(uvs=False)).figure)
     _, notes = write(tmp_path, animation, skinning=Skinning("mix"))
     apart = [
@@ -290,7 +290,7 @@ def test_other_skinning_is_compared_with(tmp_path):
     )
 
 
-def test_long_takes_stay_small_and_exact(tmp_path):
+def test_long_animations_stay_small_and_exact(tmp_path):
     """Ten thousand frames: every key is at its place."""
     count = 10_000
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.eye(3)[:2])
@@ -307,7 +307,7 @@ def test_long_takes_stay_small_and_exact(tmp_path):
     assert len(gltf.buffer) == count * 4 * (1 + 2 * 4)
 
 
-def test_malformed_takes(tmp_path):
+def test_invalid_animations_are_refused(tmp_path):
     def refused(animation, message, **options):
         with pytest.raises(RigError) as caught:
             write(tmp_path, animation, **options)

@@ -23,7 +23,7 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
 
 
-def test_influences_can_be_cut_as_asked(tmp_path):
+def test_influences_can_be_limited(tmp_path):
     actor = viewer.load().actors[0]
     actor.pose.dofs[:] = np.linspace(-0.5, 0.5, len(actor.pose.dofs))
     gltf, notes = write(tmp_path, actor, max_influences=3)
@@ -32,7 +32,7 @@ def test_influences_can_be_cut_as_asked(tmp_path):
     assert not any("influences" in note for note in notes[1:])
 
 
-def test_thirteen_influences_are_all_there(tmp_path):
+def test_all_thirteen_influences_are_written(tmp_path):
     shares = np.arange(1.0, 14.0) / 91.0
     joints = np.array([[0.1 * j, 0, 0] for j in range(14)])
     bound = np.tile(np.eye(4), (14, 1, 1))
@@ -55,7 +55,7 @@ def test_thirteen_influences_are_all_there(tmp_path):
     assert notes[1].startswith("up to 13 influences per vertex, all of them written")
 
 
-def test_weights_are_scaled_and_the_largest_move_is_told(tmp_path):
+def test_weights_are_normalised_and_the_largest_displacement_is_reported(tmp_path):
     # Vertex 1 at (1, 0, 0) weighs 0.5: as stored it is drawn at (0.5, 0, 0), half a metre away.
     # Vertex 3 at (1, 2, 1) weighs 1.1: drawn at (1.1, 2.2, 1.1), 0.1 sqrt(6) away.
     rows = ((1.0, 0.0), (0.0, 0.5), (1.0, 0.0), (0.6, 0.5), (1.0, 0.0))
@@ -69,7 +69,7 @@ def test_weights_are_scaled_and_the_largest_move_is_told(tmp_path):
     )
 
 
-def test_vertices_without_influence_hold_on_to_a_node_that_never_moves(tmp_path):
+def test_vertices_without_influence_are_bound_to_a_static_node(tmp_path):
     rows = ((1.0, 0.0), (0.0, 0.0), (1.0, 0.0), (0.5, 0.5), (0.0, 0.0))
     actor = seamed_actor(weights=rows, unit="m", mesh=seamed_mesh(uvs=False))
     actor.pose.dofs[2] = np.pi
@@ -99,7 +99,7 @@ def test_negative_and_repeated_weights_become_what_gltf_allows(tmp_path):
     )
 
 
-def test_other_skinning_is_told(tmp_path):
+def test_other_skinning_is_reported(tmp_path):
     # Half and half, 180 degrees apart about z: LBS collapses to the axis, DQS keeps the distance.
     actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
     actor.pose.dofs[5] = np.pi
@@ -113,7 +113,7 @@ def test_other_skinning_is_told(tmp_path):
     )
 
 
-def test_several_losses_are_summed_up(tmp_path):
+def test_several_losses_are_summarised(tmp_path):
     figure = family_figure("smpl", tmp_path)
     skin = replace(figure.skin, weights=figure.skin.weights * 0.9)
     actor = Actor(replace(figure, skin=skin))
@@ -137,7 +137,7 @@ def test_raw_weights_of_an_animal_model(tmp_path):
     assert_drawn(gltf, figure, actor.pose, TO_Y if figure.up == "z" else np.eye(3))
 
 
-def test_far_meshes_say_what_single_precision_costs(tmp_path):
+def test_distant_meshes_report_single_precision_loss(tmp_path):
     mesh = replace(seamed_mesh(), positions=POSITIONS + np.array([2.0**24 + 1.0, 0, 0]))
     _, notes = write(tmp_path, Actor(Figure("far", mesh, unit="m")))
     # Above 2^24 single precision knows even numbers only.
@@ -147,7 +147,7 @@ def test_far_meshes_say_what_single_precision_costs(tmp_path):
     )
 
 
-def test_large_meshes_and_skeletons_get_larger_numbers(tmp_path):
+def test_large_meshes_and_skeletons_get_wider_indices(tmp_path):
     count, n_joints = 65536, 300
     points = np.random.default_rng(0).normal(size=(count, 3))
     triangles = np.array([[0, 1, 2], [65533, 65534, 65535]])

@@ -121,7 +121,7 @@ def quaternion(vector):
 
 
 @pytest.mark.parametrize("key", ["obj", "npz", "easymocap"])
-def test_unknown_ways_are_refused(tmp_path, key):
+def test_unknown_gap_modes_are_refused(tmp_path, key):
     animation = moving_roof()
     if key == "easymocap":
         animation = family_animation(family_figure("smpl", tmp_path), family_motion(24))

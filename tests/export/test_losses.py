@@ -72,7 +72,7 @@ def write(
 
 
 @pytest.mark.parametrize("unit", ["m", "cm", "in"])
-def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_path, unit):
+def test_bvh_reports_joint_and_skin_error_where_bones_stretch(tmp_path, unit):
     """Each bone grows by 0.1, so the highest joint is 0.2 away, and what it carries 0.5."""
     animation = chain_animation(unit)
     found = said(write(animation, tmp_path, "bvh", "a.bvh", digits=9))
@@ -89,7 +89,7 @@ def test_bvh_tells_how_far_joints_and_a_driven_skin_are_where_bones_grow(tmp_pat
         assert_allclose(place, [-JOINTS[joint, 1], 0, 0], rtol=0, atol=1e-8 / scale)
 
 
-def test_frames_that_are_missing_are_not_compared(tmp_path):
+def test_missing_frames_are_not_compared(tmp_path):
     rows = np.arange(len(WEIGHTS))
     rows[WORST] = -1
     whole = chain_animation()
@@ -102,7 +102,7 @@ def test_frames_that_are_missing_are_not_compared(tmp_path):
         assert found["vertices"] == (pytest.approx(375, rel=TOLD), "vertex 3, frame 4")
 
 
-def test_files_of_parts_tell_their_own_losses(tmp_path):
+def test_each_part_file_reports_its_own_losses(tmp_path):
     rows = np.array([0, 1, -1, 3, 4])
     whole = chain_animation()
     clip = replace(whole.motion, timing=Timing(10.0, rows))
@@ -115,7 +115,7 @@ def test_files_of_parts_tell_their_own_losses(tmp_path):
         assert said(found[1:])["joints"] == (pytest.approx(200, rel=TOLD), "high, frame 3")
 
 
-def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
+def test_gltf_reports_the_same_loss_for_the_baked_shape(tmp_path):
     notes = write(chain_animation(), tmp_path, "gltf", "a.glb")
     assert said(notes) == {
         "joints": (pytest.approx(200, rel=TOLD), f"high, frame {WORST}"),
@@ -128,7 +128,7 @@ def test_gltf_tells_the_same_of_the_shape_that_is_baked_in(tmp_path):
 
 
 @pytest.mark.slow
-def test_expressions_are_no_part_of_a_bvh(tmp_path):
+def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
     """SMPL-X, faces that move: what a skin on the file's joints lacks, by plain formulas."""
     figure = replace(family_figure("smplx", tmp_path), correctives=None)
     motion = family_motion(55, frames=12, expression=4.0 * waves(12, 10, seed=5.0))
@@ -182,7 +182,7 @@ def weighted(weights, count: int, peak: int, far: float) -> SampledAnimation:
 
 
 @pytest.mark.parametrize("peak", [0, 7, 50, 101, 119])
-def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, peak):
+def test_raw_weights_report_the_normalisation_error_in_the_worst_frame(tmp_path, peak):
     """Vertex 2 is at (0, 0, 1), half on each joint, with a sum of 0.998.
 
     Scaled, it goes to (1.5, 0, 1) where the second joint is at x = 3; as stored, to 0.998 of that.
@@ -197,7 +197,7 @@ def test_raw_weights_tell_what_scaling_them_moves_in_the_worst_frame(tmp_path, p
     assert note.values["causes"] == [Phrase("weights-unnormalized", n=1, negative=0)]
 
 
-def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
+def test_explicitly_normalised_weights_lose_nothing(tmp_path):
     weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
     animation = weighted(weights, 5, 2, 3.0)
     assert (
@@ -206,7 +206,7 @@ def test_weights_that_were_scaled_as_asked_lose_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("peak", [13, 77])
-def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path, peak):
+def test_four_influence_error_is_reported_for_the_worst_frame(tmp_path, peak):
     """The weakest of five influences, 0.05, is cut; its joint jumps by 2 m."""
     row = (0.3, 0.3, 0.2, 0.15, 0.05)
     animation = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
@@ -219,7 +219,7 @@ def test_programs_that_read_four_influences_are_told_of_the_worst_frame(tmp_path
     assert not any(note.key in ("X002.first-influences", "X005.influences") for note in cut)
 
 
-def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path):
+def test_four_influence_error_is_measured_over_the_motion(tmp_path):
     """Weights that add up to 0.95, the joint of the weakest, 0.05, 2 m along x in one frame.
 
     As the figure moves it, vertex 1 goes from (0, 1, 0) to (0.1, 0.95, 0); the other four weights,
@@ -232,7 +232,7 @@ def test_programs_that_read_four_influences_are_held_against_the_motion(tmp_path
     assert note.values["distance"] == pytest.approx(np.hypot(0.1, 0.05), rel=TOLD)
 
 
-def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
+def test_negligible_influences_are_reported_without_an_error(tmp_path):
     animation = weighted([(0.3, 0.3, 0.2, 0.15, 0.05)] * 3, 4, 1, 0.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
     assert ("X005.influences", {"most": 5}) in faults.told(notes)
@@ -241,7 +241,7 @@ def test_influences_that_never_matter_are_told_without_a_number(tmp_path):
 # Formats without a place for something
 
 
-def test_amass_and_easymocap_tell_what_they_leave_out(tmp_path):
+def test_amass_and_easymocap_report_omissions(tmp_path):
     """A knee that comes out of its joint by 0.25 m, with all below it, is not in the file."""
     figure = family_figure("smpl", tmp_path)
     knee = figure.skeleton.names.index("left_knee")
@@ -256,7 +256,7 @@ def test_amass_and_easymocap_tell_what_they_leave_out(tmp_path):
         assert found["vertices"][0] <= 250 * (1 + TOLD)
 
 
-def test_anim_tells_of_the_mesh_too(tmp_path):
+def test_anim_reports_the_mesh_error_too(tmp_path):
     """A tip a metre long, turned by 1 radian where its limit is 0.5: 2 sin 0.25 away."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, "x", 0.0), (1, "y", 0.0), (1, "z", 0.0, -0.5, 0.5)]
@@ -280,7 +280,7 @@ def test_anim_tells_of_the_mesh_too(tmp_path):
 
 
 @pytest.mark.slow
-def test_nothing_is_said_where_nothing_is_lost(tmp_path):
+def test_lossless_exports_report_nothing(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
     animation = family_animation(figure, family_motion(24, frames=30))
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb"), ("amass", "a.npz"), ("easymocap", "e")):
@@ -293,7 +293,7 @@ def test_nothing_is_said_where_nothing_is_lost(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "skel"])
-def test_bodies_at_rest_in_another_shape_lose_nothing(tmp_path, suffix):
+def test_still_bodies_in_another_shape_lose_nothing(tmp_path, suffix):
     """Correctives add nothing at rest, so nothing is off by 0 mm either."""
     np.savez(tmp_path / "body.npz", **model("smplx"))
     actor = viewer.load(tmp_path / "body.npz").actors[0]
@@ -304,7 +304,7 @@ def test_bodies_at_rest_in_another_shape_lose_nothing(tmp_path, suffix):
     assert Phrase("part-correctives") in note.values["parts"]
 
 
-def test_correctives_count_in_the_worst_of_many_frames(tmp_path):
+def test_corrective_loss_is_taken_from_the_worst_frame(tmp_path):
     """More frames than are looked at at once, by all of them the slow way."""
     figure = family_figure("smpl", tmp_path)
     animation = family_animation(figure, family_motion(24, frames=150))
@@ -336,7 +336,7 @@ def spike(at: float) -> SampledAnimation:
 
 
 @pytest.mark.parametrize("at", [1.25, 2.5])
-def test_a_peak_between_frames_is_told(tmp_path, at):
+def test_a_peak_between_frames_is_reported(tmp_path, at):
     """Frames on both sides of the peak lie on its flanks; straight between them is lower."""
     animation = spike(at)
     before, after = np.floor(at), np.ceil(at)
@@ -352,7 +352,7 @@ def test_a_peak_between_frames_is_told(tmp_path, at):
         assert found["joints"][0] == size and found["vertices"][0] == size
 
 
-def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
+def test_captures_at_another_rate_report_dropped_frames(tmp_path):
     """Every second frame is written; the one between stands 2 m aside."""
     moves = np.zeros((7, 3))
     moves[3, 0] = 2.0
@@ -367,7 +367,7 @@ def test_captures_at_another_rate_tell_what_is_left_out(tmp_path):
             assert found.get("joints", (None,))[0] == (size and pytest.approx(size, rel=TOLD))
 
 
-def test_motions_that_hang_are_compared_as_they_are_written(tmp_path):
+def test_upside_down_motions_are_compared_as_written(tmp_path):
     """Turned over, a capture at another rate still differs by what it leaves out alone."""
     moves = np.zeros((7, 3))
     moves[:, 1] = np.arange(7)

@@ -42,7 +42,7 @@ def corners(obj):
     return table[..., 0] - 1, table[..., 1] - 1, table[..., 2] - 1
 
 
-def test_mesh_at_rest_comes_back(tmp_path):
+def test_mesh_at_rest_round_trips(tmp_path):
     obj, notes = write(tmp_path, seamed_actor())
     assert_array_equal(obj.v, POSITIONS)
     assert_array_equal(obj.vt, UVS)
@@ -66,14 +66,14 @@ def test_seam_gives_one_vertex_several_texture_coordinates(tmp_path):
     assert len(obj.v) == 5  # none was doubled
 
 
-def test_mesh_with_a_coordinate_a_vertex_repeats_its_index(tmp_path):
+def test_mesh_with_one_coordinate_per_vertex_repeats_its_index(tmp_path):
     mesh = Mesh(POSITIONS, NORMALS, TRIANGLES, UVS[:5])
     obj, _ = write(tmp_path, seamed_actor(mesh=mesh))
     assert_array_equal(corners(obj), [TRIANGLES] * 3)
     assert_array_equal(obj.vt, UVS[:5])
 
 
-def test_mesh_without_coordinates_has_faces_of_vertex_and_normal(tmp_path):
+def test_mesh_without_coordinates_has_vertex_normal_faces(tmp_path):
     obj, _ = write(tmp_path, seamed_actor(mesh=seamed_mesh(uvs=False)))
     assert len(obj.vt) == 0
     lines = (tmp_path / "out.obj").read_text().splitlines()
@@ -118,7 +118,7 @@ def test_numbers_keep_nine_digits(tmp_path):
     assert "v 123456789 0 1e-300\n" in text  # no -0
 
 
-def test_name_says_what_it_is(tmp_path):
+def test_object_name_describes_the_figure(tmp_path):
     obj, _ = write(tmp_path, seamed_actor("a fat\tcat\n", up="z", unit="m"))
     assert len(obj.objects) == 1 and " " not in obj.objects[0]
     assert obj.comments == [f"{obj.objects[0]}: z up, metres"]
@@ -129,7 +129,7 @@ def test_name_says_what_it_is(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["v 1 2 3\nv 4 5 6", "a\rb", "\u2028", "é\udcff", "x" * 5000])
-def test_no_name_can_add_a_line(tmp_path, name):
+def test_line_breaks_in_names_add_no_line(tmp_path, name):
     obj, _ = write(tmp_path, seamed_actor(name))
     assert len(obj.v) == 5 and len(obj.objects) == 1
     data = (tmp_path / "out.obj").read_bytes()
@@ -148,7 +148,7 @@ def pixels(path):
         return np.array(picture.convert("RGBA"))
 
 
-def test_texture_is_written_beside_it(tmp_path):
+def test_texture_is_written_next_to_the_mesh(tmp_path):
     obj, notes = write(tmp_path, textured(PICTURE))
     assert names(tmp_path) == ["out.mtl", "out.obj", "out_0.png"]
     assert obj.libraries == ["out.mtl"]
@@ -176,14 +176,14 @@ def test_triangles_without_material_do_not_inherit_one(tmp_path):
 
 
 @pytest.mark.parametrize("pictures", [(), (None,)])
-def test_without_a_picture_there_is_no_material(tmp_path, pictures):
+def test_without_a_texture_there_is_no_material(tmp_path, pictures):
     of_triangle = [len(pictures) - 1] * 3
     obj, _ = write(tmp_path, textured(*pictures, of_triangle=of_triangle))
     assert names(tmp_path) == ["out.obj"] and obj.libraries == []
     assert [material for material, _ in obj.faces] == [None] * 3
 
 
-def test_files_that_are_there_already_stay(tmp_path):
+def test_existing_files_are_kept(tmp_path):
     for name in ("out.mtl", "out_0.png"):
         (tmp_path / name).write_bytes(b"precious")
     obj, _ = write(tmp_path, textured(PICTURE))
@@ -203,7 +203,7 @@ def test_the_same_files_are_used_again(tmp_path):
     assert names(tmp_path) == ["out-2.mtl", "out.mtl", "out.obj", "out_0-2.png", "out_0.png"]
 
 
-def test_long_names_of_two_pictures_stay_apart(tmp_path):
+def test_long_names_of_two_textures_stay_distinct(tmp_path):
     obj, _ = write(tmp_path, textured(PICTURE, OTHER_PICTURE), f"{'x' * 200}.obj")
     materials = read_mtl(tmp_path / obj.libraries[0])
     for index, picture in enumerate((PICTURE, OTHER_PICTURE)):
@@ -212,7 +212,7 @@ def test_long_names_of_two_pictures_stay_apart(tmp_path):
 
 
 @pytest.mark.parametrize("stem", ["a fat cat", "two\nlines", "ünï", "semi;colon", ".hidden", "#"])
-def test_files_beside_it_have_names_without_blanks(tmp_path, stem):
+def test_companion_files_have_names_without_blanks(tmp_path, stem):
     obj, _ = write(tmp_path, textured(PICTURE), f"{stem}.obj")
     (library,) = obj.libraries  # one word
     picture = read_mtl(tmp_path / library)["material0"]["map_Kd"]
@@ -223,7 +223,7 @@ def test_files_beside_it_have_names_without_blanks(tmp_path, stem):
 # Figures that lack something
 
 
-def test_mesh_without_joints_is_written_as_it_is(tmp_path):
+def test_mesh_without_joints_is_written_unchanged(tmp_path):
     obj, _ = write(tmp_path, Actor(Figure("roof", seamed_mesh())))
     assert_array_equal(obj.v, POSITIONS)
 

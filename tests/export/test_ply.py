@@ -31,7 +31,7 @@ def write(tmp_path, actor):
     return read_ply(tmp_path / "out.ply"), notes
 
 
-def test_header_is_as_the_format_wants_it(tmp_path):
+def test_header_follows_the_format(tmp_path):
     write(tmp_path, seamed_actor(up="z"))
     head = (tmp_path / "out.ply").read_bytes().partition(b"end_header\n")[0]
     assert head.decode("ascii").split("\n") == [
@@ -47,7 +47,7 @@ def test_header_is_as_the_format_wants_it(tmp_path):
     ]
 
 
-def test_mesh_comes_back(tmp_path):
+def test_mesh_round_trips(tmp_path):
     ply, notes = write(tmp_path, seamed_actor())
     vertices, faces = ply.elements["vertex"], ply.elements["face"]
     assert_array_equal(columns(vertices, "x", "y", "z"), POSITIONS)
@@ -64,14 +64,14 @@ def test_corners_have_texture_coordinates_along_seams_too(tmp_path):
     assert_array_equal(found.reshape(3, 3, 2), UVS[UV_TRIANGLES])  # exact in float32
 
 
-def test_one_coordinate_a_vertex_is_spread_to_the_corners(tmp_path):
+def test_per_vertex_coordinates_are_written_per_corner(tmp_path):
     mesh = Mesh(POSITIONS, NORMALS, TRIANGLES, UVS[:5])
     ply, _ = write(tmp_path, seamed_actor(mesh=mesh))
     found = np.array([face["texcoord"] for face in ply.elements["face"]])
     assert_array_equal(found.reshape(3, 3, 2), UVS[TRIANGLES])
 
 
-def test_mesh_without_coordinates_has_no_such_property(tmp_path):
+def test_mesh_without_coordinates_has_no_texcoord_property(tmp_path):
     ply, _ = write(tmp_path, seamed_actor(mesh=seamed_mesh(uvs=False)))
     assert [list(face) for face in ply.elements["face"]] == [["vertex_indices"]] * 3
     assert_array_equal([face["vertex_indices"] for face in ply.elements["face"]], TRIANGLES)
@@ -88,7 +88,7 @@ def test_posed_vertices_are_written(tmp_path):
     assert_allclose(columns(ply.elements["vertex"], "x", "y", "z"), expected, rtol=0, atol=1e-6)
 
 
-def test_pictures_are_left_out(tmp_path):
+def test_textures_are_left_out(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     write(tmp_path, seamed_actor(mesh=mesh))
     assert [path.name for path in tmp_path.iterdir()] == ["out.ply"]

@@ -77,7 +77,7 @@ def body(tmp_path):
 SHAPE = [1.5, -1.0, 0.5]
 
 
-def test_posed_body_comes_back_without_its_correctives(tmp_path, body):
+def test_posed_body_round_trips_without_correctives(tmp_path, body):
     actor, arrays, numbers = body
     again, notes = there_and_back(actor, tmp_path, correctives=False)
     expected, joints = smpl_forward(arrays, SHAPE, numbers, correct=False)
@@ -88,7 +88,7 @@ def test_posed_body_comes_back_without_its_correctives(tmp_path, body):
     assert told_error(notes) == (0, "")
 
 
-def test_error_is_that_of_the_correctives_left_out(tmp_path, body):
+def test_reported_error_is_that_of_the_omitted_correctives(tmp_path, body):
     actor, arrays, numbers = body
     again, notes = there_and_back(actor, tmp_path)
     whole = smpl_forward(arrays, SHAPE, numbers)[0]
@@ -178,7 +178,7 @@ def test_limits_and_missing_dofs_are_kept(tmp_path):
     assert_array_equal(found.dof_limits, limits)
 
 
-def test_boxes_are_kept_or_made(tmp_path):
+def test_boxes_are_kept_or_generated(tmp_path):
     boxes = np.array([[[-1, -2, -3], [1, 2, 3]]], dtype=float)
     joints = skeleton([-1], [(0, "x", 0)], boxes=boxes)
     again, _ = there_and_back(Actor(Figure("box", skeleton=joints)), tmp_path)
@@ -202,7 +202,7 @@ def test_figure_translation_goes_to_the_root(tmp_path):
     assert told_error(notes) == (0, "")
 
 
-def test_scale_becomes_part_of_all_lengths(tmp_path):
+def test_scale_is_baked_into_all_lengths(tmp_path):
     actor = seamed_actor(unit="m")
     actor.pose.figure_scale = 1.5
     again, notes = there_and_back(actor, tmp_path)
@@ -214,7 +214,7 @@ def test_scale_becomes_part_of_all_lengths(tmp_path):
     assert np.allclose(found.min(axis=0), wanted.min(axis=0), atol=1e-12)
 
 
-def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeypatch):
+def test_error_of_a_figure_without_unit_is_relative_to_its_size(tmp_path, monkeypatch):
     # As if the scale were lost.
     monkeypatch.setattr("viewer.export.rig.scaled", lambda figure, factor: figure)
     actor = seamed_actor()
@@ -224,7 +224,7 @@ def test_error_of_a_figure_without_unit_is_a_share_of_its_size(tmp_path, monkeyp
     assert told_error(notes) == (pytest.approx(50, rel=5e-3), "% of the size")
 
 
-def test_up_axis_is_said_to_be_lost(tmp_path):
+def test_loss_of_the_up_axis_is_reported(tmp_path):
     _, notes = there_and_back(seamed_actor(up="z"), tmp_path)
     assert parts_not_held(notes) == [Phrase("part-up", up="z")]
 
@@ -244,7 +244,7 @@ def test_raw_weights_are_kept(tmp_path):
     assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
-def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
+def test_error_caused_by_raw_weights_is_reported(tmp_path):
     rows = "0 0 0.5\n1 1 1\n0 2 1\n2 3 1\n2 4 0.75\n"
     actor = viewer.load(write_pig(tmp_path / "pig", skinning_weights=rows)).actors[0]
     actor.pose.figure_translation[:] = 3, 4, 0
@@ -258,7 +258,7 @@ def test_raw_weights_scale_the_translation_and_the_error_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("options", "sums"), [({"normalize": True}, [1, 1]), ({"max_influences": 1}, [1, 1])]
 )
-def test_weights_are_written_as_they_are_used(tmp_path, options, sums):
+def test_weights_are_written_as_used(tmp_path, options, sums):
     weights = [[0.5, 0], [0, 1], [1, 0], [0.5, 0.75], [1, 0]]
     again, notes = there_and_back(seamed_actor(weights=weights), tmp_path, **options)
     skin = again.figure.skin
@@ -268,7 +268,7 @@ def test_weights_are_written_as_they_are_used(tmp_path, options, sums):
     assert np.diff(skin.starts)[5] == (1 if "max_influences" in options else 2)
 
 
-def test_dual_quaternions_are_no_part_of_a_skin(tmp_path):
+def test_loss_of_dual_quaternions_is_reported(tmp_path):
     weights = [[0.5, 0.5]] * 5
     actor = seamed_actor(weights=weights, unit="m")
     actor.pose.dofs[3] = np.pi / 2  # the tip about x, the line through both joints
@@ -288,7 +288,7 @@ def test_seams_are_split(tmp_path):
     assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
-def test_texture_goes_along(tmp_path):
+def test_texture_is_copied_too(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     again, _ = there_and_back(seamed_actor(mesh=mesh), tmp_path)
     assert names(tmp_path) == ["cloth0.png", "rig.skel", "rig.skin"]
@@ -334,7 +334,7 @@ def test_scaled_joints_are_refused(tmp_path):
     assert refused(actor, tmp_path) == ".skel cannot hold the scale of joint tip"
 
 
-def test_translations_of_joints_below_the_root_are_refused_unless_they_are_0(tmp_path):
+def test_nonzero_joint_translations_below_the_root_are_refused(tmp_path):
     joints = skeleton([-1, 0], [(1, "ty", 0)], names=["hip", "knee"])
     actor = Actor(Figure("a", skeleton=joints))
     actor.pose.dofs[0] = 1e-3
@@ -350,13 +350,13 @@ def test_mesh_without_skeleton_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a{b", "two\nlines", "offset"])
-def test_names_that_would_be_read_otherwise_are_refused(tmp_path, name):
+def test_names_that_would_not_round_trip_are_refused(tmp_path, name):
     joints = ball_skeleton((name,), np.array([-1]), np.zeros((1, 3)))
     actor = Actor(Figure("a", skeleton=joints))
     assert "joint name" in refused(actor, tmp_path, UnsupportedFormatError)
 
 
-def test_refusal_of_the_skin_takes_the_skeleton_back(tmp_path):
+def test_refusal_of_the_skin_reverts_the_skeleton(tmp_path):
     mesh = replace(seamed_mesh(), triangles=np.zeros((0, 3), np.int32), uvs=None,
                    uv_triangles=None, triangle_materials=None)  # fmt: skip
     actor = seamed_actor(mesh=mesh)
@@ -370,7 +370,7 @@ def test_refusal_of_the_skin_takes_the_skeleton_back(tmp_path):
     assert names(tmp_path) == ["rig.skel", "rig.skin"]
 
 
-def test_picture_of_another_content_is_never_replaced(tmp_path):
+def test_texture_with_different_content_is_never_replaced(tmp_path):
     (tmp_path / "cloth0.png").write_bytes(b"precious")
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     with pytest.raises(OutputError) as caught:

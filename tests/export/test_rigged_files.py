@@ -36,7 +36,7 @@ def rigged():
     return target, transfer(template, pose, target)
 
 
-def test_names_of_the_files():
+def test_rigged_file_names():
     assert files_of(Path("a/b.npz")) == [Path("a/b.npz")]
     assert [path.name for path in files_of(Path("b.skin"))] == [
         "b.skel", "b.skin", "b.obj", "b.json",
@@ -49,7 +49,7 @@ def test_names_of_the_files():
     )
 
 
-def test_without_correctives_the_target_is_met_in_its_pose(rigged):
+def test_without_correctives_the_pose_matches_the_target(rigged):
     target, found = rigged
     assert found.figure.correctives is not None
     plain = without_correctives(found)
@@ -59,7 +59,7 @@ def test_without_correctives_the_target_is_met_in_its_pose(rigged):
     assert np.abs(plain.mesh.positions - found.figure.mesh.positions).max() > 1e-3
 
 
-def test_course_rig_gives_the_target_and_says_what_is_lost(rigged, tmp_path):
+def test_skel_rig_matches_the_target_and_reports_losses(rigged, tmp_path):
     target, found = rigged
     lines = faults.lines(write_rigged(found, tmp_path / "arm.skel"))
     assert lines[-1].startswith("pose correctives cannot be stored in .skel and .skin: ")

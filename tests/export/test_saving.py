@@ -127,7 +127,7 @@ def test_full_disk_at_every_step_changes_nothing(
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_interrupt_leaves_what_was_there(rig, tmp_path, monkeypatch, capsys, suffix):
+def test_interrupt_keeps_existing_files(rig, tmp_path, monkeypatch, capsys, suffix):
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / f"person{suffix}").write_text("precious")
@@ -177,7 +177,7 @@ def test_folder_that_cannot_be_written_is_refused(rig, tmp_path, capsys, suffix)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_link_is_followed_and_stays(rig, tmp_path, suffix):
+def test_link_is_followed_and_kept(rig, tmp_path, suffix):
     kept = tmp_path / "kept"
     kept.mkdir()
     target = kept / f"real{suffix}"
@@ -193,7 +193,7 @@ def test_link_is_followed_and_stays(rig, tmp_path, suffix):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_full_device_is_reported_and_takes_no_file_with_it(rig, tmp_path, capsys, suffix):
+def test_full_device_is_reported_and_other_files_survive(rig, tmp_path, capsys, suffix):
     folder = tmp_path / "out"
     folder.mkdir()
     link = folder / f"person{suffix}"
@@ -204,7 +204,7 @@ def test_full_device_is_reported_and_takes_no_file_with_it(rig, tmp_path, capsys
     assert link.is_symlink() and stat.S_ISCHR(Path("/dev/full").stat().st_mode)
 
 
-def test_link_to_nothing_creates_what_it_names(rig, tmp_path):
+def test_dangling_link_creates_its_target(rig, tmp_path):
     link = tmp_path / "person.obj"
     link.symlink_to("real.obj")
     assert run(["convert", *rig, "-o", str(link)]) == 0
@@ -219,7 +219,7 @@ def test_all_or_none_keeps_what_was_written():
         pass
 
 
-def test_all_or_none_puts_back_what_was_there(tmp_path):
+def test_all_or_none_restores_previous_files(tmp_path):
     old, new, link = tmp_path / "old", tmp_path / "new", tmp_path / "link"
     old.write_text("old")
     link.symlink_to("new")
@@ -239,7 +239,7 @@ def test_all_or_none_leaves_no_copies(tmp_path):
     assert contents(tmp_path) == {"old": b"changed"}
 
 
-def test_outer_block_that_fails_puts_back_what_an_inner_one_wrote(tmp_path):
+def test_failing_outer_block_reverts_inner_writes(tmp_path):
     old, new, twice = tmp_path / "old", tmp_path / "new", tmp_path / "twice"
     old.write_text("old")
     twice.write_text("twice")

@@ -77,20 +77,20 @@ def test_first_release(tmp_path):
         (np.array("female", dtype=object), None),
     ],
 )
-def test_gender_may_be_written_in_many_ways(tmp_path, gender, said):
+def test_gender_is_accepted_in_several_spellings(tmp_path, gender, said):
     path = saved(tmp_path / "a.npz", **first_release(gender=gender))
     assert dict(motion_of(path)[0].facts).get("gender") == said
 
 
 @pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
 @pytest.mark.parametrize("value", [np.array(59.94), np.array([59.94], dtype=">f8")])
-def test_frame_rate_by_any_name(tmp_path, key, value):
+def test_frame_rate_is_found_under_any_key(tmp_path, key, value):
     path = saved(tmp_path / "a.npz", **first_release(**{"mocap_framerate": None, key: value}))
     motion, warnings = motion_of(path)
     assert (motion.timing.frame_rate, warnings) == (59.94, [])
 
 
-def test_differing_frame_rates_are_noticed(tmp_path):
+def test_conflicting_frame_rates_are_reported(tmp_path):
     path = saved(tmp_path / "a.npz", **first_release(mocap_frame_rate=np.array(60)))
     motion, warnings = motion_of(path)
     assert motion.timing.frame_rate == 120.0
@@ -99,7 +99,7 @@ def test_differing_frame_rates_are_noticed(tmp_path):
     ]
 
 
-def test_soft_tissue_is_counted(tmp_path):
+def test_soft_tissue_coefficients_are_counted(tmp_path):
     dmpls = np.zeros((4, 8))
     dmpls[1:3, 2] = 0.5
     path = saved(tmp_path / "a.npz", **first_release(dmpls=dmpls))
@@ -170,7 +170,7 @@ def test_hand_angles_are_joints_and_never_get_the_mean(tmp_path):
     assert warnings == [("F007.motion-angles", None, {"item": "right_hand_pose"})]
 
 
-def test_expressions_of_speech(tmp_path):
+def test_speech_expressions(tmp_path):
     path = saved(
         tmp_path / "a.npz",
         betas=waves(300),
@@ -186,7 +186,7 @@ def test_expressions_of_speech(tmp_path):
     assert_array_equal(motion.expression, waves(3, 100))
 
 
-def test_dance_in_a_pickle(tmp_path):
+def test_dance_data_in_a_pickle(tmp_path):
     path = tmp_path / "gBR_sBM_c01.pkl"
     values = {"smpl_poses": waves(3, 72), "smpl_trans": 93.0 * waves(3, 3)}
     values |= {"smpl_scaling": np.array([93.0]), "smpl_loss": 0.5}
@@ -201,7 +201,7 @@ def test_dance_in_a_pickle(tmp_path):
     ("shape", "names"),
     [((2, 72), SMPL), ((2, 24, 3), SMPL), ((2, 66), SMPL[:22]), ((2, 52, 3), SMPLH)],
 )
-def test_poses_alone_are_a_motion_if_there_are_several(tmp_path, shape, names):
+def test_several_poses_alone_are_a_motion(tmp_path, shape, names):
     path = saved(tmp_path / "a.npz", poses=waves(*shape))
     motion, warnings = motion_of(path)
     assert (motion.joint_names, motion.n_rows, motion.up) == (names, 2, "")
@@ -219,7 +219,7 @@ def test_poses_alone_are_a_motion_if_there_are_several(tmp_path, shape, names):
         {"betas": waves(10), "gender": np.array("male")},
     ],
 )
-def test_one_frame_is_still_a_pose(tmp_path, arrays):
+def test_one_frame_is_a_pose(tmp_path, arrays):
     source = Source.open(saved(tmp_path / "a.npz", **arrays))
     assert detect(source) == "pose"
     assert isinstance(read(source), PoseRecord)
@@ -248,7 +248,7 @@ def test_one_frame_at_a_frame_rate_is_a_motion(tmp_path, arrays, names):
         ({"global_orient": np.zeros((0, 3)), "body_pose": np.zeros((0, 69))}, "global_orient"),
     ],
 )
-def test_no_frames_are_refused(tmp_path, arrays, key):
+def test_empty_motions_are_refused(tmp_path, arrays, key):
     path = saved(tmp_path / "a.npz", **arrays)
     with pytest.raises(FormatError) as caught:
         read(Source.open(path))
@@ -279,27 +279,27 @@ def test_no_frames_are_refused(tmp_path, arrays, key):
          "others": ["shape"]})),
     ],
 )  # fmt: skip
-def test_what_is_there_twice_and_differs_is_said(tmp_path, changes, message):
+def test_conflicting_duplicates_are_reported(tmp_path, changes, message):
     motion, warnings = motion_of(saved(tmp_path / "a.npz", **first_release(**changes)))
     assert warnings == [message]
     assert_array_equal(motion.vectors, waves(4, 156).reshape(4, 52, 3))
     assert_array_equal(motion.translations, waves(4, 3, seed=1))
 
 
-def test_what_is_there_twice_and_the_same_is_not_said(tmp_path):
+def test_identical_duplicates_are_not_reported(tmp_path):
     same = {"fullpose": waves(4, 156), "transl": waves(4, 1, 3, seed=1), "shape": waves(16, seed=2)}
     same |= {"root_orient": waves(4, 156)[:, :3] + 9e-6, "pose_hand": waves(4, 156)[:, 66:]}
     assert motion_of(saved(tmp_path / "a.npz", **first_release(**same)))[1] == []
 
 
-def test_hand_components_beside_whole_poses_are_not_compared(tmp_path):
+def test_hand_components_next_to_full_poses_are_not_compared(tmp_path):
     beside = {"left_hand_pose": waves(4, 45), "use_pca": np.array(True)}
     assert motion_of(saved(tmp_path / "a.npz", **first_release(**beside)))[1] == []
     beside = {"right_hand_pose": waves(4, 12)}
     assert motion_of(saved(tmp_path / "b.npz", **first_release(**beside)))[1] == []
 
 
-def test_parts_of_the_same_joints_are_taken_once(tmp_path):
+def test_parts_covering_the_same_joints_are_used_once(tmp_path):
     parts = {"root_orient": waves(3, 3), "pose_body": waves(3, 63), "pose_eye": waves(3, 6)}
     parts |= {"leye_pose": waves(3, 3, seed=2), "reye_pose": waves(3, 6)[:, 3:]}
     path = saved(tmp_path / "a.npz", **parts, trans=waves(3, 3), fps=np.array(30))
@@ -309,7 +309,7 @@ def test_parts_of_the_same_joints_are_taken_once(tmp_path):
     assert warnings == [("F007.motion-again", None, {"item": "leye_pose"})]
 
 
-def test_marks_of_our_own_files_are_read(tmp_path):
+def test_own_metadata_is_read(tmp_path):
     present = np.array([True, False, True, True])
     arrays = first_release(present=present, up=np.array("y"))
     motion, warnings = motion_of(saved(tmp_path / "a.npz", **arrays))
@@ -380,18 +380,18 @@ def test_mismatched_parts_are_refused(tmp_path, part, message):
     assert refusal(saved(tmp_path / "a.npz", root_orient=waves(3, 3), **part)) == message
 
 
-def test_shape_of_a_subject_is_no_motion(tmp_path):
+def test_subject_shape_is_not_a_motion(tmp_path):
     path = saved(tmp_path / "shape.npz", betas=waves(16), gender=np.array("male"))
     assert refusal(path) == (("F002.motion-shape", None, {"keys": ["betas", "gender"]}))
 
 
-def test_first_stage_is_no_motion(tmp_path):
+def test_first_stage_file_is_not_a_motion(tmp_path):
     arrays = {"betas": waves(16), "markers_latent": np.zeros((4, 3)), "gender": np.array("male")}
     path = saved(tmp_path / "female_stagei.npz", **arrays)
     assert detect(Source.open(path)) == "amass"
     assert refusal(path) == (("F002.motion-stage", None, {}))
 
 
-def test_other_archives_are_named_by_their_keys(tmp_path):
+def test_other_archives_are_described_by_their_keys(tmp_path):
     path = saved(tmp_path / "a.npz", pose_body=waves(3, 63))
     assert refusal(path) == (("F002.motion", None, {"keys": ["pose_body"]}))

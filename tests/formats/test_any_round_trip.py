@@ -94,7 +94,7 @@ def skinned_meshes(draw):
 
 @given(skeletons())
 @settings(max_examples=150)
-def test_any_skeleton_comes_back(wanted):
+def test_any_skeleton_round_trips(wanted):
     found, warnings = again(Figure("any", skeleton=wanted), skel)
     assert warnings == []
     assert_equal_skeletons(found.skeleton, wanted)
@@ -102,7 +102,7 @@ def test_any_skeleton_comes_back(wanted):
 
 @given(skinned_meshes())
 @settings(max_examples=150)
-def test_any_skin_comes_back(wanted):
+def test_any_skin_round_trips(wanted):
     found, _ = again(wanted, skin)
     assert_equal_meshes(found.mesh, wanted.mesh)
     assert_equal_skins(found.skin, wanted.skin)

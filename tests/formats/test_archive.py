@@ -59,7 +59,9 @@ def refused(action: Any, *arguments: Any) -> Fault:
         (b"(d.", "pickle", ()),
     ],
 )
-def test_content_decides_not_the_name(data: bytes, kind: str, keys: tuple[str, ...]) -> None:
+def test_content_takes_precedence_over_the_name(
+    data: bytes, kind: str, keys: tuple[str, ...]
+) -> None:
     assert is_archive(data[:64])
     for name in ("x.pkl", "x.npz", "x.txt"):
         archive = opened(data, name)
@@ -68,7 +70,7 @@ def test_content_decides_not_the_name(data: bytes, kind: str, keys: tuple[str, .
 
 @pytest.mark.parametrize("protocol", range(6))
 @pytest.mark.parametrize("value", [{}, {"a": 1}, [1], ROWS, {1: 2}, []])
-def test_pickles_are_recognised_by_their_head(value: Any, protocol: int) -> None:
+def test_pickles_are_recognised_by_their_first_bytes(value: Any, protocol: int) -> None:
     assert is_archive(pickle.dumps(value, protocol)[:64])
 
 
@@ -97,7 +99,7 @@ def test_pickles_are_recognised_by_their_head(value: Any, protocol: int) -> None
         b"(1, 2)",
     ],
 )
-def test_other_files_are_no_archives(head: bytes) -> None:
+def test_other_files_are_not_archives(head: bytes) -> None:
     assert not is_archive(head)
 
 
@@ -115,17 +117,17 @@ def test_other_files_are_no_archives(head: bytes) -> None:
         (bytes(1000), ("F002.archive", None, {"found": "zeros"})),
     ],
 )  # fmt: skip
-def test_what_a_file_is_instead(data: bytes, found: Fault) -> None:
+def test_unsuitable_files_are_described(data: bytes, found: Fault) -> None:
     assert refused(opened, data, "SMPL_MALE.pkl") == found
 
 
 @pytest.mark.parametrize("protocol", [0, 1, 2])
-def test_transfer_in_text_mode_is_named(protocol: int) -> None:
+def test_damage_by_text_mode_transfer_is_named(protocol: int) -> None:
     data = pickle.dumps({"v": np.arange(13.0)}, protocol).replace(b"\n", b"\r\n")
     assert refused(opened, data, "x.pkl") == (("F002.pickle-line-ends", None, {}))
 
 
-def test_text_that_is_no_pickle() -> None:
+def test_text_that_is_not_a_pickle() -> None:
     line = refused(opened, b"positions 4 {\n", "x.pkl")
     assert line == ("F002.archive", None, {"found": "something else"})
 
@@ -139,7 +141,7 @@ def test_single_array(tmp_path: Path) -> None:
         assert not found.flags.writeable
 
 
-def test_single_array_may_end_like_a_text(tmp_path: Path) -> None:
+def test_single_array_may_end_like_text(tmp_path: Path) -> None:
     """A byte 26 ends a text file, but not an array."""
     path = tmp_path / "x.npy"
     np.save(path, np.array([1, 26], np.uint8))
@@ -148,7 +150,7 @@ def test_single_array_may_end_like_a_text(tmp_path: Path) -> None:
     assert open_archive(source).array("arr_0").values().tolist() == [1, 26]
 
 
-def test_large_files_are_not_read_to_open_them(tmp_path: Path) -> None:
+def test_opening_does_not_read_large_files(tmp_path: Path) -> None:
     path = tmp_path / "x.npz"
     np.savez(path, v=ROWS)
     source = Source.open(path)
@@ -156,7 +158,7 @@ def test_large_files_are_not_read_to_open_them(tmp_path: Path) -> None:
     assert source._data is None
 
 
-def test_file_that_is_gone(tmp_path: Path) -> None:
+def test_missing_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.npz"
     np.savez(path, v=ROWS)
     source = Source.open(path)
@@ -197,7 +199,7 @@ def test_file_that_is_gone(tmp_path: Path) -> None:
          dtype="float64")})),
     ],
 )  # fmt: skip
-def test_shape_and_kind_are_checked(shape: Any, kinds: str, message: Fault | None) -> None:
+def test_shape_and_dtype_are_checked(shape: Any, kinds: str, message: Fault | None) -> None:
     for archive in (opened(npz(v=ROWS)), opened(pickle.dumps({"v": ROWS}))):
         if message is None:
             assert_array_equal(archive.array("v", shape, kinds).values(), ROWS)
@@ -220,7 +222,7 @@ def test_shape_and_kind_are_checked(shape: Any, kinds: str, message: Fault | Non
         (np.array([{}], object), Phrase("found-unread", what=Phrase("unread-objects"))),
     ],
 )
-def test_what_is_no_array(value: Any, found: Phrase) -> None:
+def test_non_arrays_are_refused(value: Any, found: Phrase) -> None:
     archive = opened(pickle.dumps({"v": value}))
     for ask, expected in (
         (archive.array, Phrase("wanted-numbers-any")),
@@ -241,7 +243,7 @@ def test_what_is_no_array(value: Any, found: Phrase) -> None:
         ([], "float64"),
     ],
 )
-def test_numbers_in_lists_are_arrays(value: Any, dtype: str) -> None:
+def test_lists_of_numbers_are_arrays(value: Any, dtype: str) -> None:
     found = opened(pickle.dumps({"v": value})).array("v")
     assert found.dtype == dtype
     assert_array_equal(found.values(), value)
@@ -275,7 +277,7 @@ def test_matrix_may_be_dense() -> None:
     )
 
 
-def test_entries_of_rows_and_columns() -> None:
+def test_sparse_matrix_from_rows_and_columns() -> None:
     parts = np.array([5, 6]), np.array([1, 0]), np.array([0, 1, 2])
     for layout, pairs in (("csr", [[0, 1], [1, 0]]), ("csc", [[1, 0], [0, 1]])):
         rows, columns, values = Sparse((2, 2), *parts, layout).entries()
@@ -287,7 +289,7 @@ def test_entries_of_rows_and_columns() -> None:
     "value",
     ["female", b"female", np.array("female"), np.array([b"female"]), np.array("female", ">U9")],
 )
-def test_texts_however_they_are_written(value: Any) -> None:
+def test_strings_of_any_encoding(value: Any) -> None:
     assert opened(pickle.dumps({"v": value})).text("v") == "female"
     assert opened(npz(v=np.array(value))).text("v") == "female"
 
@@ -303,12 +305,12 @@ def test_texts_however_they_are_written(value: Any) -> None:
          dtype="float64")})),
     ],
 )  # fmt: skip
-def test_what_is_no_text(value: Any, found: Fault) -> None:
+def test_non_strings_are_refused(value: Any, found: Fault) -> None:
     archive = opened(pickle.dumps({"v": value}))
     assert refused(archive.text, "v") == found
 
 
-def test_values_are_kept() -> None:
+def test_values_are_cached() -> None:
     archive = opened(npz(v=ROWS, o=np.array({}, object)))
     first = archive.get("v")
     assert isinstance(first, Deferred)
@@ -316,7 +318,7 @@ def test_values_are_kept() -> None:
     assert archive.get("o") == Opaque(Phrase("unread-objects"))
 
 
-def test_halves_are_widened(tmp_path: Path) -> None:
+def test_half_floats_are_widened(tmp_path: Path) -> None:
     """65504 is the largest half: comparing it with a larger number would overflow."""
     np.savez(tmp_path / "a.npz", half=np.array([0.5, 65504], "f2"))
     half = open_archive(Source.open(tmp_path / "a.npz")).array("half").values()

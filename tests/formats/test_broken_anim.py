@@ -239,7 +239,7 @@ def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) ->
     assert refusal_of(lambda: parse(text)) == fault
 
 
-def test_truncation_anywhere_is_an_error_or_a_warning() -> None:
+def test_truncation_anywhere_gives_an_error_or_a_warning() -> None:
     for length in range(len(GOOD)):
         try:
             _, warnings = parse(GOOD[:length])

@@ -369,7 +369,7 @@ def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) ->
         ),
     ],
 )
-def test_what_is_odd_loads_with_a_warning(text: str, count: int, warnings: list[Fault]) -> None:
+def test_oddities_load_with_a_warning(text: str, count: int, warnings: list[Fault]) -> None:
     motion, found = read(text)
     assert motion.clip.n_rows == count
     assert found == warnings

@@ -51,7 +51,7 @@ def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
     assert rows_of(parts, 0) == [0, 2]
 
 
-def test_file_that_is_no_text_is_a_gap(tmp_path):
+def test_binary_file_is_a_gap(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
     (folder / "000001.json").write_bytes(b"[\n\xff\xfe]")
     (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a byte order mark is accepted
@@ -89,7 +89,7 @@ def test_file_that_vanishes_is_a_gap(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
-def test_pipe_among_the_frames_is_not_opened(tmp_path):
+def test_pipe_among_the_frames_is_ignored(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
     os.mkfifo(folder / "000001.json")
     capture, _, warnings = opened(tmp_path)
@@ -182,7 +182,7 @@ def test_whole_numbers_may_be_written_as_fractions(tmp_path):
     assert list(opened(tmp_path)[1][0].bodies) == [2]
 
 
-def test_record_that_is_none_is_left_out(tmp_path):
+def test_non_record_is_left_out(tmp_path):
     warnings, parts = gap(tmp_path, [None, 3, body(0)])
     assert warnings == [
         (
@@ -214,7 +214,7 @@ def test_record_that_is_none_is_left_out(tmp_path):
     assert rows_of(parts, 0) == [0, 1, 2]
 
 
-def test_first_of_two_with_one_number_counts(tmp_path):
+def test_first_of_two_records_with_one_id_is_used(tmp_path):
     warnings, parts = gap(tmp_path, [body(0, seed=1.0), body(0, seed=2.0)])
     assert warnings == [
         ("F007.record", 1, {"problem": ("F002.record-twice", None, {"item": "person 0"})})
@@ -240,13 +240,13 @@ def test_untracked_people_are_named_in_messages(tmp_path):
     ]
 
 
-def test_two_numbers_of_one_person_are_noticed(tmp_path):
+def test_two_ids_for_one_person_are_reported(tmp_path):
     warnings, parts = gap(tmp_path, [body(0, personID=4), body(1, personID=1)])
     assert warnings == [("F007.record-ids", None, {})]
     assert rows_of(parts, 1) == [1]
 
 
-def test_many_faults_are_counted(tmp_path):
+def test_many_errors_are_counted(tmp_path):
     broken = dict.fromkeys(range(1, 31), "[")
     write_frames(tmp_path / "smpl", {0: [body(0)], **broken, 31: [body(0)]})
     _, parts, _ = opened(tmp_path)
@@ -268,14 +268,14 @@ def test_only_broken_files_are_refused(tmp_path):
     assert f"{folder}/000000.json:1: expected JSON, found" in str(caught.value)
 
 
-def test_code_of_vposer_is_refused(tmp_path):
+def test_vposer_latent_code_is_refused(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, 32)]})
     problem = Phrase("record-vposer", found=32)
     fault = ("F002.record", 1, {"item": "person 0: poses", "problem": problem})
     assert refusal(tmp_path / "smpl" / "000000.json") == fault
 
 
-def test_unknown_length_is_refused_with_those_known(tmp_path):
+def test_unknown_length_is_refused_with_the_known_ones(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, 90)]})
     lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
     problem = Phrase("record-lengths", expected=lengths, found=90)
@@ -283,7 +283,7 @@ def test_unknown_length_is_refused_with_those_known(tmp_path):
     assert refusal(tmp_path / "smpl" / "000000.json") == fault
 
 
-def test_nobody_is_refused(tmp_path):
+def test_capture_without_people_is_refused(tmp_path):
     write_frames(tmp_path / "smpl", {0: [], 1: []})
     assert refusal(tmp_path) == ("F002.capture-people", None, {"n": 2})
 
@@ -293,7 +293,7 @@ def test_folder_without_frames_is_refused(tmp_path):
     assert refusal(tmp_path) == (("F002.capture-frames", None, {}))
 
 
-def test_points_in_the_plane_are_refused(tmp_path):
+def test_two_dimensional_points_are_refused(tmp_path):
     write_frames(tmp_path / "annots", {0: {"annots": [{"personID": 0, "keypoints": [[1, 2, 1]]}]}})
     found = refusal(tmp_path / "annots")[2]["problem"]
     wanted, keys = ("poses", "keypoints3d"), ["personID", "keypoints"]

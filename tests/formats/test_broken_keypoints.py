@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._json_places import line_at, nearest_place
 
 
-def test_keypoints_that_are_no_numbers_are_not_seen(tmp_path):
+def test_non_finite_keypoints_are_unseen(tmp_path):
     record = points(0)
     rows = record["keypoints3d"]
     rows[1][3], rows[2][0], rows[3][3] = -0.5, float("nan"), float("nan")
@@ -57,7 +57,7 @@ def test_broken_keypoints_are_a_gap(tmp_path, rows, message):
     assert len(parts[1].points[0][1].points) == 1
 
 
-def test_keypoints_that_nobody_saw_are_noticed_at_the_end(tmp_path):
+def test_entirely_unseen_keypoints_are_reported_at_the_end(tmp_path):
     unseen = points(3)
     unseen["keypoints3d"] = [[0.0] * 4] * 25
     late = {
@@ -82,7 +82,7 @@ PEOPLE = [body(3, 9), body(4, 9)]
     ("key", "value"),
     [("poses", [1.0]), ("Th", [[1.0, float("nan"), 0.0]]), ("shapes", "x"), ("Rh", None)],
 )
-def test_the_line_of_the_key_at_fault_is_named(tmp_path, wrapper, key, value):
+def test_the_line_of_the_invalid_key_is_named(tmp_path, wrapper, key, value):
     people = [PEOPLE[0], {**PEOPLE[1], key: value}]
     content = {"note": [{"poses": 1}], wrapper: people} if wrapper else people
     text = json.dumps(content, indent=1)
@@ -116,6 +116,6 @@ def test_the_line_of_a_record_is_named_where_a_key_is_missing(tmp_path):
         ("[]", (0,), None),
     ],
 )
-def test_places_in_a_text_have_a_line(text, place, line):
+def test_text_positions_map_to_lines(text, place, line):
     offset = nearest_place(text, place)
     assert (None if offset is None else line_at(text, offset)) == line

@@ -56,7 +56,7 @@ BOUND = 64 << 20  # bytes of memory that a refusal may need
          "problem": Phrase("npy-header", found=b"")})),
     ],
 )  # fmt: skip
-def test_headers_that_lie(data: bytes, line: Fault) -> None:
+def test_headers_with_false_sizes(data: bytes, line: Fault) -> None:
     whole = zipped({"v.npy": data})
     assert refusal(whole) == line
     assert cost(lambda: refusal(whole)) < BOUND
@@ -114,7 +114,7 @@ def test_bomb_is_refused_before_it_is_unpacked() -> None:
     assert cost(lambda: refusal(data)) < 4 << 20
 
 
-def test_max_size_is_for_all_members_together() -> None:
+def test_max_size_limits_the_sum_of_all_members() -> None:
     data = npz(packed=True, a=np.zeros(1000), b=np.zeros(1000))
     assert refusal(data, 10_000) == ("F001.too-large", None, {"most": 10000, "size": 16256})
     stream = io.BytesIO()
@@ -138,7 +138,7 @@ def test_many_directory_entries_on_one_member() -> None:
     assert str(values["found"]).startswith("218107")
 
 
-def test_directory_that_is_too_long() -> None:
+def test_oversized_directory() -> None:
     data = zipped({f"{number:0>50}": b"" for number in range(25_000)})
     line = refusal(data)
     assert line == (("F002.npz", None, {"reason": "a directory of 2400000 bytes"}))
@@ -212,7 +212,7 @@ def survive(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
-def test_file_cut_short_anywhere(data: bytes) -> None:
+def test_file_truncated_anywhere(data: bytes) -> None:
     for length in range(len(data)):
         with pytest.raises(FormatError):
             look(data[:length])

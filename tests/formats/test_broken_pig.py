@@ -192,7 +192,7 @@ def test_large_file_in_the_folder_is_refused_before_it_is_read(folder):
 # Unusual weights that load
 
 
-def test_vertices_without_weights_stay_at_rest(folder):
+def test_vertices_without_weights_stay_in_the_rest_pose(folder):
     rows = WEIGHTS.replace("1 1 1\n", "").replace("2 3 1\n", "0 3 0\n")
     figure, warnings = read(write(folder, skinning_weights=rows))
     assert warnings == [
@@ -294,7 +294,7 @@ def test_broken_archive_is_refused_with_its_key(tmp_path, change, message):
 
 
 @pytest.mark.parametrize("cut", [1, 40, 200])
-def test_pickle_cut_short_is_refused(tmp_path, cut):
+def test_truncated_pickle_is_refused(tmp_path, cut):
     whole = saved(vertices=text("x" * 200), parents=text("y"))
     (tmp_path / "a.pkl").write_bytes(whole[:-cut])
     assert refusal(tmp_path / "a.pkl")[0] == "a.pkl"
@@ -311,7 +311,7 @@ def test_pickle_cut_short_is_refused(tmp_path, cut):
          {"found": "HTML or XML (a failed download?)"})),
     ],
 )  # fmt: skip
-def test_what_is_no_pickle_of_a_model_is_refused(tmp_path, data, message):
+def test_non_model_pickle_is_refused(tmp_path, data, message):
     (tmp_path / "a.pkl").write_bytes(data)
     assert refusal(tmp_path / "a.pkl") == message
 

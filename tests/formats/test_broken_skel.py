@@ -221,7 +221,7 @@ def test_odd_names_are_shown_on_one_line():
     )
 
 
-def test_long_names_and_words_are_cut():
+def test_long_names_and_words_are_truncated():
     text = f"balljoint {'n' * 5_000_000} {{ pose {'9x' * 2_500_000} 0 0 }}"
     assert shown(refusal(text)) == (
         f'pose of joint {"n" * 59}…: expected a number, found "{"9x" * 19}9…"'
@@ -229,7 +229,7 @@ def test_long_names_and_words_are_cut():
 
 
 @pytest.mark.parametrize("cut", range(len(GOOD.rstrip())))
-def test_file_cut_anywhere_is_refused_or_warned_of(cut):
+def test_truncated_file_is_refused_or_loads_with_a_warning(cut):
     source = Source("a.skel", GOOD[:cut].encode())
     try:
         skel.read(source)

@@ -183,7 +183,7 @@ def number(vertex, word):
 
 
 @pytest.mark.parametrize("cut", range(len(GOOD.rstrip())))
-def test_file_cut_anywhere_is_refused_or_warned_of(cut):
+def test_truncated_file_is_refused_or_loads_with_a_warning(cut):
     source = Source("a.skin", GOOD[:cut].encode())
     try:
         figure = skin.read(source)
@@ -194,7 +194,7 @@ def test_file_cut_anywhere_is_refused_or_warned_of(cut):
         assert figure.mesh.n_vertices == 3
 
 
-def test_paths_and_words_are_never_taken_for_formats():
+def test_paths_and_words_are_never_taken_for_format_strings():
     with pytest.raises(FormatError) as caught:
         read("positions %s {", Path("a{0}%d\n.skin"))
     assert str(caught.value) == 'a{0}%d\\n.skin:1: positions: expected a count, found "%s"'
@@ -207,7 +207,7 @@ def test_paths_and_words_are_never_taken_for_formats():
     "name", ["positions", "normals", "texcoords", "skinweights", "triangles", "bindings"]
 )
 @pytest.mark.parametrize("count", ["2000000000", "99999999999", "1e38", "-5", "-0.5"])
-def test_absurd_count_is_refused_without_memory(name, count):
+def test_absurd_count_is_refused_without_allocating(name, count):
     text = f"{BARE}{name} {count} {{ 1 2 3 }}".encode()
     refusal_of(lambda: read(text))  # modules are loaded once, whichever test comes first
     tracemalloc.start()
@@ -221,7 +221,7 @@ def test_absurd_count_is_refused_without_memory(name, count):
     assert peak < 200_000
 
 
-def test_absurd_number_of_influences_is_refused_without_memory():
+def test_absurd_number_of_influences_is_refused_without_allocating():
     text = GOOD.replace("1 1 1\n}", "1e38 1 1\n}").encode()
     refusal_of(lambda: read(text))  # modules are loaded once, whichever test comes first
     tracemalloc.start()
@@ -267,6 +267,6 @@ def test_20_000_joints_are_bound():
     assert silent(BARE + text).skin.n_joints == 20_000
 
 
-def test_broken_word_far_down_is_found():
+def test_invalid_word_far_down_is_found():
     text = "positions 200000 {\n" + "0.5 1.5 2.5\n" * 199_999 + "0.5 1.5 2.5x\n}"
     assert refusal_of(lambda: read(text)) == ("F002.number", 200001, number(199_999, b"2.5x"))

@@ -175,7 +175,7 @@ def test_negative_weight_is_refused_with_its_vertex(refusal):
     )
 
 
-def test_weight_sums_off_by_half_a_thousandth_are_scaled(tmp_path):
+def test_weight_sums_off_by_half_a_thousandth_are_normalised(tmp_path):
     factors = np.where(np.arange(32) % 2, 1.0005, 0.9995)[:, None]
     np.savez(tmp_path / "a.npz", **{**SMPL, "weights": SMPL["weights"] * factors})
     scene = viewer.load(tmp_path / "a.npz")
@@ -235,20 +235,20 @@ def test_broken_extra_is_refused_with_its_key(refusal, change, message):
         (b"\0" * 5000, ("F002.archive", {"found": "zeros"})),
     ],
 )  # fmt: skip
-def test_what_is_no_model_says_what_it_is(tmp_path, name, data, found):
+def test_non_model_file_is_described(tmp_path, name, data, found):
     (tmp_path / name).write_bytes(data)
     key, values = found
     assert refusal_of(tmp_path / name) == (key, None, values)
 
 
-def test_model_cut_short_is_refused(tmp_path):
+def test_truncated_model_is_refused(tmp_path):
     path = tmp_path / "body.npz"
     np.savez(path, **SMPL)
     path.write_bytes(path.read_bytes()[:-3000])
     assert refusal_of(path)[0] == "F002.npz"
 
 
-def test_archive_of_something_else_says_what_it_holds(tmp_path):
+def test_other_archive_is_described_by_its_content(tmp_path):
     np.savez(tmp_path / "a.npz", vertices=np.zeros((3, 3)), colour=np.zeros(3))
     with pytest.raises(FormatError) as caught:
         viewer.load(tmp_path / "a.npz")

@@ -17,7 +17,7 @@ from viewer.formats import Source, bvh
 from viewer.rig.motion.evaluation import frames_of, world_frames
 
 
-def test_many_joints_without_channels_in_many_frames_are_refused_before_memory_is_taken() -> None:
+def test_many_static_joints_in_many_frames_are_refused_before_allocating() -> None:
     joints = "JOINT a { OFFSET 0 1 0 } " * 20000
     text = (
         f"HIERARCHY ROOT r {{ OFFSET 0 0 0 CHANNELS 1 Xrotation {joints} }} MOTION Frames: 20000 "
@@ -64,13 +64,13 @@ def test_mutated_file_gives_a_motion_or_one_line(seed: int) -> None:
         check(mutate(GOOD.encode(), rng))
 
 
-def test_file_cut_anywhere_gives_a_motion_or_one_line() -> None:
+def test_truncated_file_gives_a_motion_or_one_line() -> None:
     for cut in range(len(GOOD)):
         check(GOOD[:cut].encode())
 
 
 @pytest.mark.parametrize("token", [b"3.4e38", b"-3.4e38", b"1e-300", b"0", b"-1", b"{", b"}", b"x"])
-def test_word_put_anywhere_gives_a_motion_or_one_line(token: bytes) -> None:
+def test_inserted_word_gives_a_motion_or_one_line(token: bytes) -> None:
     words = re.split(rb"(\s+)", GOOD.encode())
     for at in range(0, len(words), 2):
         check(b"".join([*words[:at], token, *words[at + 1 :]]))

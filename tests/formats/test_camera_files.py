@@ -76,13 +76,13 @@ def test_cameras_are_read(tmp_path):
     assert_array_equal(views[1].distortion, [])
 
 
-def test_line_ends_comments_and_marks_do_not_matter():
+def test_line_endings_comments_and_headers_do_not_matter():
     text = "\ufeff" + HEAD + "# one\r\nnames:\r\n- '1'\r\n- \"2\"\r\nH_1: 5\r\n...\r\n"
     assert storage(text) == {"names": ["1", "2"], "H_1": "5"}
 
 
 @pytest.mark.parametrize("level", ["out/smpl", "out", "."])
-def test_cameras_are_found_beside_the_frames_and_above(tmp_path, level):
+def test_cameras_are_found_next_to_the_frames_and_above(tmp_path, level):
     write_frames(tmp_path / "out" / "smpl", {0: [body(0)]})
     cameras(tmp_path / level)
     for path in (tmp_path / "out", tmp_path / "out" / "smpl"):
@@ -91,7 +91,7 @@ def test_cameras_are_found_beside_the_frames_and_above(tmp_path, level):
         assert (capture.warnings, warnings) == ((), [])
 
 
-def test_broken_cameras_leave_the_bodies(tmp_path):
+def test_invalid_cameras_do_not_affect_bodies(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0)]})
     cameras(tmp_path, intrinsic="nonsense")
     capture, parts, _ = opened(tmp_path)
@@ -168,7 +168,7 @@ def test_one_broken_camera_is_left_out(tmp_path, file, old, new, message):
          "name": "cols"})),
     ],
 )  # fmt: skip
-def test_broken_storage_is_refused_with_its_line(text, line, message):
+def test_invalid_yaml_is_refused_with_its_line(text, line, message):
     with pytest.raises(FormatError) as caught:
         storage(HEAD + text)
     assert str(caught.value).startswith(f"a.yml:{line}: ")

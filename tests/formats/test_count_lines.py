@@ -62,7 +62,7 @@ COUNTS = [
 
 @pytest.mark.parametrize("step", [-1, 1])
 @pytest.mark.parametrize(("name", "head", "count"), COUNTS)
-def test_a_wrong_count_is_refused_where_it_stands(name, head, count, step):
+def test_a_wrong_count_is_refused_at_its_line(name, head, count, step):
     text = FILES[name]
     assert f"{head}{count}" in text
     before, _, after = text.partition(f"{head}{count}")
@@ -86,7 +86,7 @@ def test_a_vertex_that_misstates_its_influences_is_refused_at_its_line(stated, l
     assert fault == ("F002.skin-influences", line, values)
 
 
-def test_counts_of_a_file_in_one_line_are_followed_as_they_are():
+def test_counts_of_a_single_line_file_are_followed():
     text = " ".join(SKIN.replace("1 1 1\n}", "2 1 1\n}").split())
     key, _, values = refusal("a.skin", text)
     assert key == "F002.skin-influences-end"

@@ -38,7 +38,7 @@ TEXT = pickle.dumps({"v": np.arange(3), "t": "grün", "n": [1.5, 1 << 40, True, 
 
 
 @pytest.mark.parametrize("data", [SMALL, MODERN, TEXT], ids=["2", "5", "0"])
-def test_file_cut_short_anywhere(data: bytes) -> None:
+def test_file_truncated_anywhere(data: bytes) -> None:
     self_contained(data)
     for length in range(len(data)):
         with pytest.raises(FormatError) as caught:
@@ -67,7 +67,7 @@ def test_random_damage(data: bytes) -> None:
         self_contained(bytes(damaged))
 
 
-def test_random_steps() -> None:
+def test_random_opcodes() -> None:
     dice = random.Random(1)
     steps = b"(0123NKMJ)]}taeuslbdR\x81\x85\x86\x87\x88\x93qhj\x94\x95co"
     names = [named("numpy", "dtype"), named("chumpy.ch", "Ch"), named("numpy", "ndarray")]

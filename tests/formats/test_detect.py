@@ -20,7 +20,7 @@ def found(name, data):
 
 @pytest.mark.parametrize(("data", "key"), [(SKEL, "skel"), (SKIN, "skin")])
 @pytest.mark.parametrize("suffix", ["", ".txt", ".{key}", ".{KEY}"])
-def test_content_decides(data, key, suffix):
+def test_content_determines_the_format(data, key, suffix):
     name = "a" + suffix.format(key=key, KEY=key.upper())
     assert found(name, data) == (key, [])
 
@@ -87,7 +87,7 @@ def test_skin_is_recognised(data):
 @pytest.mark.parametrize(
     ("name", "wanted"), [("a.skel", ".skel"), ("a.skin", ".skin"), ("a", None)]
 )
-def test_other_content_is_named(data, kind, name, wanted):
+def test_other_content_is_described(data, kind, name, wanted):
     with pytest.raises(FormatError) as caught:
         found(name, data)
     assert caught.value.path == Path(name)
@@ -95,7 +95,7 @@ def test_other_content_is_named(data, kind, name, wanted):
     assert fault_of(caught.value.diagnostic) == ("F002.kind", None, values)
 
 
-def test_text_of_another_kind_is_refused():
+def test_text_in_another_format_is_refused():
     fault = refusal_of(lambda: found("a.txt", b"hello world"))
     assert fault == ("F002.unknown-kind", None, {"wanted": ANY})
 

@@ -26,7 +26,7 @@ def only(parts, person=0):
 
 
 @pytest.mark.parametrize("name", ["smpl", "smpl_full", "smplfull", "keypoints3d"])
-def test_folders_are_recognised_by_what_is_in_them(tmp_path, name):
+def test_folders_are_recognised_by_content(tmp_path, name):
     record = points(0) if name == "keypoints3d" else body(0)
     write_frames(tmp_path / "out" / name, {0: [record]})
     for path in (tmp_path / "out", tmp_path / "out" / name):
@@ -55,14 +55,14 @@ def test_single_frame_file_is_read(tmp_path, content):
     assert (list(next(capture.parts()).bodies), source.warnings) == ([0], [])
 
 
-def test_json_poses_are_still_poses(tmp_path):
+def test_json_poses_are_not_captures(tmp_path):
     path = tmp_path / "a.json"
     path.write_text('{"dofs": {"a.x": 1}}')
     source = Source.open(path)
     assert (detect(source), source.warnings) == ("pose", [])
 
 
-def test_fullest_folder_is_read(tmp_path):
+def test_folder_with_the_most_frames_is_read(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0)]})
     write_frames(tmp_path / "smpl_full", {0: [body(0, 156)]})
     capture, _, warnings = opened(tmp_path)
@@ -81,7 +81,7 @@ def test_first_view_of_several_is_read(tmp_path):
         ]
 
 
-def test_pictures_and_hidden_files_do_not_count(tmp_path):
+def test_images_and_hidden_files_are_ignored(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)], "._000000": "junk"})
     (folder / "000000.jpg").write_bytes(b"picture")
     capture, parts, warnings = opened(tmp_path)
@@ -91,7 +91,7 @@ def test_pictures_and_hidden_files_do_not_count(tmp_path):
 # The timeline
 
 
-def test_numbers_keep_their_holes(tmp_path):
+def test_gaps_in_frame_numbers_are_kept(tmp_path):
     frames = {12: [body(0)], 13: [], 15: [body(0), body(1)], 110: [body(1)]}
     write_frames(tmp_path / "smpl", frames)
     capture, parts, _ = opened(tmp_path, frame_rate=50.0)
@@ -113,14 +113,14 @@ def test_numbers_sort_as_numbers_and_names_as_names(tmp_path):
     assert capture.first_frame == 0
 
 
-def test_absurd_holes_are_closed(tmp_path):
+def test_huge_gaps_are_collapsed(tmp_path):
     write_frames(tmp_path / "smpl", {"7": [body(0)], "99999999999": [body(0)]})
     capture, parts, warnings = opened(tmp_path)
     assert (capture.n_frames, capture.first_frame, rows_of(parts, 0)) == (2, 0, [0, 1])
     assert warnings == [("F007.capture-numbers", None, {"n": 2, "first": 7, "last": 99999999999})]
 
 
-def test_hole_of_a_thousand_frames_is_none_to_close(tmp_path):
+def test_gap_of_a_thousand_frames_is_kept(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0)], 1019: [body(0)]})
     assert opened(tmp_path)[0].n_frames == 1020
     write_frames(tmp_path / "far", {0: [body(0)], 1020: [body(0)]})
@@ -138,7 +138,7 @@ def test_bodies_and_keypoints_share_the_timeline(tmp_path):
     assert [list(part.points) for part in parts] == [[0], [0, 5]]
 
 
-def test_parts_grow_and_the_first_ends_with_somebody(tmp_path):
+def test_part_sizes_grow_and_the_first_part_contains_a_person(tmp_path):
     frames = {0: [], 1: [], 2: [body(0)], **{frame: [body(0)] for frame in range(3, 400)}}
     write_frames(tmp_path / "smpl", frames)
     capture, parts, _ = opened(tmp_path)
@@ -152,7 +152,7 @@ def test_parts_grow_and_the_first_ends_with_somebody(tmp_path):
 # People
 
 
-def test_people_without_a_track_are_told_apart_within_a_frame(tmp_path):
+def test_untracked_people_are_distinguished_within_a_frame(tmp_path):
     people = [body(-1), body(0), body(-1, seed=1.0), body(-1)]
     folder = write_frames(tmp_path / "smpl", {0: people})
     _, parts, _ = opened(tmp_path)
@@ -161,7 +161,7 @@ def test_people_without_a_track_are_told_apart_within_a_frame(tmp_path):
     assert_array_equal(parts[0].bodies[-2].translations[0], waves(3, seed=3.0))
 
 
-def test_older_files_say_person_id(tmp_path):
+def test_older_files_use_person_id(tmp_path):
     record = points(0) | {"personID": 4}
     del record["id"]
     write_frames(tmp_path / "keypoints3d", {0: [record]})
@@ -203,7 +203,7 @@ def turned(record, start, stop):
         (48, "MANO", FAMILY[16].names, [(3, 48)], {}, True),
     ],
 )
-def test_length_tells_the_layout(tmp_path, count, model, names, parts, hands, is_flat, flat):
+def test_length_determines_the_layout(tmp_path, count, model, names, parts, hands, is_flat, flat):
     record = body(0, count, flat=flat)
     write_frames(tmp_path / "smpl", {0: [record], 1: [record]})
     capture, found, _ = opened(tmp_path)
@@ -231,12 +231,12 @@ def test_hands_of_newer_smplh_have_their_own_keys(tmp_path):
     assert only(opened(tmp_path, flat_hands=True)[1]).flat_hands
 
 
-def test_hand_keys_beside_full_poses_are_ignored(tmp_path):
+def test_hand_keys_next_to_full_poses_are_ignored(tmp_path):
     write_frames(tmp_path / "smpl_full", {0: [body(0, 156, handl=[[1] * 6], handr=[[1] * 6])]})
     assert only(opened(tmp_path)[1]).hands == {}
 
 
-def test_root_of_its_own_is_a_turn_within_the_world(tmp_path):
+def test_root_rotation_in_poses_is_applied_after_rh(tmp_path):
     poses = waves(72)  # the first three are not 0
     write_frames(tmp_path / "smpl", {0: [body(0, poses=[poses.tolist()])]})
     motion = only(opened(tmp_path)[1])
@@ -245,7 +245,7 @@ def test_root_of_its_own_is_a_turn_within_the_world(tmp_path):
     assert_array_equal(motion.vectors, [poses.reshape(-1, 3)])
 
 
-def test_shapes_change_or_count_for_all_frames(tmp_path):
+def test_shape_is_per_frame_only_if_it_varies(tmp_path):
     same = {frame: [body(0), body(1, shapes=[[frame] * 10])] for frame in range(3)}
     write_frames(tmp_path / "smpl", {**same, 3: [body(0), body(1)]})
     part = opened(tmp_path)[1][1]
@@ -262,7 +262,7 @@ def test_expression_is_read_and_may_drive_shapes(tmp_path):
     assert_array_equal(legacy.shape, [[*waves(10, seed=3), *waves(10, seed=5)]])
 
 
-def test_vertices_are_left_out_and_that_is_said_once(tmp_path):
+def test_vertices_are_ignored_with_one_note(tmp_path):
     record = body(0, vertices=[[0, 0, 0]] * 4)
     folder = write_frames(tmp_path / "smpl", {0: [record], 1: [record]})
     _, parts, _ = opened(tmp_path)
@@ -288,20 +288,20 @@ def test_keypoints_keep_their_confidence(tmp_path):
     assert_array_equal(clip.points, [record["keypoints3d"]])
 
 
-def test_rows_of_three_are_seen(tmp_path):
+def test_rows_without_confidence_count_as_visible(tmp_path):
     write_frames(tmp_path / "keypoints3d", {0: [points(0, columns=3)]})
     clip = opened(tmp_path)[1][0].points[0][1]
     assert_array_equal(clip.points[0, :, :3], waves(25, 3))
     assert_array_equal(clip.points[0, :, 3], np.ones(25))
 
 
-def test_layout_of_seventeen_can_be_chosen(tmp_path):
+def test_layout_of_17_keypoints_can_be_chosen(tmp_path):
     write_frames(tmp_path / "keypoints3d", {0: [points(0, 17)]})
     assert opened(tmp_path)[1][0].points[0][0].title == "coco"
     assert opened(tmp_path, layout="h36m")[1][0].points[0][0].title == "h36m"
 
 
-def test_hands_and_face_beside_the_body_are_points_too(tmp_path):
+def test_hands_and_face_next_to_the_body_are_points_too(tmp_path):
     rows = {key: waves(count, 4, seed=count) for key, count in
             (("handl3d", 21), ("handr3d", 21), ("face3d", 70))}  # fmt: skip
     for values in rows.values():
@@ -313,7 +313,7 @@ def test_hands_and_face_beside_the_body_are_points_too(tmp_path):
     assert_array_equal(clip.points[0], np.concatenate([record["keypoints3d"], *rows.values()]))
 
 
-def test_one_hand_beside_a_coco_body(tmp_path):
+def test_one_hand_with_a_coco_body(tmp_path):
     record = points(0, 17, handr3d=points(0, 21)["keypoints3d"])
     write_frames(tmp_path / "keypoints3d", {0: [record]})
     layout, clip = opened(tmp_path)[1][0].points[0]
@@ -327,7 +327,7 @@ def test_one_hand_beside_a_coco_body(tmp_path):
     assert [10, 18] in layout.limbs.tolist()
 
 
-def test_keypoints_twice_are_said_to_be_left_out(tmp_path):
+def test_duplicate_keypoints_are_ignored_with_a_note(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0) | points(0, seed=1.0)]})
     write_frames(tmp_path / "keypoints3d", {0: [points(0)]})
     _, parts, _ = opened(tmp_path)

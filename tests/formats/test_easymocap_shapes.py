@@ -13,20 +13,20 @@ ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
 GIVEN = np.array([False, True, False, True, False])
 
 
-def test_rows_repeat_the_last_good_one():
+def test_missing_rows_repeat_the_last_valid_one():
     expected = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [np.nan, 3.0], [1.0, 2.0]]
     assert_array_equal(hold(ROWS, GIVEN, None), expected)
 
 
-def test_rows_begin_with_what_was_known():
+def test_first_rows_use_the_previously_known_shape():
     assert_array_equal(hold(ROWS, GIVEN, np.array([7.0, 8.0]))[0], [7.0, 8.0])
 
 
-def test_complete_rows_stay_as_they_are():
+def test_complete_rows_are_unchanged():
     assert hold(ROWS, np.ones(5, dtype=bool), None) is ROWS
 
 
-def test_last_good_row_is_remembered():
+def test_last_valid_row_is_remembered():
     assert_array_equal(last_given(ROWS, GIVEN), [1.0, 2.0])
     assert last_given(ROWS, np.zeros(5, dtype=bool)) is None
     assert last_given(np.zeros((0, 2)), np.zeros(0, dtype=bool)) is None
@@ -42,7 +42,7 @@ def shapes_of(parts, person):
     return np.concatenate(rows)[:, 0].tolist()
 
 
-def test_shapes_of_the_first_record_count_for_all(tmp_path):
+def test_shapes_of_the_first_record_apply_to_all(tmp_path):
     bare = [body(0, shapes=None), body(1, shapes=None)]
     first = [body(0, shapes=[[2.0] * 10]), body(1, shapes=[[3.0] * 10])]
     folder = write_frames(tmp_path / "smpl", {0: first, **dict.fromkeys(range(1, 100), bare)})
@@ -55,7 +55,7 @@ def test_shapes_of_the_first_record_count_for_all(tmp_path):
     ]
 
 
-def test_last_good_shapes_are_kept(tmp_path):
+def test_last_valid_shapes_are_kept(tmp_path):
     def record(value):
         return [body(0, shapes=None if value is None else [[value] * 10])]
 
@@ -87,7 +87,7 @@ def test_last_good_shapes_are_kept(tmp_path):
     ]
 
 
-def test_who_never_had_shapes_has_those_of_the_mean_body(tmp_path):
+def test_person_without_shapes_gets_the_mean_body(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0), body(1, shapes=None)]})
     _, parts, _ = opened(tmp_path)
     assert_array_equal(parts[0].bodies[1].shape, np.zeros((1, 10)))
@@ -104,7 +104,7 @@ def test_untracked_people_do_not_inherit_shapes(tmp_path):
     assert shapes_of(parts, -1) == [5.0, 0.0, waves(10, seed=2)[0]]
 
 
-def test_expression_is_carried_on_too(tmp_path):
+def test_expression_is_held_too(tmp_path):
     said = {"expression": [[0.5] * 10]}
     frames = {0: [body(0, 87)], 1: [body(0, 87, **said)], 2: [body(0, 87)]}
     write_frames(tmp_path / "smpl", frames)
@@ -114,7 +114,7 @@ def test_expression_is_carried_on_too(tmp_path):
     assert parts[1].bodies[0].n_rows == 2
 
 
-def test_expression_that_comes_in_the_middle_of_a_part(tmp_path):
+def test_expression_appearing_within_a_part(tmp_path):
     frames = {frame: [body(0, 87), body(1, 87)] for frame in range(5)}
     frames[3] = [body(0, 87), body(1, 87, expression=[[0.5] * 10])]
     write_frames(tmp_path / "smpl", frames)
@@ -129,7 +129,7 @@ def test_record_without_poses_stays_a_gap(tmp_path):
     assert rows_of(parts, 0) == [0, 2]
 
 
-def test_faulty_record_without_shapes_leaves_the_others_alone(tmp_path):
+def test_invalid_record_without_shapes_does_not_affect_others(tmp_path):
     bare = body(0, shapes=None)
     frames = {0: [body(0, shapes=[[2.0] * 10])], 1: [bare], 2: [bare | {"Th": [[1, "x", 3]]}]}
     write_frames(tmp_path / "smpl", {**frames, 3: [bare]})
@@ -139,7 +139,7 @@ def test_faulty_record_without_shapes_leaves_the_others_alone(tmp_path):
 
 @pytest.mark.parametrize("key", ["shapes", "expression"])
 @pytest.mark.parametrize("empty", [[], [[]]], ids=["list", "matrix"])
-def test_empty_coefficients_are_none(tmp_path, key, empty):
+def test_empty_coefficients_count_as_missing(tmp_path, key, empty):
     missing = write_frames(tmp_path / "a", {0: [body(0, **{key: None})], 1: [body(0)]})
     written = write_frames(tmp_path / "b", {0: [body(0, **{key: empty})], 1: [body(0)]})
     expected, found = (opened(folder)[1] for folder in (missing, written))
@@ -152,7 +152,7 @@ def test_empty_coefficients_are_none(tmp_path, key, empty):
             assert_array_equal(motion.shape, wanted.shape)
 
 
-def test_empty_shapes_are_carried_on(tmp_path):
+def test_empty_shapes_hold_the_last_value(tmp_path):
     frames = {0: [body(0, shapes=[[2.0] * 10])], 1: [body(0, shapes=[])], 2: [body(0, shapes=[[]])]}
     write_frames(tmp_path / "smpl", frames)
     _, parts, _ = opened(tmp_path)
@@ -160,7 +160,7 @@ def test_empty_shapes_are_carried_on(tmp_path):
 
 
 @pytest.mark.parametrize("empty", [[], [[]]])
-def test_hands_without_components_are_not_there(tmp_path, empty):
+def test_hands_without_components_are_ignored(tmp_path, empty):
     write_frames(tmp_path / "smpl", {0: [body(0, 63, handl=empty, handr=[[0.5] * 6])]})
     _, parts, _ = opened(tmp_path)
     assert list(parts[0].bodies[0].hands) == ["right"]

@@ -76,7 +76,7 @@ def assert_lines(problems, fewest):
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_texts(name):
+def test_text_formats(name):
     problems = []
     for seed in SEEDS:
         rng = random.Random(seed)
@@ -87,7 +87,7 @@ def test_texts(name):
 
 
 @pytest.mark.parametrize("name", FRAMES)
-def test_frames_of_easymocap(tmp_path, name):
+def test_easymocap_frames(tmp_path, name):
     problems = []
     for seed in SEEDS:
         rng = random.Random(seed)
@@ -103,7 +103,7 @@ def test_frames_of_easymocap(tmp_path, name):
     assert_lines(problems, TRIES)
 
 
-def test_tables_of_a_pig(tmp_path):
+def test_pig_tables(tmp_path):
     folder = write_pig(tmp_path / "pig")
     problems = []
     for seed in SEEDS:

@@ -19,45 +19,45 @@ from viewer.errors import ViewerError
 from viewer.formats import Source, anim, bvh, obj, read, skel, skin, smpl
 
 
-def test_a_lost_vertex_lies_between_its_neighbours() -> None:
+def test_an_invalid_vertex_is_placed_between_its_neighbours() -> None:
     figure, _ = gone_on(skin, SKIN.replace("2 0 0", "2 nan 0", 1), "a.skin")
     # The middle of (0, 0, 0) and (0, 2, 0).
     assert figure.mesh.positions.tolist() == [[0, 0, 0], [0, 1, 0], [0, 2, 0]]
     assert figure.mesh.n_triangles == 1 and figure.skin.weights.tolist() == [1, 0.25, 0.75, 1]
 
 
-def test_a_lost_weight_is_0_and_the_others_stay() -> None:
+def test_an_invalid_weight_becomes_0_and_the_others_stay() -> None:
     figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "2 0 nan 1", 1), "a.skin")
     assert figure.skin.weights.tolist() == [1, 0, 0.75, 1]
     assert figure.skin.joints.tolist() == [0, 0, 1, 1]
 
 
-def test_a_line_of_weights_that_cannot_be_told_costs_no_other() -> None:
+def test_an_unparsable_line_of_weights_affects_no_other() -> None:
     figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "3 0 0.25 1", 1), "a.skin")
     assert figure.skin.starts.tolist() == [0, 1, 1, 2]
     assert figure.skin.weights.tolist() == [1, 1]
 
 
-def test_a_lost_corner_is_another_of_its_triangle() -> None:
+def test_an_invalid_corner_repeats_another_corner() -> None:
     figure, _ = gone_on(skin, SKIN.replace("0 1 2\n}", "0 1 7\n}", 1), "a.skin")
     assert figure.mesh.triangles.tolist() == [[0, 1, 0]]
     figure, _ = gone_on(obj, OBJ.replace("f 1 2 3", "f x 2 3"), "a.obj")
     assert figure.mesh.triangles[2].tolist() == [1, 1, 2]
 
 
-def test_a_singular_matrix_leaves_its_joint_where_it_was_bound() -> None:
+def test_a_singular_bind_matrix_keeps_the_joint_at_its_bind_position() -> None:
     broken = SKIN.replace("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5")
     figure, _ = gone_on(skin, broken, "a.skin")
     assert figure.skin.inverse_bind[0, :3, 3].tolist() == [-5, -6, -7]
     assert figure.skin.inverse_bind[0, :3, :3].tolist() == np.eye(3).tolist()
 
 
-def test_normals_that_are_lost_are_computed() -> None:
+def test_invalid_normals_are_computed() -> None:
     figure, _ = gone_on(obj, OBJ.replace("vn 0 0 1", "vn 0 inf 1"), "a.obj")
     assert figure.mesh.normals.tolist() == [[0, 0, 1]] * 4
 
 
-def test_several_faults_of_one_block_are_one_for_each_kind() -> None:
+def test_several_errors_of_one_block_are_reported_once_per_code() -> None:
     text = SKIN.replace("0 0 0\n  2 0 0", "nan inf 0\n  up 0 0")
     first, second = (Phrase("of-vertex", section="positions", index=vertex) for vertex in (0, 1))
     assert [fault[0::2] for fault in gone_on(skin, text, "a.skin")[1]] == [
@@ -79,7 +79,7 @@ def frames(*rows: str) -> str:
      ("boxmin nan\nnan\n0", 2), ("boxmin 0 x 0 and more", 0)],
 )  # fmt: skip
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_a_lost_item_of_a_skeleton_takes_no_line_with_it(item: str, below: int, end: str) -> None:
+def test_an_invalid_skeleton_item_affects_no_other_line(item: str, below: int, end: str) -> None:
     text = f"balljoint a {{\n{item}\ncolour red\nballjoint b {{ }} }}".replace("\n", end)
     source = Source("a.skel", text.encode(), diagnostics=Collector(keeps_errors=True))
     figure = skel.read(source)
@@ -87,7 +87,7 @@ def test_a_lost_item_of_a_skeleton_takes_no_line_with_it(item: str, below: int, 
     assert warnings_of(source.diagnostics) == [("F006.unknown", 3 + below, {"found": b"colour"})]
 
 
-def test_a_frame_that_is_lost_is_as_the_one_before() -> None:
+def test_an_invalid_frame_repeats_the_previous_one() -> None:
     good = [f"{k} 1 0" + " 0" * 12 for k in range(5)]
     bad = [good[0], good[1].replace("1", "nan", 1), good[2], good[3] + " 7", good[4]]
     motion, faults = gone_on(bvh, frames(*bad), "a.bvh")
@@ -96,12 +96,12 @@ def test_a_frame_that_is_lost_is_as_the_one_before() -> None:
     assert motion.clip.translations[:, 0, 0].tolist() == [0, 0, 2, 2, 4]
 
 
-def test_a_key_that_is_lost_is_left_out() -> None:
+def test_an_invalid_key_is_left_out() -> None:
     clip, _ = gone_on(anim, ANIM.replace("0.5 1", "0.5 nan"), "a.anim")
     assert clip.channels[0].times.tolist() == [0, 1]
 
 
-def test_faults_of_a_body_model_are_noted_by_vertex_and_joint(tmp_path: Any) -> None:
+def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
     arrays = model("smpl")
     arrays = {key: np.array(values) for key, values in arrays.items()}
     arrays["v_template"][3, 0] = np.nan
@@ -132,7 +132,7 @@ def test_faults_of_a_body_model_are_noted_by_vertex_and_joint(tmp_path: Any) -> 
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_reader_goes_on_from_faults_alone(seed: int) -> None:
+def test_a_reader_continues_only_after_recoverable_errors(seed: int) -> None:
     """Files that the strict reader refuses have a fault; files that it accepts have none."""
     rng = random.Random(seed)
     texts = {**FILES, "dir/b.skin": SKIN.encode(), "dir/a.obj": OBJ.encode(),
@@ -154,7 +154,7 @@ def test_a_reader_goes_on_from_faults_alone(seed: int) -> None:
 
 
 @pytest.mark.parametrize("word", ["nan", "-inf", "Infinity", "1e39", "1.#QNAN", "-nan(ind)"])
-def test_what_was_a_number_once_has_a_code_of_its_own(word: str) -> None:
+def test_non_finite_values_have_a_separate_code(word: str) -> None:
     source = Source(
         "a.skin",
         SKIN.replace("2 0 0", f"2 {word} 0", 1).encode(),
@@ -164,7 +164,7 @@ def test_what_was_a_number_once_has_a_code_of_its_own(word: str) -> None:
     assert [fault.code for fault in source.diagnostics.errors] == ["F003"]
 
 
-def test_places_of_a_skin_are_lines() -> None:
+def test_skin_locations_are_lines() -> None:
     source = Source("a.skin", SKIN.encode())
     skin.read(source)
     found = {kind: source.place(kind, 1) for kind in ("positions", "normals", "weights")}

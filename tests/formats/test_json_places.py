@@ -28,7 +28,7 @@ TEXT = r'{"a": [1, {"b": "x,]}\"", "c": []}, -2e5], "": {}, "d\u00e9": {"a": nul
         (("e",), "true"),
     ],
 )
-def test_value_is_found_by_what_leads_to_it(path, value):
+def test_value_is_found_by_its_path(path, value):
     place = value_place(TEXT, path)
     assert TEXT[place:].startswith(value)
     # Python's parser, started at that position, reads the same value.
@@ -39,11 +39,11 @@ def test_value_is_found_by_what_leads_to_it(path, value):
 
 
 @pytest.mark.parametrize("path", [("b",), ("a", 3), ("a", "0"), ("a", 1, "b", 0), (0,)])
-def test_what_is_not_there_has_no_place(path):
+def test_missing_value_has_no_position(path):
     assert value_place(TEXT, path) is None
 
 
-def test_the_last_of_several_keys_counts_and_the_second_is_named():
+def test_last_duplicate_key_wins_and_the_second_is_reported():
     text = '{"a": 1, "b": {"a": 2}, "c": [{"a": 3}, {"a": 4}], "a": 5}'
     assert text[value_place(text, ("a",))] == "5"
     assert repeated_key(text) == ("a", text.rindex('"a"'))
@@ -51,12 +51,12 @@ def test_the_last_of_several_keys_counts_and_the_second_is_named():
     assert repeated_key(r'{"a": 1, "\u0061": 2}') == ("a", 9)
 
 
-def test_words_for_infinite_numbers_are_found_outside_of_texts():
+def test_nan_and_infinity_are_found_outside_strings():
     assert constant_place('{"NaN": "a NaN", "b": [1, -Infinity, NaN]}') == ("-Infinity", 26)
     assert constant_place('{"NaN": "Infinity"}') is None
 
 
-def test_nesting_is_found_by_its_depth():
+def test_excessive_nesting_is_found():
     assert nesting_place('["[[", [[1]]]', 2) == 8
     assert nesting_place("[{}, {}, []]", 2) == 12
     assert nesting_place("[[[", 0) == 0

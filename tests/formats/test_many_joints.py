@@ -129,14 +129,14 @@ def pair(skeleton):
 
 
 @pytest.mark.parametrize("work", [joint_labels, dof_labels, record, pair])
-def test_names_are_gone_through_a_few_times_only(work):
+def test_names_are_scanned_only_a_few_times(work):
     Names.looked = 0
     skeleton = chain(MANY)
     work(skeleton)
     assert 0 < Names.looked <= 20 * MANY
 
 
-def test_labels_of_all_dofs_are_those_of_each():
+def test_all_dof_labels_match_single_labels():
     skeleton = chain(20)
     assert dof_labels(skeleton) == [dof_label(skeleton, dof) for dof in range(skeleton.n_dofs)]
     assert dof_labels(skeleton)[:4] == ["own0.x", "own0.y", "own0.z", "j1#1.x"]

@@ -41,7 +41,7 @@ def assert_good(target):
     ],
     ids=["plain", "crlf", "one line", "glued", "mark", "swapped", "other order", "descending"],
 )
-def test_reads_every_part_without_a_word(text):
+def test_reads_every_part_without_warnings(text):
     target, warnings = parse(text)
     assert_good(target)
     assert warnings == []
@@ -145,7 +145,7 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
     assert refusal_of(lambda: parse(text)) == fault
 
 
-def test_truncation_anywhere_is_an_error_or_a_warning():
+def test_truncation_anywhere_gives_an_error_or_a_warning():
     for length in range(len(GOOD.rstrip())):
         try:
             _, warnings = parse(GOOD[:length])
@@ -155,7 +155,7 @@ def test_truncation_anywhere_is_an_error_or_a_warning():
             assert warnings, GOOD[:length]
 
 
-def test_morph_is_told_from_a_skin_by_its_suffix():
+def test_morph_is_distinguished_from_a_skin_by_its_suffix():
     assert detect(Source("smile.morph", GOOD.encode())) == "morph"
     assert detect(Source("smile.skin", GOOD.encode())) == "skin"
 

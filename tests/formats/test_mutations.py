@@ -232,14 +232,14 @@ def test_mutated_file_gives_a_figure_or_one_line(path, seed):
 
 
 @pytest.mark.parametrize("path", FILES)
-def test_file_cut_anywhere_gives_a_figure_or_one_line(path):
+def test_truncated_file_gives_a_figure_or_one_line(path):
     for cut in range(len(FILES[path])):
         check(path, FILES[path][:cut])
 
 
 @pytest.mark.parametrize("path", FILES)
 @pytest.mark.parametrize("token", [b"{", b"}", b" ", b"-", b"x", b"\0", b"9", b".", b"\x1a"])
-def test_letter_put_anywhere_gives_a_figure_or_one_line(path, token):
+def test_inserted_letter_gives_a_figure_or_one_line(path, token):
     data = FILES[path]
     for at in range(0, len(data), 2):
         check(path, data[:at] + token + data[at:])
@@ -247,13 +247,13 @@ def test_letter_put_anywhere_gives_a_figure_or_one_line(path, token):
 
 @pytest.mark.parametrize("path", FILES)
 @pytest.mark.parametrize("token", [b"3.4e38", b"-3.4e38", b"1e-300", b"0", b"1e-45", b"-1"])
-def test_extreme_number_anywhere_gives_a_figure_or_one_line(path, token):
+def test_extreme_number_gives_a_figure_or_one_line(path, token):
     words = re.split(rb"(\s+)", FILES[path])
     for at in range(0, len(words), 2):
         check(path, b"".join([*words[:at], token, *words[at + 1 :]]))
 
 
-def test_all_numbers_extreme_still_move():
+def test_all_extreme_numbers_still_give_a_poseable_figure():
     check("dir/a.skel", re.sub(rb"-?\d\S*", b"3.4e38", SKEL))
     body = re.sub(rb"(\n  ?)(-?[\d.e-]+) (\S+) (\S+)(?=\n)", rb"\1\2 3.4e38 -3.4e38", SKIN)
     check("dir/a.skin", body)

@@ -55,26 +55,26 @@ def test_every_array_is_read(packed: bool, in_file: bool, tmp_path: Path) -> Non
         assert not found.flags.writeable
 
 
-def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
+def test_only_requested_arrays_are_read(tmp_path: Path) -> None:
     path = tmp_path / "x.npz"
     np.savez(path, large=np.zeros(4 << 20), small=ROWS)
     source = Source.open(path)
     assert cost(lambda: open_archive(source).array("small").values()) < 1 << 20
 
 
-def test_packed_arrays_are_not_unpacked_at_opening() -> None:
+def test_compressed_arrays_are_not_decompressed_on_opening() -> None:
     data = npz(packed=True, large=np.zeros(6 << 20))
     assert cost(lambda: opened(data).get("large")) < 1 << 20
 
 
-def test_reading_takes_no_second_copy(tmp_path: Path) -> None:
+def test_reading_makes_no_second_copy(tmp_path: Path) -> None:
     path = tmp_path / "x.npz"
     np.savez(path, large=np.ones(2 << 20))
     archive = open_archive(Source.open(path))
     assert cost(lambda: archive.array("large").values()) < (16 << 20) + (5 << 20)
 
 
-def test_file_that_changed_is_not_read(tmp_path: Path) -> None:
+def test_changed_file_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "x.npz"
     np.savez(path, v=ROWS)
     archive = open_archive(Source.open(path))
@@ -92,7 +92,7 @@ def test_file_that_changed_is_not_read(tmp_path: Path) -> None:
     )
 
 
-def test_headers_of_other_writers() -> None:
+def test_headers_from_other_writers() -> None:
     one = struct.pack("<d", 2.5)
     headers = [
         npy("{'descr':'<f8','fortran_order':False,'shape':(1,)}", one),
@@ -123,7 +123,7 @@ def test_headers_of_other_writers() -> None:
     ],
     ids=["object", "objects", "record", "sub-array", "void", "complex", "date"],
 )
-def test_arrays_that_are_not_evaluated(given: Any, what: Phrase) -> None:
+def test_unsupported_dtypes_are_not_evaluated(given: Any, what: Phrase) -> None:
     archive = opened(npz(v=given, good=ROWS))
     assert archive.get("v") == Opaque(what)
     assert_array_equal(archive.array("good").values(), ROWS)

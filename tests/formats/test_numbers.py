@@ -53,14 +53,14 @@ def parsed(text):
 @example([("-0", " "), ("-0.0", " "), ("+0", " "), ("-.0", " "), ("-0.", "\n"), ("0e0", " ")])
 @example([("999999999999999", " "), ("9007199254740993", " "), (".000000000000001", " ")])
 @example([("1.7976931348623157", " "), ("2.2250738585072014e-308", " "), ("5e-324", " ")])
-def test_numbers_are_bit_equal_to_float(pairs):
+def test_numbers_match_float_bit_for_bit(pairs):
     values, bad = parsed("".join(number + space for number, space in pairs))
     assert bad == -1
     assert bits(values) == bits(float(number.rstrip("fF")) for number, _ in pairs)
 
 
 @pytest.mark.parametrize("length", range(1, 25))
-def test_every_place_of_the_point_is_bit_equal_to_float(length):
+def test_every_decimal_point_position_matches_float_bit_for_bit(length):
     rng = random.Random(length)
     words = []
     for place in range(length + 1):
@@ -72,7 +72,7 @@ def test_every_place_of_the_point_is_bit_equal_to_float(length):
     assert bits(values) == bits(map(float, words))
 
 
-def test_repr_of_random_floats_is_read_back_bit_equal():
+def test_repr_of_random_floats_round_trips_exactly():
     rng = random.Random(3)
     numbers = [rng.choice([rng.gauss(0, 1), rng.uniform(-1e6, 1e6), 10 ** rng.uniform(-300, 38)])
                for _ in range(20_000)]  # fmt: skip
@@ -94,7 +94,7 @@ def test_chunk_boundaries_split_no_number(monkeypatch, chunk):
 
 @pytest.mark.parametrize("chunk", [1, 5, 8, 64, 1 << 17])
 @pytest.mark.parametrize("word", [word for word in NO_NUMBERS if word])
-def test_word_that_is_no_number_is_found_at_its_index(monkeypatch, chunk, word):
+def test_non_number_is_found_at_its_index(monkeypatch, chunk, word):
     monkeypatch.setattr(_numbers, "_CHUNK", chunk)
     for index in (0, 1, 6):
         text = [*["0", "-1.5", "2e1", "3", "4", "5"][:index], word, "7", "bad", "8"]
@@ -104,7 +104,7 @@ def test_word_that_is_no_number_is_found_at_its_index(monkeypatch, chunk, word):
 
 
 @pytest.mark.parametrize("word", NO_NUMBERS)
-def test_single_word_that_is_no_number_is_refused(word):
+def test_single_non_number_is_refused(word):
     assert not is_number(word.encode())
     assert to_number(word.encode()) is None
 
@@ -121,7 +121,7 @@ def test_block_and_single_words_agree(parts):
 
 
 @pytest.mark.parametrize("control", [code for code in range(32) if code not in range(9, 14)])
-def test_control_characters_belong_to_their_word(control):
+def test_control_characters_are_part_of_a_word(control):
     letter = bytes([control])
     assert parsed(b"1 2" + letter + b" 3") == ([1.0], 1)
     assert parsed(b"1 " + letter + b" 3") == ([1.0], 1)
@@ -130,7 +130,7 @@ def test_control_characters_belong_to_their_word(control):
 
 
 @pytest.mark.parametrize("code", range(128, 256))
-def test_letters_beyond_ascii_belong_to_their_word(code):
+def test_non_ascii_letters_are_part_of_a_word(code):
     assert parsed(b"1 2" + bytes([code]) + b"3") == ([1.0], 1)
 
 
@@ -143,7 +143,7 @@ def test_no_words_give_no_numbers(text):
     assert parsed(text) == ([], -1)
 
 
-def test_only_the_given_part_is_parsed():
+def test_only_the_given_range_is_parsed():
     values, bad = parse_numbers(b"x 12345 y", 3, 6)
     assert (values.tolist(), bad) == ([234.0], -1)
 
@@ -157,7 +157,7 @@ def test_largest_float32_is_the_limit():
 @pytest.mark.parametrize(
     "word", [b"9" * 5_000_000 + b"x", b"0." + b"0" * 5_000_000 + b"e", b"." * 5_000_000]
 )
-def test_word_of_5_mb_is_refused_without_quadratic_time(word):
+def test_word_of_5_mb_is_refused_in_linear_time(word):
     assert to_number(word) is None
     assert parse_numbers(b"1 " + word, 0, len(word) + 2)[1] == 1
 
@@ -168,11 +168,11 @@ def test_number_of_5_mb_is_read():
 
 
 @pytest.mark.parametrize("word", ["1e-400", "1e-324", ".0001e-330f", "0." + "0" * 400 + "1"])
-def test_what_is_too_small_does_not_become_a_whole_number(word):
+def test_underflow_does_not_give_an_integer(word):
     assert parsed(f"{word} -{word}") == ([5e-324, -5e-324], -1)
     assert parsed(f"{word}\x01 1")[1] == 0
 
 
 @pytest.mark.parametrize("word", ["0e-400", "-0.0e-999", ".0e5", "0" * 400, "0." + "0" * 400])
-def test_zero_is_zero_however_it_is_written(word):
+def test_zero_is_parsed_in_any_notation(word):
     assert parsed(word) == ([0.0], -1)

@@ -19,7 +19,7 @@ from viewer.formats import Source, anim, bvh, obj, ply, skel, skin
 @pytest.mark.parametrize(
     "case", MESH_FAULTS + MOTION_FAULTS, ids=lambda case: f"{case[1]}, {case[4]!r}"[:40]
 )
-def test_one_fault_is_noted_with_its_place(case: tuple[Any, ...]) -> None:
+def test_one_error_is_reported_with_its_location(case: tuple[Any, ...]) -> None:
     module, name, text, old, new, fault, part, places = case
     assert old in text
     broken = text.replace(old, new, 1)
@@ -33,5 +33,5 @@ def test_one_fault_is_noted_with_its_place(case: tuple[Any, ...]) -> None:
     [(skin, "a.skin", SKIN), (obj, "a.obj", OBJ), (ply, "a.ply", PLY), (skel, "a.skel", SKEL),
      (bvh, "a.bvh", BVH), (anim, "a.anim", ANIM)],
 )  # fmt: skip
-def test_good_files_have_no_faults(module: Any, name: str, text: str) -> None:
+def test_valid_files_have_no_errors(module: Any, name: str, text: str) -> None:
     assert gone_on(module, text, name)[1] == []

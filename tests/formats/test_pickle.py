@@ -91,7 +91,7 @@ def test_protocol_0_of_python_2() -> None:
     assert_array_equal(values(PYTHON_2_TEXT), [[1.5, -2.0]])
 
 
-def test_protocol_0_spells_quotes_and_back_slashes() -> None:
+def test_protocol_0_escapes_quotes_and_backslashes() -> None:
     data = b"(dp1\nS'v'\n" + rb"""S"it's \\ \x41\n\t\'" """.strip() + b"\ns."
     assert opened(data).get("v") == "it's \\ A\n\t'"
 
@@ -131,7 +131,7 @@ def test_every_protocol_of_python_3(given: Any, protocol: int) -> None:
 
 
 @pytest.mark.parametrize("protocol", [2, 4, 5])
-def test_names_of_numpy_1(protocol: int) -> None:
+def test_module_names_of_numpy_1(protocol: int) -> None:
     data = pickle.dumps({"v": ROWS, "s": np.float32(0.5)}, protocol)
     if protocol > 2:
         data = unframed(data)
@@ -160,7 +160,7 @@ def test_plain_data(protocol: int) -> None:
         assert archive.get(key) == value, key
 
 
-def test_numbers_of_numpy_arrive_as_those_of_python() -> None:
+def test_numpy_scalars_become_python_numbers() -> None:
     given = {"f": np.float64(1.5), "i": np.int32(-7), "b": np.True_, "s": np.str_("x"), "e": ""}
     for protocol in (0, 2, 5):
         archive = opened(pickle.dumps(given, protocol))
@@ -185,11 +185,11 @@ def test_sets_of_protocol_4_are_lists() -> None:
     assert (archive.get("s"), archive.get("f")) == ([1], [2])
 
 
-def test_strings_of_python_2_are_latin_1() -> None:
+def test_python_2_strings_are_latin_1() -> None:
     assert opened(finished(b"}" + text("gr\xfcn") + text("\xe9") + b"s")).get("grün") == "é"
 
 
-def test_text_of_protocol_0_may_have_any_letter() -> None:
+def test_protocol_0_text_may_have_any_character() -> None:
     data = b"(dp0\nV\\u20ac\np1\nVgr\xfcn\ns."
     assert opened(data).get("€") == "grün"
 
@@ -208,7 +208,7 @@ def test_arrays_are_views_of_the_file() -> None:
     assert frozen("v", found, (4, 3)) is found
 
 
-def test_values_are_read_once() -> None:
+def test_pickled_values_are_read_once() -> None:
     archive = opened(saved(v=array(ROWS)))
     later = archive.get("v")
     assert isinstance(later, Deferred)
@@ -241,7 +241,7 @@ def test_sparse_rows(module: str) -> None:
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 4])
-def test_objects_as_python_writes_them(monkeypatch: pytest.MonkeyPatch, protocol: int) -> None:
+def test_objects_pickled_by_python(monkeypatch: pytest.MonkeyPatch, protocol: int) -> None:
     sparse = fake_class(monkeypatch, "scipy.sparse.csc", "csc_matrix")()
     sparse.__dict__ = {"_shape": (1, 1), "data": np.ones(1), "indices": np.zeros(1, "i4")}
     sparse.indptr = np.array([0, 1], "i4")
@@ -328,11 +328,11 @@ def test_lists_of_arrays_stay_lists() -> None:
     assert [part.shape for part in found] == [(4, 3), (4, 3)]
 
 
-def test_truth_values_other_than_0_and_1_are_true() -> None:
+def test_bool_bytes_other_than_0_and_1_are_true() -> None:
     assert values(saved(v=array_of((3,), b"\0\1\7", "b1", "|"))).tolist() == [False, True, True]
 
 
-def test_letters_beyond_unicode_are_refused() -> None:
+def test_invalid_code_points_are_refused() -> None:
     line = refusal(saved(v=array_of((1,), b"\xff\xff\xff\x7f", "U1")))
     assert line == (
         "F002.archive-value",
@@ -341,14 +341,14 @@ def test_letters_beyond_unicode_are_refused() -> None:
     )
 
 
-def test_old_byte_order_without_state() -> None:
+def test_old_dtype_without_state() -> None:
     plain = named("numpy", "dtype") + several(text("f8"), b"\x89", b"\x88") + b"R"
     built = array(ROWS).replace(element_type(), plain)
     assert plain in built
     assert_array_equal(values(saved(v=built)), ROWS)
 
 
-def test_unicode_bytes_of_an_array() -> None:
+def test_array_bytes_stored_as_unicode() -> None:
     built = array(ROWS).replace(payload(ROWS.tobytes()), unicode(ROWS.tobytes().decode("latin-1")))
     assert_array_equal(values(saved(v=built)), ROWS)
 

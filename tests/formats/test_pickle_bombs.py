@@ -87,7 +87,7 @@ def cost(action: Callable[[], Any]) -> int:
          {"problem": Phrase("array-bytes", shape=(1099511627776,), dtype="bytes32", found=4)})),
     ],
 )  # fmt: skip
-def test_shapes_that_do_not_fit_their_bytes(body: bytes, line: Fault) -> None:
+def test_shapes_that_do_not_match_their_bytes(body: bytes, line: Fault) -> None:
     data = saved(v=body)
     assert refusal(data) == line
     assert cost(lambda: refusal(data)) < BOUND
@@ -102,7 +102,7 @@ def test_element_types_without_numbers_are_not_evaluated(code: str) -> None:
 
 
 @pytest.mark.parametrize("sides", [(1,) * 33, (1,) * 100_000, (1 << 62,), (1 << 2000,)])
-def test_shapes_beyond_numpy(sides: tuple[int, ...]) -> None:
+def test_shapes_beyond_numpy_limits(sides: tuple[int, ...]) -> None:
     line = refusal(saved(v=array_of(sides, b"12345678")))
     assert line == (
         "F002.pickle",
@@ -150,7 +150,7 @@ def test_sparse_matrices_that_contradict_themselves(changes: Any, line: Fault) -
     assert cost(lambda: refusal(data)) < BOUND
 
 
-def test_sparse_shape_is_compared_before_anything_is_dense() -> None:
+def test_sparse_shape_is_checked_before_densifying() -> None:
     archive = opened(saved(v=matrix(sides=(1 << 27, 3))))
     with pytest.raises(FormatError) as caught:
         archive.sparse("v", (24, 3))
@@ -201,11 +201,11 @@ def selection(indices: list[int], *sides: int) -> bytes:
          found=2)})),
     ],
 )  # fmt: skip
-def test_selections_that_do_not_fit(data: bytes, line: Fault) -> None:
+def test_selections_out_of_range(data: bytes, line: Fault) -> None:
     assert refusal(data) == line
 
 
-def test_selection_of_long_texts_is_not_evaluated() -> None:
+def test_selection_of_long_strings_is_not_evaluated() -> None:
     long = array_of((1,), b"x" * 100_000, "S100000", "|")
     state = mapping(a=long, idxs=array(np.zeros(100_000, np.uint8)), preferred_shape=shape(100_000))
     archive = opened(saved(v=created("chumpy.reordering", "Select", state)))
@@ -264,21 +264,21 @@ def test_lists_of_the_same_list_twice(count: int) -> None:
         assert cost(lambda data=data: opened(data).get("v")) < BOUND
 
 
-def test_sets_of_the_same_list_again_and_again() -> None:
+def test_sets_of_the_same_list_repeatedly() -> None:
     items = b"](" + b"N" * 100_000 + b"eq\x01"
     again = named("__builtin__", "set") + b"(h\x01tR"
     data = saved(v=b"](" + items + again * 1000 + b"e")
     assert is_too_long(refusal(data))
 
 
-def test_pairs_of_the_same_key_again_and_again() -> None:
+def test_dicts_with_the_same_key_repeatedly() -> None:
     items = b"](" + (text("k") + b"N\x86") * 100_000 + b"eq\x01"
     again = named("collections", "OrderedDict") + b"(h\x01tR"
     data = saved(v=b"](" + items + again * 1000 + b"e")
     assert is_too_long(refusal(data))
 
 
-def test_long_text_used_again_and_again() -> None:
+def test_long_string_used_repeatedly() -> None:
     long = payload(b"x" * 1_000_000) + b"q\x01"
     encoded = unicode("x" * 1_000_000) + b"q\x02" + unicode("latin1") + b"q\x03"
     encode = named("_codecs", "encode") + b"(h\x02h\x03tR"
@@ -295,20 +295,20 @@ def test_long_text_used_again_and_again() -> None:
         assert cost(lambda data=data: self_contained(data)) < BOUND
 
 
-def test_texts_are_no_array() -> None:
+def test_strings_are_not_an_array() -> None:
     """Numpy would make every element as long as the longest."""
     data = saved(v=b"](" + payload(b"x" * 1_000_000) + b"e" + b"(" + b"K\x01" * 10_000 + b"e")
     assert cost(lambda: self_contained(data)) < BOUND
 
 
-def test_memo_with_a_huge_number_costs_nothing() -> None:
+def test_huge_memo_index_allocates_nothing() -> None:
     data = saved(v=b"Nr\xff\xff\xff\x7fj\xff\xff\xff\x7f" + b"0")
     assert opened(data).get("v") is None
     assert cost(lambda: opened(data)) < 1 << 20
 
 
 @pytest.mark.parametrize("step", [b"N", b"(", b"]", b"}", b"2", b")"])
-def test_endless_steps_end(step: bytes) -> None:
+def test_endless_opcodes_terminate(step: bytes) -> None:
     data = b"\x80\x02]" + step * 3_000_000
     assert refusal(data) == (
         "F002.pickle-step",
@@ -317,7 +317,7 @@ def test_endless_steps_end(step: bytes) -> None:
     )
 
 
-def test_huge_declared_lengths_cost_nothing() -> None:
+def test_huge_declared_lengths_allocate_nothing() -> None:
     for step in (b"B\xff\xff\xff\x7f", b"\x8e" + b"\xff" * 5 + b"\0" * 3, b"\x96" + b"\xff" * 8):
         assert cost(lambda step=step: refusal(saved(v=step))) < 1 << 20
 
@@ -345,7 +345,7 @@ def test_huge_declared_lengths_cost_nothing() -> None:
          found=Phrase("noun-text"))})),
     ],
 )  # fmt: skip
-def test_keys_that_are_no_names(key: bytes, found: Fault) -> None:
+def test_keys_that_are_not_strings(key: bytes, found: Fault) -> None:
     assert refusal(saved(v=b"}" + key + b"Ns")) == found
     assert refusal(saved(v=b"(" + key + b"Nd")) == found
 
@@ -367,9 +367,9 @@ def test_keys_that_are_no_names(key: bytes, found: Fault) -> None:
         (b"}K\x05Ns", ("F002.pickle-key", None, {"found": 5})),
     ],
 )  # fmt: skip
-def test_anything_but_named_values(body: bytes, found: Fault) -> None:
+def test_top_level_object_must_be_a_dict(body: bytes, found: Fault) -> None:
     assert refusal(finished(body)) == found
 
 
-def test_same_name_as_text_and_bytes() -> None:
+def test_same_name_as_str_and_bytes() -> None:
     assert refusal(pickle.dumps({b"v": 1, "v": 2})) == ("F002.pickle-twice", None, {"item": "v"})

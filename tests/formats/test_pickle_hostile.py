@@ -54,7 +54,7 @@ def written(marker: Path) -> str:
     return f"__import__('pathlib').Path({str(marker)!r}).touch()"
 
 
-def test_attacks_of_this_file_work_where_they_are_not_refused(tmp_path: Path) -> None:
+def test_attacks_in_this_file_work_with_the_standard_unpickler(tmp_path: Path) -> None:
     path = tmp_path / "proof"
     pickle.loads(saved(v=reduced("builtins", "eval", text(written(path)))))
     assert path.exists()
@@ -109,7 +109,7 @@ def test_attacks_of_this_file_work_where_they_are_not_refused(tmp_path: Path) ->
         ("numpy.ndarray", ""),
     ],
 )
-def test_names_outside_the_table(module: str, name: str, marker: Path) -> None:
+def test_globals_outside_the_table(module: str, name: str, marker: Path) -> None:
     argument = text(written(marker))
     problem = Phrase("pickle-global", name=printable(f"{module}.{name}"))
     fault = ("F002.pickle", None, {"problem": problem})
@@ -150,7 +150,7 @@ CODE = text("f8")
          found=Phrase("noun", name="chumpy.ch.Ch"))})),
     ],
 )  # fmt: skip
-def test_calls_of_what_is_no_function(body: bytes, line: Fault) -> None:
+def test_calls_of_non_functions(body: bytes, line: Fault) -> None:
     assert refusal(saved(v=body)) == line
 
 
@@ -261,11 +261,11 @@ SLOTS = several(b"N", mapping(toarray=whole(1)))
          {"problem": Phrase("pickle-dtype-state", found=Phrase("noun-other", kind="tuple"))})),
     ],
 )  # fmt: skip
-def test_states_that_nobody_writes(body: bytes, line: Fault) -> None:
+def test_malformed_states(body: bytes, line: Fault) -> None:
     assert refusal(saved(v=body)) == line
 
 
-def test_states_set_no_attribute(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_set_no_attributes(monkeypatch: pytest.MonkeyPatch) -> None:
     state = mapping(
         x=array(np.ones(2)),
         __class__=whole(1),
@@ -281,7 +281,7 @@ def test_states_set_no_attribute(monkeypatch: pytest.MonkeyPatch) -> None:
     assert archive.get("b") == Opaque(Phrase("unread-chumpy", name="chumpy.ch.Ch"))
 
 
-def test_one_load_leaves_nothing_for_the_next() -> None:
+def test_loads_share_no_state() -> None:
     refusal(saved(v=named(*MATRIX) + mapping(role=text("x")) + b"b"))
     assert opened(saved(v=matrix())).sparse("v").shape == (2, 3)
 
@@ -305,7 +305,7 @@ def test_one_load_leaves_nothing_for_the_next() -> None:
          found=Phrase("noun-buffer"))})),
     ],
 )  # fmt: skip
-def test_steps_that_reach_outside(body: bytes, found: Fault) -> None:
+def test_opcodes_with_out_of_range_references(body: bytes, found: Fault) -> None:
     assert refusal(saved(v=body)) == found
 
 

@@ -75,7 +75,7 @@ def test_folder_is_recognised_and_named_after_itself(folder):
     ],
     ids="crlf cr crcrlf bom tabs blank-led cut-newline newlines gaps ctrl-z".split(),  # noqa: SIM905
 )
-def test_ways_to_write_a_table_load_silently(folder, change):
+def test_table_format_variants_load_silently(folder, change):
     assert_good(silent(write(folder, {name: change(text.encode()) for name, text in GOOD.items()})))
 
 
@@ -94,7 +94,7 @@ def test_weights_may_come_in_any_order(folder, seed):
     assert influences(silent(write(folder, skinning_weights="\n".join(rows)))) == WEIGHTS
 
 
-def test_weights_are_kept_as_they_are(folder):
+def test_weights_are_kept_as_stored(folder):
     rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.24800000\n2 3 1\n2 4 0.5\n1 4 0.5\n"
     figure = silent(write(folder, skinning_weights=rows))  # up to 0.01 is the authors' rounding
     assert influences(figure)[:3] == [[(0, 0.998)], [(1, 1.002)], [(0, 0.75), (1, 0.248)]]
@@ -103,7 +103,7 @@ def test_weights_are_kept_as_they_are(folder):
     assert_allclose(deform(figure)[0], rest, rtol=0, atol=EXACT)
 
 
-def test_fact_tells_what_normalising_would_move(folder):
+def test_fact_reports_the_effect_of_normalising(folder):
     rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.25\n2 3 0.999\n2 4 0.5\n1 4 0.503\n"
     told = facts(silent(write(folder, skinning_weights=rows)))
     # The last vertex is 3 m from the origin, its sum is 1.003: 9 mm, more than any other.
@@ -111,7 +111,7 @@ def test_fact_tells_what_normalising_would_move(folder):
     assert told["weights"] == "raw; their sums are 0.998 to 1.003"
 
 
-def test_fact_tells_how_far_regressed_joints_are(folder):
+def test_fact_reports_the_distance_of_regressed_joints(folder):
     # Joint 2 is regressed to the middle of (1, 1, 0) and (2, 2, -1), sqrt(1.5) m from where it is.
     assert facts(silent(write(folder)))["joint regressor"] == (
         "408.25 mm from the file's joints on average, 1224.74 mm at most; "
@@ -119,12 +119,12 @@ def test_fact_tells_how_far_regressed_joints_are(folder):
     )
 
 
-def test_files_of_no_use_are_named(folder):
+def test_unused_files_are_named(folder):
     write(folder, {**GOOD, "PIG.obj": "v 0 0 0", "SOURCE.md": "x", ".hidden": "x"})
     assert facts(silent(folder))["not needed"] == "PIG.obj, SOURCE.md"
 
 
-def test_body_part_names_may_have_blanks_and_may_lack(folder):
+def test_body_part_names_may_have_blanks_or_be_missing(folder):
     figure = silent(write(folder, body_part_defs="NOT BODY\r\nMAIN BODY\r\nHEAD\r\n"))
     assert figure.body_parts.names == ("NOT BODY", "MAIN BODY", "HEAD")
     figure = silent(write(folder, body_part_defs=None))
@@ -134,7 +134,7 @@ def test_body_part_names_may_have_blanks_and_may_lack(folder):
 # Posing
 
 
-def test_root_turns_by_euler_angles_and_others_by_rotation_vectors(folder):
+def test_root_uses_euler_angles_and_others_rotation_vectors(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     # 90 degrees about z, the root's first number; 90 degrees about x for joint 1.
@@ -149,7 +149,7 @@ def test_root_turns_by_euler_angles_and_others_by_rotation_vectors(folder):
     assert_allclose(deform(figure, pose)[0][2], expected, rtol=0, atol=EXACT)
 
 
-def test_root_applies_its_third_number_first(folder):
+def test_root_applies_its_third_angle_first(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     numbers = [0, 0, 0, np.pi / 2, 0, np.pi / 2, *[0] * 6, 1]
@@ -198,7 +198,7 @@ def test_without_texture_coordinates_the_figure_is_untextured(folder, gone):
 RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
 
 
-def test_picture_in_the_folder_becomes_the_texture(folder):
+def test_image_in_the_folder_becomes_the_texture(folder):
     write(folder)
     save_image(folder / "skin.png", RED)
     scene = viewer.load(folder)
@@ -209,7 +209,7 @@ def test_picture_in_the_folder_becomes_the_texture(folder):
     assert scene.actors[0].figure.mesh.material_indices.tolist() == [0, 0]
 
 
-def test_two_pictures_are_left_to_the_person(folder):
+def test_two_images_are_not_chosen_from(folder):
     write(folder)
     for name in ("a.png", "b.jpg"):
         save_image(folder / name, RED)
@@ -218,7 +218,7 @@ def test_two_pictures_are_left_to_the_person(folder):
     assert scene.actors[0].figure.mesh.materials == ()
 
 
-def test_broken_picture_in_the_folder_leaves_the_figure_untextured(folder):
+def test_invalid_image_in_the_folder_leaves_the_figure_untextured(folder):
     write(folder)
     (folder / "skin.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     scene = viewer.load(folder)
@@ -228,7 +228,7 @@ def test_broken_picture_in_the_folder_leaves_the_figure_untextured(folder):
     assert warning.endswith("; drawn untextured")
 
 
-def test_picture_named_beside_the_folder_becomes_the_texture(folder, tmp_path):
+def test_image_named_together_with_the_folder_becomes_the_texture(folder, tmp_path):
     save_image(tmp_path / "red.png", RED)
     figure = viewer.load(tmp_path / "red.png", write(folder)).actors[0].figure
     assert figure.mesh.materials[0].texture == "red.png"
@@ -247,7 +247,7 @@ def test_npz_with_rows_of_entries_equals_the_folder(tmp_path):
     assert_good(silent(tmp_path / "pig.npz"))
 
 
-def test_vertex_major_matrices_are_told_by_their_shape(tmp_path):
+def test_vertex_major_matrices_are_recognised_by_shape(tmp_path):
     given = arrays()
     given["skinning_weights"] = np.asfortranarray(given["skinning_weights"].T)
     given["J_regressor"] = given["J_regressor"].T.astype(np.float32)
@@ -307,7 +307,7 @@ def test_pickle_of_any_protocol_equals_the_folder(tmp_path, monkeypatch, protoco
     assert_good(silent(tmp_path / "PIG.pkl"))
 
 
-def test_archive_names_the_keys_of_no_use(tmp_path):
+def test_archive_reports_unused_keys(tmp_path):
     np.savez(tmp_path / "pig.npz", **arrays(), author=np.array("me"))
     assert facts(silent(tmp_path / "pig.npz"))["not needed"] == "author"
 

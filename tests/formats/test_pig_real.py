@@ -84,7 +84,7 @@ def test_weights_are_raw(pig):
     assert facts["weights"] == "raw; their sums are 0.998 to 1.002"
 
 
-def test_regressed_joints_are_near_the_files(pig):
+def test_regressed_joints_are_near_the_stored_ones(pig):
     fact = dict(pig.facts)["joint regressor"]
     assert fact.startswith("0.13 mm from the file's joints on average, 1.63 mm at most")
 
@@ -174,13 +174,13 @@ def test_rest_box_and_normals(pig):
     assert_allclose(pig.mesh.normals[[0, 10895]], expected, rtol=0, atol=PRINTED)
 
 
-def test_turned_root(pig):
+def test_rotated_root(pig):
     pose = posed(pig, numbers(ROOT))
     row = joint_rotations(pig.skeleton, pose)[0, 0]
     assert_allclose(row, [0.572541, -0.818863, -0.040743], rtol=0, atol=PRINTED)
 
 
-def test_turned_root_placed_and_scaled(pig):
+def test_rotated_root_placed_and_scaled(pig):
     pose = posed(pig, numbers(ROOT, **PLACED))
     nose = deform(pig, pose)[0][10895]
     assert_allclose(nose, [0.643911, 0.241038, 0.716217], rtol=0, atol=PRINTED)
@@ -188,7 +188,7 @@ def test_turned_root_placed_and_scaled(pig):
     assert_allclose(tail, [0.132899, -0.415763, 0.398340], rtol=0, atol=PRINTED)
 
 
-def test_three_turned_joints(pig):
+def test_three_rotated_joints(pig):
     pose = posed(pig, numbers(THREE))
     vertices = deform(pig, pose)[0]
     nose = [0.433938, 0.049298, -0.014247]
@@ -233,7 +233,7 @@ VECTOR = np.concatenate([[0.3, -0.2, 0.5], 0.4 * np.sin(np.arange(186.0)), [1.35
 
 
 @pytest.mark.parametrize("separator", ["\n", " ", "\r\n", "\t"])
-def test_pose_file_of_190_numbers_comes_back(pig, folder, tmp_path, separator):
+def test_pose_file_of_190_values_round_trips(pig, folder, tmp_path, separator):
     path = tmp_path / "pose.txt"
     path.write_bytes(separator.join(map(repr, VECTOR.tolist())).encode())
     scene = viewer.load(folder, path)

@@ -66,7 +66,7 @@ def some_pose(figure):
 
 @pytest.mark.parametrize("suffix", [".json", ".npz", ".JSON"])
 @pytest.mark.parametrize("kind", ["pig", "skel", *MODELS])
-def test_pose_comes_back_to_the_bit(figures, tmp_path, kind, suffix):
+def test_pose_round_trips_exactly(figures, tmp_path, kind, suffix):
     figure = figures[kind]
     given, path = some_pose(figure), tmp_path / f"pose{suffix}"
     viewer.write(record_of(figure, given), path)
@@ -81,7 +81,7 @@ def test_pose_comes_back_to_the_bit(figures, tmp_path, kind, suffix):
 
 
 @pytest.mark.parametrize("kind", ["pig", "smpl", "smplx"])
-def test_own_numbers_come_back_as_text(figures, tmp_path, kind):
+def test_raw_pose_values_round_trip_as_text(figures, tmp_path, kind):
     figure = figures[kind]
     given, path = some_pose(figure), tmp_path / "pose.txt"
     viewer.write(record_of(figure, given), path)
@@ -94,7 +94,7 @@ def test_own_numbers_come_back_as_text(figures, tmp_path, kind):
     assert_allclose(turns(figure, found), turns(figure, given), rtol=0, atol=1e-14)
 
 
-def test_record_with_smplx_names_comes_back(tmp_path):
+def test_record_with_smplx_names_round_trips(tmp_path):
     given = PoseRecord(
         parts={"body_pose": waves(63), "left_hand_pose": waves(6), "jaw_pose": waves(3)},
         shape=waves(10),
@@ -120,7 +120,7 @@ def test_same_pose_gives_the_same_bytes(figures, tmp_path):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
-def test_writer_refuses_what_is_no_pose(figures, tmp_path):
+def test_writer_refuses_invalid_poses(figures, tmp_path):
     with pytest.raises(
         UnsupportedFormatError, match=r"^\.json holds a pose, not a figure or clip$"
     ):
@@ -133,7 +133,7 @@ def test_writer_refuses_what_is_no_pose(figures, tmp_path):
 # Names used by smplx
 
 
-def test_parts_turn_their_joints(figures):
+def test_parts_rotate_their_joints(figures):
     figure = figures["smplx"]
     given = {"global_orient": waves(3, 1), "body_pose": waves(63, 2), "jaw_pose": waves(3, 3)}
     given |= {"leye_pose": waves(3, 4), "reye_pose": waves(3, 5), "betas": waves(10, 6)}
@@ -192,7 +192,7 @@ def test_vector_may_have_any_shape_of_one_frame(figures, tmp_path, shape, key):
     assert_allclose(turns(figure, posed), expected, rtol=0, atol=1e-6)
 
 
-def test_vector_of_a_relative_poses_the_body(figures):
+def test_vector_of_a_related_model_poses_the_body(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=waves(72)), figure, posed)
@@ -202,7 +202,7 @@ def test_vector_of_a_relative_poses_the_body(figures):
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
 
 
-def test_body_pose_of_smpl_leaves_the_face_of_smplx_alone(figures):
+def test_body_pose_of_smpl_keeps_the_face_of_smplx(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(parts={"body_pose": waves(69)}), figure, posed)
@@ -221,7 +221,7 @@ def test_parts_that_a_figure_lacks_are_noted_unless_they_are_at_rest(figures):
     ]
 
 
-def test_unknown_keys_are_named_and_those_of_motions_are_not():
+def test_unknown_keys_are_named_except_motion_keys():
     _, warnings = parts(body_pose=[0] * 63, gender="male", mocap_framerate=120, fps=30)
     assert warnings == []
     _, warnings = parts(body_pose=[0] * 63, body_poses=[1], comment="me")
@@ -239,7 +239,7 @@ def test_unknown_keys_are_named_and_those_of_motions_are_not():
     ]
 
 
-def test_large_members_of_no_use_are_not_read(tmp_path):
+def test_unused_large_members_are_not_read(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, poses=np.zeros((1, 72)), marker_data=np.arange(1000.0))
     data = bytearray(path.read_bytes())

@@ -56,7 +56,7 @@ def refusal(*paths):
 # Poses
 
 
-def test_coefficients_beyond_those_of_the_model_are_left_out_and_said(files):
+def test_coefficients_beyond_those_of_the_model_are_dropped_with_a_note(files):
     scene = viewer.load(files["smpl"], files["long"])
     assert scene.actors[0].pose.shape_weights.tolist() == [1.0] * 10
     assert scene.warnings[-1] == (
@@ -65,13 +65,13 @@ def test_coefficients_beyond_those_of_the_model_are_left_out_and_said(files):
 
 
 @pytest.mark.parametrize("order", [("legs", "kick"), ("kick", "legs")])
-def test_pose_goes_to_the_figure_beside_it(files, order):
+def test_pose_is_applied_to_the_figure_opened_with_it(files, order):
     scene = viewer.load(*(files[name] for name in order))
     assert scene.warnings == ()
     assert scene.actors[0].pose.dofs.tolist() == [0, 0, 0, 0.25, 0, 0, 0.5, 0, 0]
 
 
-def test_pose_goes_to_the_first_figure_that_it_fits(files):
+def test_pose_is_applied_to_the_first_figure_that_it_fits(files):
     scene = viewer.load(files["smpl"], files["pig"], files["legs"], files["kick"], files["bend"])
     smpl, pig, legs = scene.actors
     assert not smpl.pose.dofs.any()
@@ -85,7 +85,7 @@ def test_values_beyond_limits_are_clamped_with_a_note(files):
     assert scene.actors[0].pose.dofs[[1, 3, 6]].tolist() == [1e8, 1, 0.5]
 
 
-def test_shape_goes_to_a_body(files):
+def test_shape_is_applied_to_a_body(files):
     scene = viewer.load(files["smpl"], files["shape"])
     assert scene.warnings == ()
     assert scene.actors[0].pose.shape_weights.tolist() == [1, 2, *[0] * 8]
@@ -126,35 +126,35 @@ def test_pose_of_another_figure_is_refused_with_both(files, figure, pose, messag
 # Pictures
 
 
-def test_picture_goes_to_the_first_figure_without_a_texture(files):
+def test_image_is_applied_to_the_first_figure_without_a_texture(files):
     scene = viewer.load(files["legs"], files["pig"], files["red"])
     (material,) = scene.actors[1].figure.mesh.materials
     assert (material.name, material.texture) == ("red", "red.png")
     assert material.image.tolist() == RED.tolist()
 
 
-def test_second_picture_goes_to_the_second_figure(files):
+def test_second_image_is_applied_to_the_second_figure(files):
     scene = viewer.load(files["pig"], files["pig"], files["red"], files["blue"])
     textures = [actor.figure.mesh.materials[0].texture for actor in scene.actors]
     assert textures == ["red.png", "blue.png"]
 
 
 @pytest.mark.parametrize("names", [["legs"], ["smpl"], ["bare"], ["legs", "smpl"]])
-def test_picture_for_figures_without_texture_coordinates_is_refused(files, names):
+def test_image_for_figures_without_texture_coordinates_is_refused(files, names):
     listed = ", ".join(names)
     assert refusal(files["red"], *(files[name] for name in names)) == (
         f"{files['red']}: cannot apply the picture: {listed} has no texture coordinates"
     )
 
 
-def test_picture_alone_is_refused(files):
+def test_image_alone_is_refused(files):
     assert (
         refusal(files["red"])
         == f"{files['red']}: a picture without a figure: open it together with a figure"
     )
 
 
-def test_broken_picture_is_refused(files):
+def test_invalid_image_is_refused(files):
     files["red"].write_bytes(b"\x89PNG\r\n\x1a\nnothing")
     with pytest.raises(FormatError) as caught:
         viewer.load(files["pig"], files["red"])
@@ -183,7 +183,7 @@ def test_pose_is_added_to_an_actor_in_place(files):
     ]
 
 
-def test_picture_makes_an_actor_with_the_same_pose(files):
+def test_texture_makes_an_actor_with_the_same_pose(files):
     actor = viewer.load(files["pig"]).actors[0]
     other, notes = add_to_actor(additions(files, "red", "bend"), actor)
     assert notes == []
@@ -195,7 +195,7 @@ def test_picture_makes_an_actor_with_the_same_pose(files):
 
 
 @pytest.mark.parametrize("names", [("bend", "short"), ("bend", "kick"), ("red", "bend", "tail")])
-def test_what_does_not_fit_leaves_the_actor_as_it_was(files, names):
+def test_unsuitable_file_leaves_the_actor_unchanged(files, names):
     actor = viewer.load(files["pig"]).actors[0]
     figure, before = actor.figure, pose_key(actor.pose)
     with pytest.raises(FormatError):
@@ -213,6 +213,6 @@ def test_pose_for_an_actor_without_a_skeleton_is_refused(files):
     assert str(caught.value) == f"{files['kick']}: cannot apply the pose: a has no skeleton"
 
 
-def test_figures_and_clips_are_no_additions(files):
+def test_figures_and_clips_cannot_be_added_to_an_actor(files):
     assert not read_files([files["pig"], files["bend"]]).is_addition
     assert not read_files([]).is_addition

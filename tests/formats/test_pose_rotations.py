@@ -31,7 +31,7 @@ def turns(shifts=SHIFTS, rotations=None) -> JointRotations:
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
 @pytest.mark.parametrize("shifts", [SHIFTS, np.zeros((5, 3))])
-def test_turns_come_back(tmp_path: Path, suffix, shifts):
+def test_rotations_round_trip(tmp_path: Path, suffix, shifts):
     path = tmp_path / f"a{suffix}"
     viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(shifts)), path)
     source = Source(path, path.read_bytes())
@@ -45,7 +45,7 @@ def test_turns_come_back(tmp_path: Path, suffix, shifts):
 
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
-def test_rotations_beneath_the_dofs_come_back(tmp_path: Path, suffix):
+def test_rotations_beneath_the_dofs_round_trip(tmp_path: Path, suffix):
     path = tmp_path / f"a{suffix}"
     viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(rotations=BENEATH)), path)
     source = Source(path, path.read_bytes())
@@ -53,7 +53,7 @@ def test_rotations_beneath_the_dofs_come_back(tmp_path: Path, suffix):
     assert source.warnings == []
 
 
-def test_what_is_at_rest_is_not_written():
+def test_rest_values_are_not_written():
     named = json.loads(
         pose.pose_text(PoseRecord(dofs={"a.x": 1.0}, joint_rotations=turns(0 * SHIFTS)))
     )
@@ -61,7 +61,7 @@ def test_what_is_at_rest_is_not_written():
     assert "joint_rotations" not in named and "joint_shifts" not in named
 
 
-def test_edited_dof_of_a_saved_pose_is_what_a_figure_gets():
+def test_edited_dof_of_a_saved_pose_takes_precedence():
     skeleton = viewer.Skeleton(
         names=("hip", "knee"),
         parents=np.array([-1, 0]),
@@ -91,14 +91,14 @@ def read(**values):
     return pose.read(Source("a.json", json.dumps(GOOD | values).encode()))
 
 
-def test_a_file_needs_no_more_than_names_and_turns():
+def test_a_file_needs_only_names_and_rotations():
     found = read(joint_turns=[[0, 0, 0, 2]]).joint_rotations
     assert found.relative.tolist() == [[0, 0, 0, 1]] and found.shifts.tolist() == [[0, 0, 0]]
     assert found.rotations is None
     assert (found.figure, found.up, found.layout) == ("", "y", "")
 
 
-def test_without_turns_the_other_words_mean_nothing():
+def test_without_rotations_the_other_keys_are_ignored():
     source = Source("a.json", b'{"dofs": {"a.x": 1}, "joint_names": 3, "up": "y"}')
     assert pose.read(source).joint_rotations is None
     assert warnings_of(source.diagnostics) == [
@@ -145,7 +145,7 @@ def test_without_turns_the_other_words_mean_nothing():
          "found": Phrase("found-list", n=1)})),
     ],
 )  # fmt: skip
-def test_broken_turns_are_refused(values, message):
+def test_invalid_rotations_are_refused(values, message):
     with pytest.raises(FormatError) as caught:
         read(**values)
     assert str(caught.value).startswith("a.json:1: ")

@@ -39,12 +39,12 @@ def test_reads_every_part() -> None:
     ],
     ids=["crlf", "cr", "tabs", "numbered", "glued", "byte order mark"],
 )
-def test_quirks_load_without_a_word(text: str) -> None:
+def test_quirks_load_without_warnings(text: str) -> None:
     clip, warnings = parse(text)
     assert len(clip.channels) == 1 and warnings == []
 
 
-def test_write_then_read_gives_the_clip_back(tmp_path: Path) -> None:
+def test_clip_round_trips(tmp_path: Path) -> None:
     clip, _ = parse(GOOD)
     write(clip, tmp_path / "copy.anim")
     again = read(Source.open(tmp_path / "copy.anim"))
@@ -56,7 +56,7 @@ def test_write_then_read_gives_the_clip_back(tmp_path: Path) -> None:
         assert (old.tangents, old.extrapolation) == (new.tangents, new.extrapolation)
 
 
-def test_tangents_mix_rules_and_numbers_on_the_two_sides() -> None:
+def test_tangents_mix_rules_and_slopes_on_the_two_sides() -> None:
     keys = "0 1 13.7 -0.22 1 2 flat -.75 2 3 +1e-1 linear 3 4 smooth 5."
     channel = f"channel {{ extrapolate linear cycle keys 4 {{ {keys} }} }}"
     clip, warnings = parse(f"animation {{ range 0 1 numchannels 1 {channel} }}")
@@ -95,13 +95,13 @@ def test_what_follows_the_animation_is_ignored_with_a_warning() -> None:
     assert parse(f"{GOOD} more")[1] == [("F006.anim-after", 1, {"found": b"more"})]
 
 
-def test_missing_range_is_that_of_the_keys() -> None:
+def test_missing_range_is_taken_from_the_keys() -> None:
     clip, warnings = parse(GOOD.replace("range -1 4 ", ""))
     assert (clip.start, clip.end) == (0.0, 2.0)
     assert warnings == [("F007.anim-no-range", None, {"start": "0", "end": "2"})]
 
 
-def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
+def test_numpy_scalars_are_written_as_numbers(tmp_path: Path) -> None:
     tangents = ((np.float64(0.1), "flat"),)
     channel = Channel(0, np.array([1 / 3]), np.array([2 / 3]), tangents)
     write(Clip("c", (channel,), np.float64(0.1), np.float64(1e-17 + 0.3)), tmp_path / "c.anim")
@@ -131,7 +131,7 @@ def test_clip_is_recognised_by_content() -> None:
     assert detect(Source("walk.txt", GOOD.encode())) == "anim"
 
 
-def test_clip_of_another_skeleton_names_both_numbers(tmp_path: Path) -> None:
+def test_clip_of_another_skeleton_names_both_dof_counts(tmp_path: Path) -> None:
     (tmp_path / "a.skel").write_text(SKEL)
     (tmp_path / "a.anim").write_text(GOOD)
     with pytest.raises(RigError) as caught:

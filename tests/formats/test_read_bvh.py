@@ -99,7 +99,7 @@ def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() 
     np.testing.assert_allclose(worlds(motion)[0, 3, :3, 3], [0, 1.75, 0])
 
 
-def test_positions_of_0_below_the_root_are_added() -> None:
+def test_zero_positions_below_the_root_keep_the_offset() -> None:
     six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     text = GOOD.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
     body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + "0 " * 24
@@ -134,14 +134,14 @@ def test_root_offset_is_replaced_too() -> None:
     ids=["crlf", "cr", "cr cr lf", "one line", "blanks", "capitals", "small", "glued", "bom",
          "no end", "empty lines", "glued numbers", "time first", "named end"],
 )  # fmt: skip
-def test_quirks_load_without_a_word(text: str) -> None:
+def test_quirks_load_without_warnings(text: str) -> None:
     motion, warnings = read(text)
     assert warnings == []
     expected = worlds(read(GOOD)[0])
     np.testing.assert_array_equal(worlds(motion), expected)
 
 
-def test_names_repeat_are_missing_or_hold_blanks() -> None:
+def test_names_may_repeat_be_missing_or_contain_blanks() -> None:
     text = GOOD.replace("LeftUpLeg", "arm").replace("LeftFoot", "arm").replace("Head", "")
     motion, warnings = read(text.replace("Hips", "my  hips é"))
     assert motion.figure.skeleton.names == ("my hips é", "arm", "arm", "")
@@ -221,7 +221,9 @@ def test_quaternions_keep_their_sign_from_frame_to_frame() -> None:
         ("0.034567", 1 / 0.034567),
     ],
 )
-def test_frame_rate_is_the_usual_one_that_rounds_to_the_time(written: str, rate: float) -> None:
+def test_frame_rate_snaps_to_the_common_one_matching_the_frame_time(
+    written: str, rate: float
+) -> None:
     motion, warnings = read(GOOD.replace("0.0333333", written))
     assert warnings == []
     assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-15)
@@ -257,20 +259,20 @@ def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: lis
     assert motion.figure.facts[0][0] == "unit"
 
 
-def test_z_is_up_where_the_head_is_above_the_feet_along_z() -> None:
+def test_z_is_up_if_the_head_is_above_the_feet_along_z() -> None:
     text = GOOD.replace("0.0 -0.9 0.0", "0 0 -0.9").replace("0.0 0.6 0.0", "0.0 0.0 0.6")
     motion, warnings = read(text.replace("0.0 1.0 0.0 0 0 0", "0 0 1 0 0 0"))
     assert motion.figure.up == "z"
     assert warnings == [Phrase("up-of-head", up="z")]
 
 
-def test_z_is_up_where_a_nameless_skeleton_is_longest_along_z() -> None:
+def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
     motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
     assert motion.figure.up == "z"
     assert warnings == [Phrase("up-of-longest", up="z")]
 
 
-def test_frames_that_stand_along_another_axis_are_announced() -> None:
+def test_frames_upright_along_another_axis_are_reported() -> None:
     # A rest pose along y, turned by 90 degrees about x in every frame: a z-up world.
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
@@ -278,7 +280,7 @@ def test_frames_that_stand_along_another_axis_are_announced() -> None:
     assert warnings == [Phrase("up-against-frames", up="y", axis="+z")]
 
 
-def test_content_tells_the_format() -> None:
+def test_content_determines_the_format() -> None:
     assert detect(Source("x.bvh", GOOD.encode())) == "bvh"
     assert detect(Source("x.txt", b"  hierarchy\nroot a{}")) == "bvh"
 

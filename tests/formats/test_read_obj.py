@@ -37,7 +37,7 @@ def test_triangles_keep_vertices_and_order() -> None:
     assert (figure.name, figure.up, figure.unit) == ("a", "y", "")
 
 
-def test_missing_normals_are_computed_and_said_in_the_facts() -> None:
+def test_missing_normals_are_computed_and_listed_in_the_facts() -> None:
     figure = silent(SQUARE + "f 1 2 3\n")
     assert figure.mesh.normals.tolist()[:3] == [[0, 0, 1]] * 3
     assert figure.facts == (("normals", "none in the file: computed from the triangles"),)
@@ -74,7 +74,7 @@ def test_negative_indices_count_back_from_the_line() -> None:
     assert silent(text).mesh.triangles.tolist() == [[0, 1, 2], [3, 1, 2], [0, 3, 1]]
 
 
-def test_negative_indices_reach_back_over_pieces() -> None:
+def test_negative_indices_reach_back_over_chunks() -> None:
     # 40,000 quads with four vertices each span several pieces of the file.
     block = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n"
     mesh = silent(block * 40_000).mesh
@@ -87,7 +87,7 @@ def test_indices_may_point_forward() -> None:
     assert silent("f 1 2 3\n" + SQUARE).mesh.triangles.tolist() == [[0, 1, 2]]
 
 
-def test_polygons_are_cut_and_counted() -> None:
+def test_polygons_are_triangulated_and_counted() -> None:
     text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 3 0\nv 0 2 0\nf 1 2 3 4 5\nf 1 2 3 5\nf 1 2 3\n"
     figure = silent(text)
     triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 1, 2], [0, 2, 4], [0, 1, 2]]
@@ -96,7 +96,7 @@ def test_polygons_are_cut_and_counted() -> None:
     assert ("polygons", text) in figure.facts
 
 
-def test_a_quad_with_a_dent_is_split_along_it() -> None:
+def test_a_concave_quad_is_split_at_its_reflex_corner() -> None:
     # The fourth corner lies inside the triangle of the others: only its diagonal stays inside.
     text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 0\nf 1 2 4 3\nf 4 3 1 2\nf 2 4 3 1\nf 3 1 2 4\n"
     mesh = silent(text).mesh
@@ -108,7 +108,7 @@ def test_a_quad_with_a_dent_is_split_along_it() -> None:
 
 
 @pytest.mark.parametrize("turn", range(0, 12, 3))
-def test_a_polygon_that_is_not_convex_is_covered_exactly(turn: int) -> None:
+def test_a_concave_polygon_is_covered_exactly(turn: int) -> None:
     # A comb of three teeth: 12 corners, area by the shoelace formula, in a slanted plane.
     flat = [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3),
             (0, 3)]  # fmt: skip
@@ -123,7 +123,7 @@ def test_a_polygon_that_is_not_convex_is_covered_exactly(turn: int) -> None:
     assert crosses.sum() == pytest.approx(shoelace)
 
 
-def test_a_polygon_of_very_many_corners_takes_no_time() -> None:
+def test_a_polygon_with_very_many_corners_is_fast() -> None:
     angles = np.linspace(0, 2 * np.pi, 60_000, endpoint=False)
     radii = 1.0 + 0.1 * np.cos(9 * angles)  # not convex: nine dents
     points = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
@@ -141,7 +141,7 @@ def test_triangles_of_a_closed_box_of_quads_enclose_its_volume() -> None:
     assert volume(mesh.positions, mesh.triangles) == pytest.approx(30.0)
 
 
-def test_colours_and_weights_are_left_out_and_said_once() -> None:
+def test_colours_and_weights_are_ignored_with_one_note() -> None:
     figure, warnings = read(
         "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nv 0 0 1 2\nv 0 0 1 1\nf 1 2 3\n"
     )
@@ -158,7 +158,7 @@ def test_continued_lines_comments_and_blanks() -> None:
 
 
 @pytest.mark.parametrize("end", ["\r\n", "\r", "\r\r\n"])
-def test_line_ends(end: str) -> None:
+def test_line_endings(end: str) -> None:
     mesh = silent((SQUARE + "f 1 2 3\n").replace("\n", end)).mesh
     assert mesh.positions.shape == (4, 3) and mesh.triangles.tolist() == [[0, 1, 2]]
 
@@ -206,7 +206,7 @@ def test_groups_become_materials_where_there_are_none() -> None:
     assert ("parts", "2 groups and objects") in figure.facts
 
 
-def test_one_object_is_no_material() -> None:
+def test_one_object_is_not_a_material() -> None:
     figure = silent("o body\n" + SQUARE + "s 1\nf 1 2 3\n")
     assert figure.mesh.materials == ()
 
@@ -231,7 +231,7 @@ def test_textures_come_from_the_library(tmp_path) -> None:
     assert mesh.materials[1].image is None
 
 
-def test_what_libraries_lack_is_said(tmp_path) -> None:
+def test_missing_library_entries_are_reported(tmp_path) -> None:
     (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd gone.png\nnewmtl b\nmap_Kd ../b.png\n")
     text = SQUARE + "vt 0 0\nmtllib m.mtl none.mtl ../up.mtl\n"
     text += "".join(f"usemtl {name}\nf 1/1 2/1 3/1\n" for name in "abc")
@@ -250,7 +250,7 @@ def test_what_libraries_lack_is_said(tmp_path) -> None:
     ]
 
 
-def test_what_is_not_drawn_is_said() -> None:
+def test_unsupported_elements_are_reported() -> None:
     text = SQUARE + "f 1 2 3\nl 1 2 3\nl 2 3\np 1\ncstype bezier\ncstype bezier\nvp 0 0\n"
     _, warnings = read(text)
     assert warnings == [
@@ -334,17 +334,17 @@ def test_points_alone_are_a_warning() -> None:
          ('F002.obj-corner', 5, {'found': b'99999999999999999999'})),
     ],
 )  # fmt: skip
-def test_broken_files_say_where_and_what(text: str, fault: Fault) -> None:
+def test_invalid_files_are_reported_with_location_and_reason(text: str, fault: Fault) -> None:
     assert refusal_of(lambda: read(text)) == fault
 
 
-def test_it_is_found_by_content_and_by_suffix() -> None:
+def test_format_is_detected_by_content_and_by_suffix() -> None:
     assert detect(Source("a.obj", b"# made by hand\n" + SQUARE.encode())) == "obj"
     assert detect(Source("a.txt", SQUARE.encode())) == "obj"
     assert detect(Source("a.obj", b"g nothing\n")) == "obj"
 
 
-def test_our_own_files_come_back(tmp_path) -> None:
+def test_exported_files_round_trip(tmp_path) -> None:
     actor = viewer.load().actors[0]
     viewer.export(actor, tmp_path / "fox.obj")
     scene = viewer.load(tmp_path / "fox.obj")
@@ -360,12 +360,12 @@ def test_our_own_files_come_back(tmp_path) -> None:
     assert np.array_equal(mesh.materials[0].image, written.materials[0].image)
 
 
-def test_our_own_files_say_what_is_up() -> None:
+def test_exported_files_record_the_up_axis() -> None:
     figure = silent("# pig: z up, metres\n" + SQUARE + "f 1 2 3\n")
     assert (figure.up, figure.unit) == ("z", "m")
 
 
-def test_random_damage_is_refused_in_one_line_or_read() -> None:
+def test_randomly_damaged_file_is_refused_in_one_line_or_read() -> None:
     good = (
         SQUARE
         + "vt 0 0\nvt 1 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1 4/2/1\nf -1//1 -2//1 -3//1\n"

@@ -65,7 +65,7 @@ def binary(order, elements, comments=()) -> bytes:
     return "\n".join([*lines, "end_header\n"]).encode() + body
 
 
-def test_text() -> None:
+def test_ascii_file() -> None:
     figure = silent(GOOD)
     assert figure.mesh.positions.tolist() == SQUARE
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
@@ -80,7 +80,7 @@ def test_text() -> None:
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize("number", ["float", "double", "short"])
 @pytest.mark.parametrize("index", ["uchar", "short", "int", "uint"])
-def test_bytes_of_every_type_and_order(order: str, number: str, index: str) -> None:
+def test_binary_file_of_every_type_and_byte_order(order: str, number: str, index: str) -> None:
     vertices = [[x, y, z] for x, y, z in [(0, 0, 0), (2, 0, 0), (2, 2, 0), (-3, 2, 7)]]
     faces = [[[0, 1, 2]], [[0, 2, 3]]]
     data = binary(
@@ -96,7 +96,7 @@ def test_bytes_of_every_type_and_order(order: str, number: str, index: str) -> N
 
 
 @pytest.mark.parametrize("order", "<>")
-def test_properties_in_any_order_and_elements_that_are_not_known(order: str) -> None:
+def test_properties_in_any_order_and_unknown_elements(order: str) -> None:
     data = binary(
         order,
         [
@@ -120,14 +120,14 @@ def test_properties_in_any_order_and_elements_that_are_not_known(order: str) -> 
     assert warnings == [unused("element camera", "vertex red", "face flags", "face quality")]
 
 
-def test_a_last_byte_that_ends_texts_is_a_number_here() -> None:
+def test_trailing_ctrl_z_byte_of_binary_data_is_kept() -> None:
     data = binary("<", [("vertex", ["float x", "float y", "uchar z"], [[0, 0, 26]] * 3),
                         ("face", ["list uchar uchar vertex_indices"], [])])  # fmt: skip
     mesh, _ = read(data)
     assert mesh.mesh.positions[:, 2].tolist() == [26] * 3
 
 
-def test_texture_coordinates_of_corners_become_seams() -> None:
+def test_per_corner_texture_coordinates_become_seams() -> None:
     data = binary(
         "<",
         [
@@ -146,7 +146,7 @@ def test_texture_coordinates_of_corners_become_seams() -> None:
     assert len(mesh.uvs) == 5  # (1, 1) is shared
 
 
-def test_texture_coordinates_that_are_not_two_a_corner_are_left_out() -> None:
+def test_texture_coordinates_other_than_two_per_corner_are_ignored() -> None:
     text = GOOD.replace("indices\nend", "indices\nproperty list uchar float texcoord\nend")
     text = text.replace("3 0 1 2\n", "3 0 1 2 0\n").replace("0 1 2 3\n", "0 1 2 3 2 .5 .5\n")
     figure, warnings = read(text)
@@ -171,7 +171,7 @@ def test_a_comment_names_the_texture(tmp_path) -> None:
     assert mesh.material_indices.tolist() == [0, 0, 0]
 
 
-def test_line_ends_of_the_header() -> None:
+def test_header_line_endings() -> None:
     assert silent(GOOD.replace("\n", "\r\n")).mesh.n_triangles == 3
     assert silent(GOOD.replace("\n", "\r")).mesh.n_triangles == 3
     rows = [[10.0, 0, 0]] * 3  # 10.0 as a big-endian float begins with 65, as a byte 10 below
@@ -189,7 +189,7 @@ def test_points_alone_are_a_warning() -> None:
     assert warnings == [("F007.ply-no-faces", None, {"n": 4})]
 
 
-def test_what_is_left_over_is_said() -> None:
+def test_trailing_data_is_reported() -> None:
     assert read(GOOD + "1 2 3\n")[1] == [("F006.ply-lines", None, {"n": 1})]
     data = binary("<", [("vertex", ["float x", "float y", "float z"], SQUARE)])
     assert read(data + b"abc")[1][0] == ("F006.ply-bytes", None, {"n": 3})
@@ -292,11 +292,11 @@ def changed(old: str, new: str) -> str:
         ),
     ],
 )
-def test_broken_texts_say_where_and_what(text: str, fault: Fault) -> None:
+def test_invalid_ascii_files_are_reported_with_location_and_reason(text: str, fault: Fault) -> None:
     assert refusal(text) == fault
 
 
-def test_broken_bytes_say_where_and_what() -> None:
+def test_invalid_binary_files_are_reported_with_location_and_reason() -> None:
     elements = [
         ("vertex", ["float x", "float y", "float z"], SQUARE),
         ("face", ["list char int vertex_indices"], [[[0, 1, 2]], [[0, 1, 2, 3]]]),
@@ -317,12 +317,12 @@ def test_broken_bytes_say_where_and_what() -> None:
     assert refusal(negative) == ("F002.ply-list", None, {"item": face, "found": -1})
 
 
-def test_it_is_found_by_content() -> None:
+def test_format_is_detected_by_content() -> None:
     assert detect(Source("a.ply", GOOD.encode())) == "ply"
     assert detect(Source("a.txt", GOOD.encode())) == "ply"
 
 
-def test_our_own_files_come_back(tmp_path) -> None:
+def test_exported_files_round_trip(tmp_path) -> None:
     actor = viewer.load().actors[0]
     viewer.export(actor, tmp_path / "fox.ply")
     scene = viewer.load(tmp_path / "fox.ply")
@@ -335,7 +335,7 @@ def test_our_own_files_come_back(tmp_path) -> None:
     np.testing.assert_allclose(mesh.uvs[mesh.uv_triangles], written.uvs[corners], atol=1e-7)
 
 
-def test_random_damage_is_refused_in_one_line_or_read() -> None:
+def test_randomly_damaged_file_is_refused_in_one_line_or_read() -> None:
     good = [
         GOOD.encode(),
         binary(

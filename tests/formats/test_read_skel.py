@@ -37,7 +37,7 @@ def test_good_file_gives_every_value():
         pytest.param(GOOD.replace("1 2 3", "1. 2.0f 3F"), id="trailing f"),
     ],
 )
-def test_white_space_and_spelling_mean_nothing(text):
+def test_white_space_and_number_notation_do_not_matter(text):
     assert_good(silent(text))
 
 
@@ -203,7 +203,7 @@ def test_unknown_item_is_skipped_whole(item, words, place):
     assert warnings == [unknown(line, word) for line, word in enumerate(words, 2)]
 
 
-def test_numbers_that_belong_to_nothing_are_skipped():
+def test_stray_numbers_are_skipped():
     skeleton, warnings = read("balljoint a {\n5 6 7\noffset 1 2 3 balljoint b { }\n8 9 }")
     assert skeleton.rest_translations.tolist() == [[1, 2, 3], [0, 0, 0]]
     assert warnings == [unknown(2, "5"), unknown(4, "8")]
@@ -221,7 +221,7 @@ def test_unknown_keyword_is_named_once_and_with_its_first_line():
     assert warnings == [unknown(2, "pos"), unknown(3, "foo")]
 
 
-def test_warnings_of_a_hopeless_file_end_after_100():
+def test_warnings_of_a_hopeless_file_stop_after_100():
     _, warnings = read(f"balljoint a {{ {chr(10).join(f'w{number}' for number in range(500))} }}")
     assert len(warnings) == 101
     assert warnings[99] == unknown(100, "w99")
@@ -245,7 +245,7 @@ def test_extra_braces_after_the_root_are_a_warning():
     assert warnings == [("F006.extra-braces", None, {"n": 2})]
 
 
-def test_arrays_of_a_skeleton_read_are_locked():
+def test_arrays_of_a_loaded_skeleton_are_read_only():
     assert not silent(GOOD).rest_translations.flags.writeable
 
 

@@ -48,11 +48,11 @@ def test_good_file_gives_every_value():
         pytest.param(GOOD + "triangles 0 { }", id="an empty section of triangles"),
     ],
 )
-def test_white_space_order_and_optional_braces_mean_nothing(text):
+def test_white_space_order_and_optional_braces_do_not_matter(text):
     assert_good(silent(text))
 
 
-def test_rows_of_a_binding_are_the_columns_of_its_matrix():
+def test_bind_matrix_rows_in_the_file_are_columns():
     # 90 degrees about z, scaled by 2: x goes to 2y, y to -2x, z to 2z; then moved by 1 2 3.
     rows = "0 2 0  -2 0 0  0 0 2  1 2 3"
     figure = silent(
@@ -123,7 +123,7 @@ def test_zero_normals_are_computed():
     ]
 
 
-def test_repeated_section_counts_last():
+def test_last_repeated_section_wins():
     figure, warnings = read(GOOD + POSITIONS.replace("2 0 0", "9 0 0") + POSITIONS)
     assert_good(figure)
     assert warnings == ["a.skin:33: repeated positions section: the last one is used"]
@@ -201,11 +201,11 @@ def test_weights_that_do_not_add_up_are_a_warning():
     ]
 
 
-def test_weights_that_add_up_within_a_hundredth_are_no_warning():
+def test_weight_sums_within_a_hundredth_give_no_warning():
     silent(GOOD.replace("0 1.0", "0 0.991"))
 
 
-def test_nearly_singular_binding_is_a_warning():
+def test_ill_conditioned_bind_matrix_is_a_warning():
     _, warnings = read(GOOD.replace("0 0 1\n  5", "0 0 1e-8\n  5"))
     assert warnings == ["a.skin:20: bindings: matrix 0 is ill-conditioned (condition number 1e+08)"]
 

@@ -66,17 +66,17 @@ INSIDE = [
 
 
 @pytest.mark.parametrize("name", OUTSIDE)
-def test_what_leads_out_of_the_folder_is_refused(folder, name):
+def test_paths_outside_the_folder_are_refused(folder, name):
     (folder.parent / "model2").mkdir()
     assert referenced_path(folder, name.format(top=folder.parent)) is None
 
 
 @pytest.mark.parametrize("name", INSIDE)
-def test_what_stays_below_the_folder_is_found(folder, name):
+def test_paths_within_the_folder_are_found(folder, name):
     assert referenced_path(folder, name) == folder / name.replace("\\", "/")
 
 
-def test_links_in_a_circle_stay_where_they_are(folder):
+def test_circular_links_are_not_followed(folder):
     (folder / "round.png").symlink_to("round.png")
     assert referenced_path(folder, "round.png") == folder / "round.png"
 
@@ -114,7 +114,7 @@ def test_a_texture_from_outside_is_not_read(folder, kind, name):
 
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
-def test_an_absolute_path_is_called_so_even_within_the_folder(folder, kind):
+def test_an_absolute_path_is_reported_even_within_the_folder(folder, kind):
     path, named, line = write_model(folder, kind, f"{folder}/in.png")
     source = Source.open(path)
     assert read(source).mesh.materials[0].image is None
@@ -125,7 +125,7 @@ def test_an_absolute_path_is_called_so_even_within_the_folder(folder, kind):
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
 @pytest.mark.parametrize("name", ["in.png", "sub/in.png", "same.png"])
-def test_a_texture_below_the_folder_is_read(folder, kind, name):
+def test_a_texture_within_the_folder_is_read(folder, kind, name):
     path, _, _ = write_model(folder, kind, name)
     source = Source.open(path)
     (material,) = read(source).mesh.materials
@@ -146,7 +146,7 @@ def test_a_library_behind_a_link_is_not_read(folder):
 
 @pytest.mark.parametrize("item", ["skeleton {}", "skin {}", "morphs 1 {{ {} }}"])
 @pytest.mark.parametrize("name", ["../secret/a.skel", "{top}/secret/a.skel", "way/a.skel"])
-def test_a_rig_that_names_files_elsewhere_is_refused(folder, item, name):
+def test_a_rig_naming_files_outside_its_folder_is_refused(folder, item, name):
     name = name.format(top=folder.parent)
     with pytest.raises(FormatError) as caught:
         read(Source(folder / "a.rig", f"rig a {{\n{item.format(name)}\n}}\n".encode()))
@@ -154,13 +154,13 @@ def test_a_rig_that_names_files_elsewhere_is_refused(folder, item, name):
     assert f'within the folder of the .rig, found "{name[:39]}' in str(caught.value)
 
 
-def test_a_rig_may_use_back_slashes(folder):
+def test_a_rig_may_use_backslashes(folder):
     named = read(Source(folder / "a.rig", b"rig a { skeleton sub\\a.skel }"))
     assert isinstance(named, NamedFiles)
     assert named.paths == (folder / "sub" / "a.skel",)
 
 
-def test_the_picture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
+def test_the_texture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
     pig = write_pig(folder / "pig")
     (pig / "skin.png").symlink_to(folder.parent / "secret" / "x.png")
     contents = read_files([pig])
@@ -168,7 +168,7 @@ def test_the_picture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
     assert f"{pig}: texture skin.png is outside the folder: not read" in contents.warnings
 
 
-def test_a_link_is_opened_beside_its_neighbours(folder):
+def test_a_linked_file_finds_companions_next_to_the_link(folder):
     path, _, _ = write_model(folder, "skin", "in.png")
     elsewhere = folder.parent / "elsewhere"
     elsewhere.mkdir()
@@ -181,14 +181,14 @@ def test_a_link_is_opened_beside_its_neighbours(folder):
     assert material.image.tolist() == [[[1, 2, 3, 255]]]
 
 
-def test_a_picture_that_the_user_names_may_lie_anywhere(folder):
+def test_an_image_named_by_the_user_may_be_anywhere(folder):
     path, _, _ = write_model(folder, "skin", "gone.png")
     scene = viewer.load(path, folder / "link.png")
     (material,) = scene.actors[0].figure.mesh.materials
     assert np.asarray(material.image).tolist() == [[[9, 8, 7, 255]]]
 
 
-def test_a_secret_picture_is_not_written_again(folder, tmp_path, capsys):
+def test_a_texture_outside_the_folder_is_not_exported(folder, tmp_path, capsys):
     from viewer.cli import run
 
     path, named, line = write_model(folder, "skin", "../secret/x.png")

@@ -31,12 +31,12 @@ def test_names_the_files_relative_to_itself(text):
     assert source.warnings == [] and detect(source) == "rig"
 
 
-def test_morphs_follow_in_their_order():
+def test_morphs_are_listed_in_order():
     text = GOOD.replace("0 {", "2 { head1.morph sub/head2.morph")
     assert parse(text)[1] == ["wasp.skel", "wasp.skin", "head1.morph", "sub/head2.morph"]
 
 
-def test_names_with_blanks_stand_in_quotes_and_a_rig_may_have_none():
+def test_names_with_blanks_are_quoted_and_a_rig_may_be_empty():
     name, files, _ = parse('rig { skin "my wasp.skin" }')
     assert (name, files) == ("a", ["my wasp.skin"])
 
@@ -48,7 +48,7 @@ def test_names_with_blanks_stand_in_quotes_and_a_rig_may_have_none():
         (GOOD + "rig two { }", ("F006.rig-after", 7, {"found": b"rig"})),
     ],
 )
-def test_odd_ends_warn(text, fault):
+def test_unusual_endings_warn(text, fault):
     *_, source = parse(text)
     assert warnings_of(source.diagnostics) == [fault]
 
@@ -81,6 +81,6 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
     assert fault_of(caught.value.diagnostic) == fault
 
 
-def test_endless_count_of_morphs_takes_no_memory():
+def test_huge_morph_count_allocates_nothing():
     fault = refusal_of(lambda: parse(GOOD.replace("0 {", "2000000000 {")))
     assert fault == ("F002.rig-morphs", 4, {"expected": 2000000000, "found": 0})

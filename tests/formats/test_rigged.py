@@ -101,7 +101,7 @@ def same(found, wanted):
             assert one == other, part.name
 
 
-def test_everything_that_is_written_is_read(tmp_path):
+def test_all_written_data_is_read_back(tmp_path):
     path, wanted = tmp_path / "scan.npz", figure()
     save(wanted, path, {"alignment": np.eye(4)})
     source = Source.open(path)

@@ -28,7 +28,7 @@ def mesh(n_vertices=3, **changes) -> Mesh:
     return Mesh(**{**parts, **changes})
 
 
-def test_hand_made_skeleton_comes_back():
+def test_handmade_skeleton_round_trips():
     wanted = skeleton(
         [-1, 0, 1, 0, -1],
         names=("root", "left leg", "", "left leg", "\udce9t\u00e9 a\u00a0b"),
@@ -46,24 +46,24 @@ def test_hand_made_skeleton_comes_back():
     assert_equal_skeletons(found.skeleton, wanted)
 
 
-def test_limits_on_one_side_beyond_100000_come_back():
+def test_one_sided_limits_beyond_100000_round_trip():
     limits = np.tile([-INF, INF], (6, 1))
     limits[3], limits[4] = (200_000, INF), (-INF, -200_000)
     wanted = skeleton([-1], dof_limits=limits, rest_dofs=[0, 0, 0, 200_000, -200_000, 0])
     assert_equal_skeletons(again(Figure("a", skeleton=wanted), skel)[0].skeleton, wanted)
 
 
-def test_skeleton_without_boxes_comes_back_with_the_default_ones():
+def test_skeleton_without_boxes_round_trips_with_default_boxes():
     found, _ = again(Figure("a", skeleton=skeleton([-1], boxes=None)), skel)
     assert found.skeleton.boxes.tolist() == [[[-0.1] * 3, [0.1] * 3]]
 
 
-def test_20_000_nested_joints_come_back():
+def test_20_000_nested_joints_round_trip():
     wanted = skeleton(np.arange(-1, 19_999))
     assert_equal_skeletons(again(Figure("a", skeleton=wanted), skel)[0].skeleton, wanted)
 
 
-def test_hand_made_skin_comes_back():
+def test_handmade_skin_round_trips():
     image = np.zeros((1, 1, 4), np.uint8)
     shape = mesh(
         uvs=[[0.1, 0.2], [1.07, -3], [0, 1]],
@@ -85,14 +85,14 @@ def test_hand_made_skin_comes_back():
     assert np.array_equal(found.mesh.materials[0].image, image)  # its picture was written too
 
 
-def test_mesh_without_skin_comes_back():
+def test_mesh_without_skin_round_trips():
     found, warnings = again(Figure("a", mesh()), skin)
     assert_equal_meshes(found.mesh, mesh())
     assert found.skin is None
     assert len(warnings) == 1
 
 
-def test_other_pictures_are_not_replaced(tmp_path):
+def test_other_images_are_not_replaced(tmp_path):
     (tmp_path / "a.png").write_bytes(b"mine")
     textured = mesh(materials=(Material("", Texture("a.png", np.zeros((1, 1, 4), np.uint8))),))
     with pytest.raises(OutputError, match=r"a\.png: a different picture exists already"):
@@ -101,7 +101,7 @@ def test_other_pictures_are_not_replaced(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
-def test_pictures_in_folders_come_back(tmp_path):
+def test_textures_in_subfolders_round_trip(tmp_path):
     image = np.arange(16, dtype=np.uint8).reshape(2, 2, 4)
     textured = mesh(materials=(Material("", Texture("sub/b.png", image)),))
     for _ in range(2):  # the second time the same picture is there already
@@ -110,7 +110,7 @@ def test_pictures_in_folders_come_back(tmp_path):
     assert found.texture == "sub/b.png" and np.array_equal(found.image, image)
 
 
-def test_pictures_outside_the_folder_are_not_written(tmp_path):
+def test_textures_outside_the_folder_are_not_written(tmp_path):
     image = np.zeros((1, 1, 4), np.uint8)
     textured = mesh(materials=(Material("", Texture("../b.png", image)),))
     (tmp_path / "here").mkdir()
@@ -120,7 +120,7 @@ def test_pictures_outside_the_folder_are_not_written(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["wasp", "tube"])
-def test_real_files_come_back(shared, name):
+def test_real_files_round_trip(shared, name):
     skeleton_read = skel.read(Source.open(shared / f"{name}.skel"))
     assert_equal_skeletons(again(skeleton_read, skel)[0].skeleton, skeleton_read.skeleton)
     skin_read = skin.read(Source.open(shared / f"{name}.skin"))

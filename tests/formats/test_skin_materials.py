@@ -37,7 +37,7 @@ def test_material_covers_the_triangles_after_it(folder, material):
     assert figure.mesh.materials[0].image.tolist() == [[[255, 0, 0, 255]] * 2]
 
 
-def test_texture_name_may_hold_blanks_and_back_slashes(folder):
+def test_texture_name_may_contain_blanks_and_backslashes(folder):
     (folder / "tex").mkdir()
     (folder / "my green.png").rename(folder / "tex" / "my green.png")
     figure, warnings = textured(folder, "material { texture tex\\my green.png\n}")
@@ -58,7 +58,7 @@ def test_several_materials_apply_to_the_triangles_that_follow(folder):
     assert figure.mesh.material_indices.tolist() == [-1, 0, 1, 1]
 
 
-def test_materials_of_one_picture_share_it(folder):
+def test_materials_with_the_same_texture_share_it(folder):
     material = "material { texture red.bmp }"
     figure, _ = textured(folder, material * 3)
     first, second, third = (material.image for material in figure.mesh.materials)
@@ -100,7 +100,7 @@ def test_texture_without_texcoords_is_a_warning(folder):
         ("new\x1bline.png", "cannot be read: No such file or directory"),
     ],
 )
-def test_picture_that_cannot_be_read_is_a_warning(folder, name, reason):
+def test_unreadable_texture_is_a_warning(folder, name, reason):
     (folder / "folder").mkdir()
     (folder / "text.png").write_text("no picture")
     figure, warnings = textured(folder, f"material {{ texture {name} }}")
@@ -110,7 +110,7 @@ def test_picture_that_cannot_be_read_is_a_warning(folder, name, reason):
     assert warnings == [f"{folder}/a.skin:21: texture {path}: {reason}; drawn untextured"]
 
 
-def test_truncated_picture_is_a_warning(folder):
+def test_truncated_texture_is_a_warning(folder):
     whole = (folder / "red.bmp").read_bytes()
     (folder / "cut.bmp").write_bytes(whole[:-3])
     figure, warnings = textured(folder, "material { texture cut.bmp }")
@@ -120,7 +120,7 @@ def test_truncated_picture_is_a_warning(folder):
     assert warnings[0].endswith("; drawn untextured")
 
 
-def test_picture_that_ends_in_ctrl_z_loses_nothing(folder):
+def test_texture_that_ends_in_ctrl_z_is_complete(folder):
     # The last byte of a 24 bit BMP of one pixel's width is padding: take four pixels.
     Image.new("RGB", (4, 1), (26, 26, 26)).save(folder / "dark.bmp")
     assert (folder / "dark.bmp").read_bytes().endswith(b"\x1a" * 12)

@@ -72,7 +72,7 @@ def test_rest_pose_returns_the_template(load):
 
 @pytest.mark.parametrize("root", [-1, 0, 4294967295, 4294967296])
 @pytest.mark.parametrize("dtype", [np.int64, np.float32, np.float64, ">i8"])
-def test_root_is_written_in_many_ways(load, root, dtype):
+def test_root_parent_is_accepted_in_several_notations(load, root, dtype):
     table = SMPL["kintree_table"].astype(np.int64)
     table[0, 0] = root
     assert_smpl(load(SMPL, kintree_table=table.astype(dtype)))
@@ -80,7 +80,7 @@ def test_root_is_written_in_many_ways(load, root, dtype):
     assert load.warnings == []
 
 
-def test_small_integers_hold_a_hierarchy_too(load):
+def test_hierarchy_may_use_small_integers(load):
     table = SMPL["kintree_table"].astype(np.int64)
     table[0, 0] = -1
     assert_smpl(load(SMPL, kintree_table=table.astype(np.int8)))
@@ -108,7 +108,7 @@ TITLES = {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X", "mano": "MANO", 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_member_is_told_by_its_hierarchy(load, kind):
+def test_family_member_is_recognised_by_its_hierarchy(load, kind):
     figure = load(model(kind, 32))
     assert list(figure.skeleton.names) == NAMES[kind]
     assert dict(figure.facts)["model"] == TITLES[kind]
@@ -157,7 +157,7 @@ def test_model_of_one_joint_has_no_correctives(load):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, ">f8", ">f4"])
-def test_floats_of_any_kind(load, dtype):
+def test_floats_of_any_type(load, dtype):
     floats = ["v_template", "weights", "J_regressor", "shapedirs", "posedirs"]
     changed = {key: SMPL[key].astype(dtype) for key in floats}
     figure = load(SMPL, **changed)
@@ -177,11 +177,11 @@ def test_flattened_pose_directions(load):
 
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint16, np.float32])
-def test_faces_of_any_kind(load, dtype):
+def test_faces_of_any_type(load, dtype):
     assert_smpl(load(SMPL, f=SMPL["f"].astype(dtype)))
 
 
-def test_weight_sums_off_by_rounding_are_scaled_to_1(load):
+def test_weight_sums_off_by_rounding_are_normalised(load):
     figure = load(SMPL, weights=SMPL["weights"] * (1.0 + 5e-4))
     assert load.warnings == []
     assert_smpl(figure)
@@ -196,7 +196,7 @@ def test_model_without_shapes_or_correctives_warns(load):
     assert (figure.blend_shapes, figure.correctives) == (None, None)
 
 
-def test_no_columns_of_shape_are_no_shapes(load):
+def test_zero_shape_columns_give_no_shapes(load):
     assert load(SMPL, shapedirs=np.zeros((VERTICES, 3, 0))).blend_shapes is None
 
 
@@ -285,7 +285,7 @@ def test_amass_model_has_no_hand_components(load):
     assert load.warnings == []
 
 
-def test_odd_extras_are_left_out_with_a_warning(load):
+def test_invalid_extras_are_ignored_with_a_warning(load):
     arrays = model("smplx", 32)
     figure = load(
         arrays,
@@ -338,7 +338,7 @@ def damaged(tmp_path):
     return write
 
 
-def test_shapes_and_correctives_are_not_read_before_they_are_needed(damaged):
+def test_shapes_and_correctives_are_read_lazily(damaged):
     path = damaged("shapedirs", "posedirs")
     figure = viewer.load(path).actors[0].figure
     pose = rest_pose(figure.skeleton)
@@ -359,7 +359,7 @@ def test_shapes_and_correctives_are_not_read_before_they_are_needed(damaged):
         deform(figure, pose)
 
 
-def test_odd_numbers_in_late_arrays_are_refused_when_they_are_read(load):
+def test_invalid_values_in_lazy_arrays_are_refused_on_reading(load):
     for key in ("shapedirs", "posedirs"):
         bad = SMPL[key].copy()
         bad[1, 2, 3] = np.nan

@@ -69,7 +69,7 @@ def record_of_inputs(given):
     )
 
 
-def test_file_has_all_cases():
+def test_expected_file_has_all_cases():
     cases = inputs_of_all_cases()
     assert len(cases) == 68
     assert {str(given["kind"]) for given in cases.values()} == {*HANDS, "smpl", "flame"}

@@ -97,14 +97,14 @@ def test_shapes_may_be_a_selection(load):
     assert_smpl(load(python_2(shapedirs=created("chumpy.reordering", "Select", state))))
 
 
-def test_expressions_in_keys_of_no_use_are_skipped(load):
+def test_expressions_in_unused_keys_are_skipped(load):
     product = created("chumpy.ch_ops", "dot", mapping(a=chumpy(SMPL["J"]), b=chumpy(SMPL["J"])))
     figure = load(python_2(v_posed=product, pose_training_info=mapping(gender=text("male"))))
     assert_smpl(figure)
     assert "v_posed, pose_training_info" in dict(figure.facts)["keys not needed"]
 
 
-def test_expression_in_a_key_of_use_is_refused(load):
+def test_expression_in_a_used_key_is_refused(load):
     product = created("chumpy.ch_ops", "dot", mapping(a=chumpy(SMPL["J"]), b=chumpy(SMPL["J"])))
     with pytest.raises(FormatError) as caught:
         load(python_2(v_template=product))
@@ -131,7 +131,7 @@ def test_pickle_of_the_text_protocols_is_read(load, protocol):
     assert_smpl(load(pickle.dumps(SMPL, protocol)))
 
 
-def test_regressor_of_another_size_is_refused_before_anything_grows(load):
+def test_regressor_of_another_size_is_refused_before_allocating(load):
     huge = matrix(
         sides=(24, 1 << 26),
         data=[1.0],
@@ -148,12 +148,12 @@ def test_regressor_of_another_size_is_refused_before_anything_grows(load):
     )
 
 
-def test_numbers_in_lists_are_arrays_too(load):
+def test_lists_of_numbers_are_arrays_too(load):
     figure = load(pickle.dumps({**SMPL, "f": SMPL["f"].tolist()}, 2))
     assert_smpl(figure)
 
 
-def test_shapes_in_a_pickle_are_read_late(load):
+def test_shapes_in_a_pickle_are_read_lazily(load):
     figure = load(python_2())
     assert not figure.blend_shapes.offsets.is_loaded
     pose = rest_pose(figure.skeleton)
@@ -163,5 +163,5 @@ def test_shapes_in_a_pickle_are_read_late(load):
     assert figure.blend_shapes.offsets.is_loaded
 
 
-def test_unknown_whole_numbers_beside_arrays_do_not_matter(load):
+def test_unknown_integers_next_to_arrays_do_not_matter(load):
     assert_smpl(load(python_2(version=whole(3))))

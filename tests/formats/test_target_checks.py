@@ -26,13 +26,13 @@ def old(tmp_path):
     return path
 
 
-def test_files_that_are_not_there_pass(tmp_path, old):
+def test_missing_files_pass(tmp_path, old):
     check_targets([tmp_path / "a", tmp_path / "b"], [old, tmp_path / "missing"], False)
     check_targets([old], [], True)
     check_targets([], [old], False)
 
 
-def test_old_file_is_refused_also_through_a_link(tmp_path, old):
+def test_existing_file_is_refused_even_through_a_link(tmp_path, old):
     (tmp_path / "link").symlink_to("old")
     assert refused([tmp_path / "a", old]).startswith(f"{old}: exists already")
     assert refused([tmp_path / "link"]).startswith(f"{tmp_path / 'link'}: exists already")
@@ -69,7 +69,7 @@ def test_one_file_under_two_names_is_refused(tmp_path, old):
         assert refused([tmp_path / "a", first, second], force=True) == words
 
 
-def test_folders_are_looked_at(tmp_path, old):
+def test_folders_are_checked(tmp_path, old):
     assert refused([tmp_path]) == f"{tmp_path}: is a folder"
     for folder in (tmp_path / "no", old):
         assert refused([folder / "x"]) == f"{folder / 'x'}: the folder {folder} does not exist"
@@ -78,7 +78,7 @@ def test_folders_are_looked_at(tmp_path, old):
     assert refused([Path("a\0b")]).startswith("a\\x00b: ")
 
 
-def test_locked_folder_is_refused(tmp_path, monkeypatch):
+def test_read_only_folder_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
     target = tmp_path / "x"
     assert refused([target]) == f"{target}: the folder {tmp_path} cannot be written to"
@@ -89,7 +89,7 @@ def test_devices_are_never_replaced_and_need_no_force(tmp_path):
     check_targets([Path("/dev/null"), Path("/dev/null"), tmp_path / "pipe"], [], False)
 
 
-def test_folder_that_was_read_is_named_where_it_would_be_written_into(tmp_path):
+def test_writing_into_an_input_folder_is_refused_by_name(tmp_path):
     (tmp_path / "take" / "smpl").mkdir(parents=True)
     target = tmp_path / "take" / "smpl" / "smpl"
     words = refused(target, [tmp_path / "take" / "smpl"], True, check_folder_target)
@@ -97,7 +97,7 @@ def test_folder_that_was_read_is_named_where_it_would_be_written_into(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["in", "in/smpl", "link"])
-def test_folder_that_was_read_is_not_replaced(tmp_path, name):
+def test_input_folder_is_not_replaced(tmp_path, name):
     (tmp_path / "in" / "smpl").mkdir(parents=True)
     (tmp_path / "link").symlink_to("in")
     target = tmp_path / "in" / "smpl"
@@ -106,7 +106,7 @@ def test_folder_that_was_read_is_not_replaced(tmp_path, name):
     assert "input" in refused(tmp_path / "link" / "smpl", [target], True, check_folder_target)
 
 
-def test_folder_that_is_there_needs_force(tmp_path, old):
+def test_existing_folder_needs_force(tmp_path, old):
     target = tmp_path / "out" / "smpl"
     check_folder_target(target, [old], False)
     target.mkdir(parents=True)
@@ -115,6 +115,6 @@ def test_folder_that_is_there_needs_force(tmp_path, old):
     assert refused(old / "smpl", [], True, check_folder_target).startswith(f"{old}: ")
 
 
-def test_free_path_takes_no_link_to_nothing(tmp_path):
+def test_free_path_avoids_dangling_links(tmp_path):
     (tmp_path / "fox.png").symlink_to("elsewhere.png")
     assert free_path(tmp_path, "fox", ".png") == tmp_path / "fox-2.png"

@@ -7,7 +7,7 @@ from viewer.media.saving import Replacement
 from viewer.media.unfinished import remove_unfinished
 
 
-def test_what_is_finished_stays_and_what_is_not_goes(tmp_path):
+def test_finished_files_stay_and_unfinished_ones_are_removed(tmp_path):
     save_bytes(tmp_path / "done.txt", b"whole")
     finished, begun = Replacement(tmp_path / "a.mp4"), Replacement(tmp_path / "b.mp4")
     finished.begin().write_bytes(b"video")
@@ -18,7 +18,7 @@ def test_what_is_finished_stays_and_what_is_not_goes(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mp4", "done.txt"]
 
 
-def test_file_that_is_being_written_goes(tmp_path, monkeypatch):
+def test_file_being_written_is_removed(tmp_path, monkeypatch):
     kept = tmp_path / "x.txt"
     kept.write_bytes(b"old")
 

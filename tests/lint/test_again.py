@@ -41,7 +41,7 @@ def checked(files: list[Path], scene: Scene | None = None) -> list[Finding]:
     return lint_again(scene or viewer.load(*files), files).findings
 
 
-def test_what_readers_mend_is_found_as_the_command_finds_it(files: list[Path]) -> None:
+def test_reader_repairs_are_found_as_by_the_command(files: list[Path]) -> None:
     again = lint_again(viewer.load(*files), files)
     assert again.n_files == 3 and again.notes == ()
     texts = [*map(finding_text, again.findings)]
@@ -52,14 +52,14 @@ def test_what_readers_mend_is_found_as_the_command_finds_it(files: list[Path]) -
     } <= places  # fmt: skip
 
 
-def test_nothing_is_told_twice(files: list[Path]) -> None:
+def test_nothing_is_reported_twice(files: list[Path]) -> None:
     codes = [f.code for f in checked(files)]
     assert [code for code in codes if code in ("W001", "M007", "S003", "C001")] == [
         "S003", "M007", "C001", "W001"
     ]  # fmt: skip
 
 
-def test_remarks_lead_to_the_place_they_name(files: list[Path]) -> None:
+def test_reader_findings_jump_to_the_location_they_name(files: list[Path]) -> None:
     found = {f.code: f for f in checked(files)}
     assert (found["M007"].actor, found["M007"].vertices.tolist()) == (0, [1])
     assert (found["S003"].actor, found["S003"].joints.tolist()) == (0, [0])
@@ -67,7 +67,7 @@ def test_remarks_lead_to_the_place_they_name(files: list[Path]) -> None:
     assert (found["C001"].actor, found["C001"].joints.tolist()) == (0, [1])
 
 
-def test_what_was_edited_has_no_line(files: list[Path]) -> None:
+def test_edited_data_has_no_line(files: list[Path]) -> None:
     scene = viewer.load(*files)
     figure = scene.actors[0].figure
     weights = np.array(figure.skin.weights)
@@ -82,7 +82,7 @@ def test_what_was_edited_has_no_line(files: list[Path]) -> None:
     assert found["M007"].file.name == "a.skin" and found["M007"].actor is None
 
 
-def test_files_that_are_gone_are_named(files: list[Path]) -> None:
+def test_missing_files_are_named(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].unlink()
     again = lint_again(scene, files)
@@ -93,7 +93,7 @@ def test_files_that_are_gone_are_named(files: list[Path]) -> None:
     assert found["W001"].file is None and found["S003"].line == 5
 
 
-def test_files_that_changed_are_named(files: list[Path]) -> None:
+def test_changed_files_are_named(files: list[Path]) -> None:
     scene, opened_at = viewer.load(*files), time.time()
     assert lint_again(scene, files, since=opened_at + 60.0).notes == ()
     os.utime(files[0], (opened_at + 100.0,) * 2)
@@ -107,7 +107,7 @@ def test_files_that_changed_are_named(files: list[Path]) -> None:
     assert again.notes[0].startswith("a.skel, a.skin, a.anim were changed")
 
 
-def test_a_file_inside_a_folder_counts(tmp_path: Path) -> None:
+def test_a_changed_file_inside_a_folder_is_detected(tmp_path: Path) -> None:
     from formats import pig_text
 
     folder = pig_text.write(tmp_path / "pig")
@@ -116,14 +116,14 @@ def test_a_file_inside_a_folder_counts(tmp_path: Path) -> None:
     assert lint_again(scene, [folder], since=opened_at + 60.0).notes[0].startswith("pig was")
 
 
-def test_a_new_fault_of_a_changed_file_is_told(files: list[Path]) -> None:
+def test_a_new_error_in_a_changed_file_is_reported(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 up 0", 1))
     found = checked(files, scene)
     assert ("F002", files[1], 3) in [(f.code, f.file, f.line) for f in found]
 
 
-def test_likely_files_count_only_if_the_scene_is_of_them() -> None:
+def test_guessed_files_are_used_only_if_the_scene_matches_them() -> None:
     bundled = list(bundled_files())
     again = lint_again(viewer.load(), bundled, is_likely=True)
     assert again.n_files == 2 and all(f.file in bundled for f in again.findings)
@@ -138,7 +138,7 @@ def test_people_of_a_capture_keep_their_folder(shared_data: Path) -> None:
     ]  # fmt: skip
 
 
-def test_progress_may_stop_while_frames_are_read(shared_data: Path) -> None:
+def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
     class StopError(viewer.ViewerError):
         pass
 
@@ -166,7 +166,7 @@ def test_progress_may_stop_while_frames_are_read(shared_data: Path) -> None:
         (("F007.anim-range", "", None), "clip", None, None),
     ],
 )
-def test_remarks_of_readers_keep_their_places(found, part, vertices, joints) -> None:
+def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> None:
     key, data, places = found
     remark = Diagnostic(key, Path("a.skin"), 8, data, None if places is None else np.array(places))
     aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], part)
@@ -176,7 +176,7 @@ def test_remarks_of_readers_keep_their_places(found, part, vertices, joints) -> 
         assert (aimed.vertices.tolist(), aimed.joints.tolist()) == (vertices, joints)
 
 
-def test_a_vertex_that_only_a_value_names_is_found() -> None:
+def test_a_vertex_named_only_in_a_value_is_found() -> None:
     remark = Diagnostic("W002.vertex", Path("a.npz"), values={"vertex": 3})
     aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
     assert aimed.vertices.tolist() == [3]

@@ -36,11 +36,11 @@ def heavy(findings: list[Finding]) -> list[tuple[str, int | None]]:
     return [(f.code, f.line) for f in findings if f.severity != "note"]
 
 
-def test_the_column_is_sound_as_files(tmp_path: Path) -> None:
+def test_the_valid_column_has_no_findings(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, saved(tmp_path, column()))) == []
 
 
-def test_ten_faults_of_one_skin_are_ten_findings(tmp_path: Path) -> None:
+def test_ten_errors_in_one_skin_are_ten_findings(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     positions, weights = section(lines, "positions"), section(lines, "skinweights")
     triangles, bindings = section(lines, "triangles"), section(lines, "bindings")
@@ -70,7 +70,7 @@ def test_ten_faults_of_one_skin_are_ten_findings(tmp_path: Path) -> None:
     ]
 
 
-def test_findings_of_one_kind_say_how_many_and_where(tmp_path: Path) -> None:
+def test_findings_of_one_code_report_count_and_locations(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     positions = section(lines, "positions")
     for vertex in (3, 8, 9):
@@ -83,7 +83,7 @@ def test_findings_of_one_kind_say_how_many_and_where(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("vertex", range(20))
-def test_a_lost_position_brings_nothing_else(tmp_path: Path, vertex: int) -> None:
+def test_an_invalid_position_causes_no_other_finding(tmp_path: Path, vertex: int) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + vertex] = "nan nan nan"
     assert [f.code for f in linted(tmp_path, lines) if f.severity != "note"] == ["F003"]
@@ -91,20 +91,20 @@ def test_a_lost_position_brings_nothing_else(tmp_path: Path, vertex: int) -> Non
 
 
 @pytest.mark.parametrize("triangle", [0, 7, 33, 35])
-def test_a_lost_triangle_leaves_no_border(tmp_path: Path, triangle: int) -> None:
+def test_an_invalid_triangle_causes_no_border_finding(tmp_path: Path, triangle: int) -> None:
     lines = saved(tmp_path, column())
     place = section(lines, "triangles") + triangle
     lines[place] = " ".join([*lines[place].split()[:2], "1000"])
     assert [f.code for f in linted(tmp_path, lines)] == ["F002"]
 
 
-def test_a_lost_weight_brings_nothing_else(tmp_path: Path) -> None:
+def test_an_invalid_weight_causes_no_other_finding(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "skinweights") + 9] = "2 0 nan 1 0.5"
     assert [f.code for f in linted(tmp_path, lines)] == ["W003"]
 
 
-def test_a_singular_matrix_does_not_stop_the_others(tmp_path: Path) -> None:
+def test_a_singular_matrix_does_not_hide_other_findings(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     bindings = section(lines, "bindings")
     lines[bindings + 1 : bindings + 4] = ["0 0 0"] * 3
@@ -112,7 +112,7 @@ def test_a_singular_matrix_does_not_stop_the_others(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, lines)) == [("B002", bindings + 1), ("B005", bindings + 7)]
 
 
-def test_a_skin_without_bindings_is_looked_at_alone(tmp_path: Path) -> None:
+def test_a_skin_without_bind_matrices_is_checked_alone(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     weights = section(lines, "skinweights")
     lines[weights] = "1 0 0.5"
@@ -120,7 +120,7 @@ def test_a_skin_without_bindings_is_looked_at_alone(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, lines)) == [("B001", weights), ("W001", weights + 1)]
 
 
-def test_what_is_no_text_of_this_kind_says_that_nothing_else_was_checked(tmp_path: Path) -> None:
+def test_unparsable_file_reports_that_nothing_else_was_checked(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + 3] = "normals 4 {"
     (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]
@@ -131,7 +131,7 @@ def test_what_is_no_text_of_this_kind_says_that_nothing_else_was_checked(tmp_pat
     )
 
 
-def test_a_lost_offset_of_a_joint_is_no_other_bind_pose(tmp_path: Path) -> None:
+def test_an_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> None:
     texts = {"a.skel": skel_text.GOOD.replace("offset 0 1 0", "offset 0 nan 0"),
              "a.skin": skin_text.GOOD}  # fmt: skip
     for name, text in texts.items():
@@ -144,7 +144,7 @@ def test_a_lost_offset_of_a_joint_is_no_other_bind_pose(tmp_path: Path) -> None:
     assert bound.joints.tolist() == [0] and bound.line == 20
 
 
-def test_all_faults_of_a_rig_file_are_found(tmp_path: Path) -> None:
+def test_all_errors_in_a_rig_file_are_found(tmp_path: Path) -> None:
     """The files that a .rig names are looked at one by one: a broken one hides no other."""
     (tmp_path / "a.rig").write_text("rig a { skeleton a.skel skin a.skin }")
     (tmp_path / "a.skel").write_text(skel_text.GOOD.replace("{", "[", 1))
@@ -154,7 +154,7 @@ def test_all_faults_of_a_rig_file_are_found(tmp_path: Path) -> None:
     assert ("F002", "a.skel", 2) in files and ("W001", "a.skin", 13) in files
 
 
-def test_faults_of_a_body_are_found_together_with_those_read_late(tmp_path: Path) -> None:
+def test_body_errors_are_found_including_lazily_read_ones(tmp_path: Path) -> None:
     arrays = {key: np.array(values) for key, values in synthetic_smpl.model("smpl").items()}
     arrays["v_template"][3] = np.nan
     arrays["weights"][4, 0] = np.nan
@@ -171,7 +171,7 @@ def test_faults_of_a_body_are_found_together_with_those_read_late(tmp_path: Path
     assert [f.message.split(":")[0] for f in found[2:4]] == ["shapedirs", "posedirs"]
 
 
-def test_lost_frames_are_no_jumps(tmp_path: Path) -> None:
+def test_invalid_frames_are_not_jumps(tmp_path: Path) -> None:
     head = bvh_text.GOOD[: bvh_text.GOOD.index("MOTION")]
     rows = [f"{k} 100 0" + " 0" * 12 for k in range(30)]
     rows[10] = rows[10].replace("100", "nan")
@@ -185,7 +185,7 @@ def test_lost_frames_are_no_jumps(tmp_path: Path) -> None:
     assert jump.line in (first + 20, first + 21) and sorted(jump.frames.tolist()) == [20, 21]
 
 
-def test_without_a_unit_lengths_are_in_the_figures_own(tmp_path: Path) -> None:
+def test_without_a_unit_lengths_are_in_figure_units(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     skel = (tmp_path / "a.skel").read_text()
     assert "offset 0.0 2.0 0.0" in skel

@@ -11,7 +11,7 @@ from viewer.lint import lint_scene
 from viewer.lint.bindings import are_singular
 
 
-def test_singular_is_what_flattens_whatever_its_scale() -> None:
+def test_singularity_does_not_depend_on_scale() -> None:
     matrices = np.tile(np.eye(4), (5, 1, 1))
     matrices[1, :3, :3] *= 1e-30
     matrices[2, 2, 2] = 1e-11
@@ -20,7 +20,7 @@ def test_singular_is_what_flattens_whatever_its_scale() -> None:
     assert are_singular(matrices).tolist() == [False, False, False, True, True]
 
 
-def test_other_joints_are_held_against_the_skeleton_beside_a_singular_one() -> None:
+def test_other_joints_are_compared_despite_a_singular_one() -> None:
     """The knee was bound at y = 3, and rests at 2."""
     figure = column()
     matrices = figure.skin.inverse_bind.copy()

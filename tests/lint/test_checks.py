@@ -41,7 +41,7 @@ def test_progress_counts_every_check() -> None:
     assert steps[0][2] == "column: weights"
 
 
-def test_progress_may_stop() -> None:
+def test_progress_may_cancel() -> None:
     class StopError(Exception):
         pass
 
@@ -53,7 +53,7 @@ def test_progress_may_stop() -> None:
         lint_scene(scene_of(column()), progress=stop)
 
 
-def test_actors_of_one_figure_are_looked_at_once() -> None:
+def test_figure_shared_by_actors_is_checked_once() -> None:
     figure = weighted({5: [(0, 0.9)]})
     scene = Scene([Actor(figure), Actor(figure), Actor(column())])
     scene.actors[1].pose.dofs[7] = 4.0
@@ -91,7 +91,7 @@ def test_points_of_captures_and_of_nothing() -> None:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_every_finding_can_be_looked_at(name: str) -> None:
+def test_every_finding_can_be_framed(name: str) -> None:
     scene = made(FAULTS[name][0])
     for finding in lint_scene(scene):
         points = points_of(finding, scene)
@@ -99,7 +99,7 @@ def test_every_finding_can_be_looked_at(name: str) -> None:
             assert np.isfinite(points).all()
 
 
-def test_the_scale_of_a_placement_counts() -> None:
+def test_placement_scale_is_applied() -> None:
     """A figure in centimetres placed in metres moves as fast as it is drawn."""
     scene = made(FAULTS["jump"][0])
     before = [f.message for f in lint_scene(scene)]

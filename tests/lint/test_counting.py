@@ -40,7 +40,7 @@ def shown_frame(scene: Scene, time: float) -> int:
 
 
 @pytest.mark.parametrize(("start", "offset"), [(0.0, 0.0), (2.5, 0.0), (1.0, 3.2)])
-def test_a_jump_is_in_the_frame_that_the_timeline_shows_there(start: float, offset: float) -> None:
+def test_a_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -> None:
     scene = Scene([jumping(start, 2.0, offset=offset)])
     found = jump_of(scene)
     # It is looked at 60 times a second, of 0 to 4 s: from frame 60, at 2 s, to half a frame on.
@@ -51,21 +51,21 @@ def test_a_jump_is_in_the_frame_that_the_timeline_shows_there(start: float, offs
     assert shown_frame(scene, float(found.times[0])) == 60
 
 
-def test_frames_are_those_of_the_rate_that_is_asked_for() -> None:
+def test_frames_use_the_requested_rate() -> None:
     found = jump_of(Scene([jumping(0.0, 2.0)]), LintOptions(frame_rate=24.0))
     # Looked at 72 times a second.
     assert found.frames.tolist() == [48] and found.times == pytest.approx([2.0 + 1 / 72])
     assert found.message.startswith("1 of 97 frames")
 
 
-def test_several_clips_are_counted_from_the_first_start() -> None:
+def test_frames_of_several_clips_count_from_the_earliest_start() -> None:
     scene = Scene([jumping(0.0, 1.0), jumping(2.0, 1.0)])
     first, second = (f for f in lint_scene(scene) if f.code == "C003")
     assert (first.frames.tolist(), second.frames.tolist()) == ([30], [90])
     assert shown_frame(scene, float(second.times[0])) == 90
 
 
-def test_beside_a_capture_its_frames_count() -> None:
+def test_capture_frames_take_precedence_for_numbering() -> None:
     figure = legs()
     scene = Scene([jumping(0.0, 1.0, length=1.5), Actor(figure, clip=standing(figure))])
     found = jump_of(scene)
@@ -73,7 +73,7 @@ def test_beside_a_capture_its_frames_count() -> None:
     assert found.frames.tolist() == [130] == [shown_frame(scene, float(found.times[0]))]
 
 
-def test_curves_beyond_limits_say_frame_and_degrees() -> None:
+def test_curves_beyond_limits_report_frame_and_degrees() -> None:
     figure = column()
     channel = Channel(7, [0.0, 1.0], [0.0, 4.0], (("linear", "linear"),) * 2)
     scene = scene_of(figure, Clip("keys", (channel,), 0.0, 1.0))
@@ -86,7 +86,7 @@ def test_curves_beyond_limits_say_frame_and_degrees() -> None:
     assert found.seek == pytest.approx(1.0)
 
 
-def test_a_file_s_frames_stay_its_own() -> None:
+def test_file_frame_numbers_are_kept() -> None:
     figure = legs()
     clip = standing(figure)
     places = np.array(clip.translations)

@@ -64,7 +64,7 @@ def test_a_joint_of_weight_0_leaves_nothing_out() -> None:
     assert found.message == f"1 vertex has more than 4 influences (maximum: 5); {TOLD}"
 
 
-def test_a_cost_that_nobody_can_know_is_not_told_as_0() -> None:
+def test_an_unknown_error_is_not_reported_as_0() -> None:
     assert cost(scene({5: LAST})).message == (
         "1 vertex has more than 4 influences (maximum: 5); the effect of pruning to 4 is unknown: "
         "1 vertex is omitted because a required position or bind matrix is invalid"
@@ -72,13 +72,13 @@ def test_a_cost_that_nobody_can_know_is_not_told_as_0() -> None:
 
 
 @pytest.mark.parametrize(("part", "places"), [("bindings", [5]), ("positions", [5])])
-def test_what_is_not_the_files_own_is_left_out_too(part: str, places: list[int]) -> None:
+def test_vertices_not_from_the_file_are_left_out_too(part: str, places: list[int]) -> None:
     lost = np.array(places, dtype=np.int32)
     found = cost(scene({8: CROWDED, 5: LAST}, singular=False), **{part: lost})
     assert f"{TOLD}; 1 vertex is omitted because" in found.message
 
 
-def test_costs_beyond_all_numbers_are_left_out() -> None:
+def test_overflowing_errors_are_left_out() -> None:
     whole = scene({8: CROWDED, 5: LAST}, singular=False)
     figure = whole.actors[0].figure
     matrices = figure.skin.inverse_bind.copy()

@@ -27,17 +27,17 @@ def test_size_is_the_diagonal_of_the_mesh_or_of_the_joints() -> None:
     assert Subject(Actor(marks)).size() == 0.0
 
 
-def test_strays_do_not_count_for_the_size() -> None:
+def test_stray_vertices_do_not_affect_the_size() -> None:
     assert Subject(Actor(cube([500.0, 500.0, 500.0]))).size() == pytest.approx(4 * np.sqrt(3))
     # One a little apart does: it may be meant so.
     assert Subject(Actor(cube([20.0, 0.0, 0.0]))).size() == pytest.approx(np.sqrt(400 + 16 + 16))
 
 
-def test_shares_of_the_size_are_told_without_strays() -> None:
+def test_relative_lengths_ignore_stray_vertices() -> None:
     subject = Subject(Actor(cube([500.0, 500.0, 500.0])))
     assert subject.length(0.4 * np.sqrt(3)) == "0.693 units (10 % of its size)"
 
 
-def test_the_largest_turn_is_the_one_that_is_told_in_degrees() -> None:
+def test_the_largest_rotation_is_reported_in_degrees() -> None:
     assert MAX_ROTATION == 3400.0
     assert np.degrees(LintOptions().max_rotation) == pytest.approx(MAX_ROTATION)

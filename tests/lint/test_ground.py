@@ -44,13 +44,13 @@ def test_a_short_sink_is_found_however_deep_and_wherever(depth: float, floor: fl
 
 
 @pytest.mark.parametrize("depth", [0.02, 0.05, 0.1, 0.2])
-def test_half_of_the_motion_sunk_is_found_where_the_ground_is_by_custom(depth: float) -> None:
+def test_sinking_for_half_of_the_motion_is_found_at_the_default_ground(depth: float) -> None:
     (sunk,) = found(np.where(_K >= 30, -depth, 0.0), 0.0)
     assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(130, 160))
 
 
 @pytest.mark.parametrize("depth", [0.05, 0.1, 0.2])
-def test_half_of_the_motion_sunk_elsewhere_is_said_to_be_unclear(depth: float) -> None:
+def test_sinking_for_half_of_the_motion_elsewhere_is_ambiguous(depth: float) -> None:
     (note,) = found(np.where(_K >= 30, -depth, 0.0), 0.8)
     # The ankles of the legs are 0.1 above the root's floor.
     assert (note.code, note.severity) == ("C013", "note")
@@ -70,14 +70,14 @@ def test_a_ramp_down_after_standing_is_found(depth: float, floor: float) -> None
 
 @pytest.mark.parametrize("floor", FLOORS)
 @pytest.mark.parametrize("depth", [0.05, 0.1, 0.2])
-def test_a_ramp_without_a_level_is_said_to_be_unclear(depth: float, floor: float) -> None:
+def test_a_ramp_without_a_level_is_ambiguous(depth: float, floor: float) -> None:
     assert [f.code for f in found(-depth * _K / 59, floor)] == ["C013"]
 
 
 @pytest.mark.parametrize("floor", [0.015, 0.02, 0.03, 0.05, -0.02, -0.05, 0.8])
 @pytest.mark.parametrize("depth", [0.01, 0.02, 0.03, 0.05])
 @pytest.mark.parametrize("count", [6, 8, 12, 14])
-def test_feet_sunk_for_some_time_are_found_near_the_usual_ground(
+def test_feet_sunk_for_some_time_are_found_near_the_default_ground(
     floor: float, depth: float, count: int
 ) -> None:
     # At rest the feet of the legs are on floor 0: there, they may rest while they are sunk.
@@ -88,7 +88,7 @@ def test_feet_sunk_for_some_time_are_found_near_the_usual_ground(
 
 @pytest.mark.parametrize("height", [0.1, 0.2, 0.4])
 @pytest.mark.parametrize("count", [8, 14, 19])
-def test_a_short_rest_on_the_usual_ground_far_below_is_said_to_be_unclear(
+def test_a_short_rest_on_the_default_ground_far_below_is_ambiguous(
     height: float, count: int
 ) -> None:
     # It stands or sits higher, or has sunk: nobody knows.
@@ -97,13 +97,13 @@ def test_a_short_rest_on_the_usual_ground_far_below_is_said_to_be_unclear(
 
 
 @pytest.mark.parametrize("count", [8, 14, 19])
-def test_a_long_rest_below_the_usual_ground_is_said_to_be_unclear(count: int) -> None:
+def test_a_long_rest_below_the_default_ground_is_ambiguous(count: int) -> None:
     assert [f.code for f in found(np.where(count > _K, 0.0, -0.05), 0.0)] == ["C013"]
 
 
 @pytest.mark.parametrize("height", [0.1, 0.4])
 @pytest.mark.parametrize("count", [22, 30, 40])
-def test_the_usual_ground_breaks_a_near_tie(height: float, count: int) -> None:
+def test_the_default_ground_breaks_a_near_tie(height: float, count: int) -> None:
     assert found(np.where(count > _K, 0.0, height), 0.0) == []
     (sunk,) = found(np.where(count > _K, 0.0, -height), 0.0)
     assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(100 + count, 160))
@@ -125,13 +125,13 @@ SOUND = {
 
 @pytest.mark.parametrize("floor", FLOORS)
 @pytest.mark.parametrize("name", SOUND)
-def test_what_is_sound_is_not_alarming(name: str, floor: float) -> None:
+def test_valid_motions_have_no_findings(name: str, floor: float) -> None:
     assert {f.code for f in found(SOUND[name], floor)} <= {"C013"}
     if "stairs" not in name:
         assert found(SOUND[name], floor) == []
 
 
-def test_a_single_noisy_frame_is_none_but_a_deep_one_is() -> None:
+def test_a_single_noisy_frame_is_ignored_unless_deep() -> None:
     assert found(np.where(_K == 30, -0.02, 0.0), 0.0) == []
     (sunk,) = found(np.where(_K == 30, -0.03, 0.0), 0.0)
     assert sunk.message == "1 of 60 frames: left_ankle is 30 mm below the ground at frame 130"
@@ -153,17 +153,17 @@ def test_a_body_that_floats_and_turns_has_no_ground() -> None:
     )
 
 
-def test_levels_are_counted_the_longest_first() -> None:
+def test_ground_levels_are_listed_longest_first() -> None:
     lowest = np.concatenate([np.full(40, 5.0), np.full(10, 4.0), np.full(12, 6.0)])
     here = np.ones(62, dtype=np.bool_)
     assert ground_of(lowest, here, 1 / 30, 1.7) == Ground(5.0, ((5.0, 40), (6.0, 12), (4.0, 10)))
 
 
-def test_nobody_has_no_ground() -> None:
+def test_empty_scene_has_no_ground() -> None:
     assert ground_of(np.zeros(9), np.zeros(9, dtype=np.bool_), 1 / 30, 1.7) == Ground(None)
 
 
-def test_who_is_away_does_not_count() -> None:
+def test_absent_people_do_not_count() -> None:
     lowest = np.where(np.arange(60) < 40, 7.0, 1.0)
     found_ground = ground_of(lowest, np.arange(60) < 40, 1 / 30, 1.7)
     assert found_ground == Ground(7.0, ((7.0, 40),))

@@ -78,7 +78,7 @@ def border(n: int) -> tuple[list[int], list[int]]:
 
 @pytest.mark.parametrize("height", [0.1, -0.1, 0.02, -0.02])
 @pytest.mark.parametrize("n", [4, 6, 12])
-def test_an_open_sheet_that_lost_its_border_is_not_closed(
+def test_an_open_sheet_missing_its_border_is_not_closed(
     tmp_path: Path, n: int, height: float
 ) -> None:
     triangles, vertices = border(n)
@@ -89,7 +89,7 @@ def test_an_open_sheet_that_lost_its_border_is_not_closed(
     assert "M003" not in codes(tmp_path, mesh, lost=range(0, len(mesh[1]), 2))
 
 
-def test_a_closed_surface_that_lost_little_is_inside_out_still(tmp_path: Path) -> None:
+def test_a_closed_surface_missing_little_is_still_inside_out(tmp_path: Path) -> None:
     mesh = ring(12)  # 288 triangles: 8 open edges squared are less than a quarter of those
     assert codes(tmp_path, mesh) == {"M003"}
     assert codes(tmp_path, mesh, lost=[7]) == {"M003", "F002"}
@@ -97,7 +97,7 @@ def test_a_closed_surface_that_lost_little_is_inside_out_still(tmp_path: Path) -
     assert codes(tmp_path, mesh, nowhere=[50]) == {"M003", "F003"}
 
 
-def test_a_closed_surface_that_lost_much_is_not_judged(tmp_path: Path) -> None:
+def test_a_closed_surface_missing_much_is_not_judged(tmp_path: Path) -> None:
     mesh = ring(12)
     assert codes(tmp_path, mesh, lost=[7, 99, 150]) == {"F002"}
     assert codes(tmp_path, mesh, lost=range(0, 288, 2)) == {"F002"}

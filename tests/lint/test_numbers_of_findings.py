@@ -22,7 +22,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.motion.timing import Timing
 
 
-def test_numbers_of_the_messages() -> None:
+def test_values_in_messages() -> None:
     messages = {name: findings_of(FAULTS[name][0]) for name in ("sum too large", "jump", "sliding")}
     texts = {f.code: f.message for found in messages.values() for f in found}
     assert texts["W001"] == (
@@ -36,7 +36,7 @@ def test_numbers_of_the_messages() -> None:
     assert "left_ankle slides by 983 mm in total, at up to 0.5 m/s (frame " in texts["C007"]
 
 
-def test_numbers_of_meshes_and_gaps() -> None:
+def test_values_of_mesh_and_gap_findings() -> None:
     """Both ends of an edge, the first vertex of a normal, and which frames are missing."""
     names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
     texts = {f.code: f.message for name in names for f in findings_of(FAULTS[name][0])}
@@ -56,7 +56,7 @@ def test_numbers_of_meshes_and_gaps() -> None:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_one_is_singular(name: str) -> None:
+def test_one_item_uses_the_singular(name: str) -> None:
     """No count of 1 has a plural behind it, nor "are" or "have"."""
     for finding in findings_of(FAULTS[name][0]):
         text = re.sub(r"[\d.]+ of ", "", finding.message)  # the whole decides: 1 of 60 frames
@@ -66,13 +66,13 @@ def test_one_is_singular(name: str) -> None:
         assert one is None, finding.message
 
 
-def test_a_gap_is_looked_at_just_before_it() -> None:
+def test_a_gap_is_shown_just_before_it() -> None:
     (gap,) = findings_of(FAULTS["gaps"][0])
     # Frame 109 is the tenth, 9 / 30 s after the first.
     assert gap.seek == pytest.approx(0.3)
 
 
-def test_who_is_not_there_for_long_is_counted_so() -> None:
+def test_long_absences_are_counted_as_absences() -> None:
     """Person 1 is there in frames 100 to 119, 2 of them missing."""
     rows = np.arange(FRAMES)
     rows[20:] = rows[5] = rows[6] = -1
@@ -81,7 +81,7 @@ def test_who_is_not_there_for_long_is_counted_so() -> None:
     assert gap.message == "2 of 20 frames are missing in 1 gap: frames 105 to 106"
 
 
-def test_thin_sheets_and_creases_have_no_normals_against_them() -> None:
+def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
     """Each side of a sheet has its own; a sheet whose sides share vertices agrees with one."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     front = np.array([[0, 1, 2], [0, 2, 3]])
@@ -100,7 +100,7 @@ def test_thin_sheets_and_creases_have_no_normals_against_them() -> None:
     assert found[0].vertices.tolist() == list(range(8))
 
 
-def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:
+def test_the_influence_limit_error_is_the_vertex_displacement() -> None:
     """All joints but the root stay; e is moved by a translation of its own: 0.05 of it is lost."""
     figure = five_joints()
     scene = scene_of(figure)
@@ -116,21 +116,21 @@ def test_the_cost_of_a_cut_is_how_far_it_moves_the_mesh() -> None:
     )
 
 
-def test_a_foot_that_swings_does_not_slide() -> None:
+def test_a_swinging_foot_does_not_slide() -> None:
     def step(root: np.ndarray, _: np.ndarray) -> None:
         root[:, 2] = 2.5 * np.arange(FRAMES) / RATE  # 2.5 m/s, as a foot passes the ground
 
     assert [finding.code for finding in lint_scene(moving(step))] == []
 
 
-def test_a_person_who_comes_later_has_no_gap() -> None:
+def test_a_person_who_appears_later_has_no_gap() -> None:
     rows = np.arange(FRAMES)
     rows[:20] = rows[50:] = -1
     timing = Timing(RATE, rows, first_frame=100, holds=False)
     assert lint_scene(moving(lambda root, turns: None, timing)) == []
 
 
-def test_seams_are_no_borders() -> None:
+def test_seams_are_not_borders() -> None:
     """Vertices at one place count as one: a closed mesh with a seam is closed."""
     figure = column()
     positions = np.vstack([figure.mesh.positions, figure.mesh.positions[0::4]])
@@ -142,7 +142,7 @@ def test_seams_are_no_borders() -> None:
     assert codes == set()
 
 
-def test_rare_keypoints_of_low_confidence_are_told_by_how_often_they_are_seen() -> None:
+def test_low_confidence_is_counted_over_the_frames_that_see_a_keypoint() -> None:
     """Low in 3 of the 10 frames that see it; in 3 of 60, which is 5 %; and once of 2."""
 
     def change(points: np.ndarray) -> None:

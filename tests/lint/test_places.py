@@ -17,21 +17,21 @@ def about(**places: list[int]) -> Finding:
     )
 
 
-def test_all_kinds_of_places_are_there_together() -> None:
+def test_locations_of_all_kinds_are_combined() -> None:
     places = places_of(about(vertices=[5, 0], triangles=[0], joints=[1]), scene_of(column()))
     assert places.vertices.tolist() == [[-1, 1, 1], [1, 0, 1]]
     assert places.triangles.tolist() == [[[1, 0, 1], [1, 1, 1], [-1, 0, 1]]]
     assert places.joints.tolist() == [[0, 2, 0]]
 
 
-def test_places_follow_pose_and_placement() -> None:
+def test_locations_follow_pose_and_placement() -> None:
     scene = scene_of(column())
     actor = scene.actors[0]
     actor.pose.dofs[0] = 3.0  # the root, along x
     actor.placement[:3, 3] = 0.0, 10.0, 0.0
     places = places_of(about(vertices=[5], joints=[1]), scene)
     assert places.vertices.tolist() == [[2, 11, 1]] and places.joints.tolist() == [[3, 12, 0]]
-    # In its binding space the mesh has no pose.
+    # In bind pose the mesh has no pose.
     bound = places_of(about(vertices=[5]), scene, binding=True)
     assert bound.vertices.tolist() == [[-1, 11, 1]]
 
@@ -51,13 +51,13 @@ def test_facing_is_the_mean_normal_in_the_scene(scale: float) -> None:
     assert facing[0] > 0.5
 
 
-def test_what_lies_all_around_faces_no_way() -> None:
+def test_surrounding_locations_have_no_facing() -> None:
     facing = places_of(about(vertices=[4, 5, 6, 7]), scene_of(column())).facing
     assert np.linalg.norm(facing) < 0.35
     assert not places_of(about(joints=[1]), scene_of(column())).facing.any()
 
 
-def test_captured_points_that_are_not_seen_have_no_place() -> None:
+def test_unseen_captured_points_have_no_location() -> None:
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0].copy()
@@ -67,7 +67,7 @@ def test_captured_points_that_are_not_seen_have_no_place() -> None:
     assert points_of(about(joints=[2]), scene).tolist() == [[0, 1, 0], [0, 0.5, 0]]
 
 
-def test_other_actors_than_there_are_have_no_place() -> None:
+def test_missing_actors_have_no_location() -> None:
     nowhere = Finding(Diagnostic("W001."), actor=3, vertices=np.array([0]))
     assert points_of(nowhere, scene_of(column())).shape == (0, 3)
     assert len(places_of(nowhere, scene_of(column())).vertices) == 0

@@ -38,7 +38,7 @@ COMPANIONS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_planted_fault_brings_nothing_else_of_weight(name: str) -> None:
+def test_a_planted_fault_causes_no_other_serious_finding(name: str) -> None:
     """Errors and warnings are the fault's own, or follow from it as listed."""
     maker, code, _, _ = FAULTS[name]
     heavy = {finding.code for finding in findings_of(maker) if finding.severity != "note"}
@@ -55,5 +55,5 @@ def test_there_are_more_than_40_planted_faults() -> None:
      lambda: keyed({7: ([0.0, 1.0], [0.0, 2.0])})],
     ids=["column", "legs", "points", "keys"],
 )  # fmt: skip
-def test_what_faults_are_planted_in_is_sound(maker) -> None:
+def test_base_figures_of_planted_faults_are_valid(maker) -> None:
     assert findings_of(maker) == []

@@ -94,14 +94,14 @@ def test_a_planted_fault_is_found_with_its_file_and_line(tmp_path: Path, name: s
     assert "\n" not in found[0].message and str(tmp_path / file) + ":" not in found[0].message
 
 
-def test_the_texts_that_faults_are_planted_in_have_none(tmp_path: Path) -> None:
+def test_base_files_of_planted_faults_are_valid(tmp_path: Path) -> None:
     clip = {"a.skel": skel_text.GOOD, "a.anim": CLIP}
     for texts in (RIG, clip, {"a.bvh": bvh_text.GOOD}):
         heavy = [f.message for f in linted(tmp_path, texts) if f.severity == "error"]
         assert heavy == []
 
 
-def test_other_files_are_still_looked_at(tmp_path: Path) -> None:
+def test_other_files_are_still_checked(tmp_path: Path) -> None:
     texts = {
         "bad.skel": "balljoint a { offset 1 }",
         **skin("2 0 0.25", "2 0 0.5"),
@@ -124,7 +124,7 @@ def test_a_missing_file_is_a_finding(tmp_path: Path) -> None:
     assert scene.actors == []
 
 
-def test_a_skin_that_does_not_fit_is_looked_at_alone(tmp_path: Path) -> None:
+def test_a_skin_that_does_not_fit_is_checked_alone(tmp_path: Path) -> None:
     texts, *_ = FAULTS["too few bindings"]
     texts = {**texts, "a.skin": texts["a.skin"].replace("2 0 0.25", "2 0 0.5", 1)}
     assert {"B001", "W001"} <= {finding.code for finding in linted(tmp_path, texts)}
@@ -169,7 +169,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_faults_of_body_models(tmp_path: Path, name: str) -> None:
+def test_body_model_faults(tmp_path: Path, name: str) -> None:
     write, code = MODELS[name]
     path = write(tmp_path)
     found = [f for f in lint_files([path])[1] if (name, f.code) != ("negative weight", "W001")]
@@ -179,7 +179,7 @@ def test_faults_of_body_models(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("parents_text", "code", "line"), [("-1\n2\n1\n", "S002", 2), ("-1\n2\n0\n", "S001", 2)]
 )
-def test_parents_of_a_pig(tmp_path: Path, parents_text: str, code: str, line: int) -> None:
+def test_pig_parents(tmp_path: Path, parents_text: str, code: str, line: int) -> None:
     folder = pig_text.write(tmp_path / "pig", parents=parents_text)
     found = [f for f in lint_files([folder])[1] if f.severity == "error"]
     assert [(f.code, f.file, f.line) for f in found] == [(code, folder / "parents.txt", line)]
@@ -205,7 +205,7 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
     assert f"{len(low) - 6} more keypoints have a confidence below 0.7: " in named[6].message
 
 
-def test_a_damaged_frame_is_a_gap_and_named(tmp_path: Path) -> None:
+def test_a_damaged_frame_is_a_gap_and_is_named(tmp_path: Path) -> None:
     frames: dict[int | str, object] = {frame: [capture_files.points(0)] for frame in range(9)}
     folder = capture_files.write_frames(tmp_path / "keypoints3d", {**frames, 4: "[{"})
     found = lint_files([folder])[1]

@@ -18,7 +18,7 @@ HEIGHT = np.array([0.0, 1.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("turn", [-1.0, -0.5, -0.2, 0.0, 0.3, 0.7])
-def test_turned_feet_touch_where_their_mesh_does(turn: float) -> None:
+def test_rotated_feet_touch_where_their_mesh_does(turn: float) -> None:
     figure = viewer.load(bundled_body()).actors[0].figure
     pose = rest_pose(figure.skeleton)
     ankles = np.array([figure.skeleton.names.index(f"{s}_ankle") for s in ("left", "right")])
@@ -31,7 +31,7 @@ def test_turned_feet_touch_where_their_mesh_does(turn: float) -> None:
         assert height == pytest.approx(positions[side * positions[:, 0] > 0.0, 1].min(), abs=2e-3)
 
 
-def test_without_a_mesh_ankles_stand_for_soles() -> None:
+def test_without_a_mesh_ankles_replace_soles() -> None:
     figure = legs()
     scene = scene_of(figure, standing(figure))
     soles = soles_of(figure, True)
@@ -42,5 +42,5 @@ def test_without_a_mesh_ankles_stand_for_soles() -> None:
     assert extent(figure) == pytest.approx((0.1, 0.9))
 
 
-def test_who_has_no_ankles_has_no_soles() -> None:
+def test_figures_without_ankles_have_no_soles() -> None:
     assert soles_of(viewer.load().actors[0].figure, True) is None

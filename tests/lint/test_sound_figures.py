@@ -27,18 +27,18 @@ def notes(findings: list[Finding]) -> set[str]:
     return {finding.code for finding in findings if finding.severity == "note"}
 
 
-def test_the_bundled_fox_is_sound() -> None:
+def test_the_bundled_fox_has_no_findings() -> None:
     _, findings = lint_files(bundled_files())
     assert heavy(findings) == []
     assert notes(findings) == {"W007", "W008", "S005"}  # up to 14 influences; hinges
 
 
-def test_the_bundled_body_is_sound() -> None:
+def test_the_bundled_body_has_no_findings() -> None:
     _, findings = lint_files([bundled_body()])
     assert findings == []
 
 
-def test_a_tiny_rig_is_sound(tmp_path: Path) -> None:
+def test_a_tiny_rig_has_no_findings(tmp_path: Path) -> None:
     _, findings = lint_files(write_rig(tmp_path))
     assert [finding for finding in findings if finding.severity == "error"] == []
 
@@ -52,12 +52,12 @@ COURSE = {
 
 
 @pytest.mark.parametrize("names", COURSE)
-def test_files_of_the_course(shared: Path, names: tuple[str, ...]) -> None:
+def test_skel_and_skin_files(shared: Path, names: tuple[str, ...]) -> None:
     _, findings = lint_files([shared / name for name in names])
     assert {code for code, _ in heavy(findings)} == COURSE[names]
 
 
-def test_the_pig_has_two_pairs_of_joints_of_one_name(shared_data: Path) -> None:
+def test_the_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> None:
     for name in ("PIG_core.pkl", "core_txt_files"):
         _, findings = lint_files([shared_data / "pig" / name])
         assert heavy(findings) == [
@@ -68,13 +68,13 @@ def test_the_pig_has_two_pairs_of_joints_of_one_name(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
-def test_synthetic_models_and_captures_are_sound(shared_data: Path, name: str) -> None:
+def test_synthetic_models_and_captures_have_no_findings(shared_data: Path, name: str) -> None:
     _, findings = lint_files([shared_data / "smpl_synthetic" / name])
     assert heavy(findings) == []
 
 
 @pytest.mark.usefixtures("quick_fits")
-def test_a_mesh_that_was_given_a_rig_is_sound(tmp_path: Path) -> None:
+def test_an_automatically_rigged_mesh_has_no_findings(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
     body = viewer.load(bundled_body()).actors[0]
     moved = 1.3 * viewer.deform(body.figure, body.pose)[0] + [0.2, 0.0, 0.1]

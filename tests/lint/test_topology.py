@@ -26,7 +26,7 @@ def walked(count: int, pairs: np.ndarray) -> list[int]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_components_are_those_of_a_walk(seed: int) -> None:
+def test_components_match_a_graph_traversal(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pairs = rng.integers(0, 200, (rng.integers(1, 250), 2))
     assert components(200, pairs).tolist() == walked(200, pairs)
@@ -62,6 +62,6 @@ def test_flipped_triangles_of_a_grid_are_found(seed: int) -> None:
     assert np.array_equal(found, flipped)
 
 
-def test_of_equal_shares_the_part_with_the_first_triangle_is_right() -> None:
+def test_ties_are_resolved_in_favour_of_the_first_triangle() -> None:
     triangles = np.array([[0, 1, 2], [0, 1, 3]])  # both run from 0 to 1
     assert orientations(2, edges_of(triangles))[1].tolist() == [False, True]

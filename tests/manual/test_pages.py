@@ -38,25 +38,25 @@ def commands(path: Path) -> list[str]:
 ALL_COMMANDS = [(path.name, line) for path in PATHS for line in commands(path)]
 
 
-def test_pages_are_exactly_the_folder() -> None:
+def test_page_table_is_exactly_the_folder() -> None:
     assert {path.stem for path in FOLDER.glob("*.md")} == set(PAGES)
     assert not set(PAGES) & set(COMMANDS), "viewer help could mean either"
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_tables_are_those_of_the_registries(path: Path) -> None:
+def test_tables_match_the_registries(path: Path) -> None:
     text = path.read_text("utf-8")
     assert with_tables(text) == text, "stale: type make manual"
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_links_lead_somewhere(path: Path) -> None:
+def test_links_resolve(path: Path) -> None:
     for target in _LINK.findall(path.read_text("utf-8")):
         assert (path.parent / target).exists(), target
 
 
 @pytest.mark.parametrize(("page", "line"), ALL_COMMANDS)
-def test_commands_have_the_options_that_pages_use(page: str, line: str) -> None:
+def test_options_used_on_pages_exist(page: str, line: str) -> None:
     words = shlex.split(line, comments=True)[1:]
     name = words.pop(0) if words and words[0] in COMMANDS else "view"
     parser = command_parser(name)
@@ -67,7 +67,7 @@ def test_commands_have_the_options_that_pages_use(page: str, line: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_python_runs_as_it_is_printed(
+def test_python_examples_run_as_printed(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -85,7 +85,7 @@ def test_a_page_begins_with_its_title_and_fits_a_terminal(topic: str) -> None:
     assert not [line for line in text.splitlines() if len(line) > 100 and not is_table.match(line)]
 
 
-def test_reference_names_all_there_is() -> None:
+def test_reference_is_complete() -> None:
     assert all(f"| {key.label} | {key.text} |" in page_text("keys") for key in KEYS)
     assert all(f"| {code} |" in page_text("codes") for code in CODES)
     assert all(f"| `{key}` |" in page_text("codes") for key in MESSAGES)
@@ -100,7 +100,7 @@ def test_the_readme_is_short() -> None:
     assert len(README.read_text("utf-8").split()) <= 900
 
 
-def test_an_unknown_topic_offers_the_nearest_and_lists_all() -> None:
+def test_an_unknown_topic_suggests_the_nearest_and_lists_all() -> None:
     with pytest.raises(ViewerError) as caught:
         page_text("wieghts")
     assert "did you mean weights?" in str(caught.value)
@@ -108,14 +108,14 @@ def test_an_unknown_topic_offers_the_nearest_and_lists_all() -> None:
 
 
 @pytest.mark.parametrize("name", ["CONTRIBUTING.md", "viewer/ARCHITECTURE.md"])
-def test_paths_that_contributors_are_sent_to_exist(name: str) -> None:
+def test_paths_in_contributing_exist(name: str) -> None:
     text = (ROOT / name).read_text("utf-8")
     paths = re.findall(r"`((?:viewer|shaders|tests|assets)/[\w/.]+)`", text)
     assert paths
     assert not [path for path in paths if not (ROOT / path).exists()]
 
 
-def test_contributors_are_told_of_every_registry() -> None:
+def test_contributing_mentions_every_registry() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
     for name, home in re.findall(r"\| `([A-Z]+)` in `([\w/.]+)` \|", text):
         assert re.search(rf"^{name}\b.*=", (ROOT / home).read_text("utf-8"), re.MULTILINE), name

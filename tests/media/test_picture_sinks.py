@@ -25,7 +25,7 @@ def test_label_is_white_on_a_dark_tag_in_the_lower_left_corner():
     assert (pixels[:, 30:] == 200).reshape(-1, 4)[:, :3].all()
 
 
-def test_label_is_seen_on_transparent_pictures():
+def test_label_is_visible_on_transparent_images():
     pixels = plain((0, 0, 0, 0), (60, 40))
     write_label(pixels, "1")
     assert pixels[-1, 0].tolist() == [16, 16, 16, 158]  # 62 % of 255
@@ -38,7 +38,7 @@ def test_label_that_does_not_fit_is_left_out():
     assert (pixels == plain((9, 9, 9, 255), (12, 10))).all()
 
 
-def test_pictures_are_written_one_by_one(tmp_path):
+def test_images_are_written_one_by_one(tmp_path):
     paths = [tmp_path / f"{n}.png" for n in (3, 5)]
     sink = PictureSink(paths)
     sink.write(1, plain((1, 2, 3, 4)))
@@ -49,7 +49,7 @@ def test_pictures_are_written_one_by_one(tmp_path):
     assert sink.n_bytes == sum(path.stat().st_size for path in paths)
 
 
-def test_pictures_that_are_finished_stay_when_the_rest_is_given_up(tmp_path):
+def test_finished_images_are_kept_when_the_rest_is_aborted(tmp_path):
     sink = PictureSink([tmp_path / "0.png", tmp_path / "1.png"])
     sink.write(0, plain((1, 2, 3, 255)))
     sink.abort()
@@ -59,7 +59,7 @@ def test_pictures_that_are_finished_stay_when_the_rest_is_given_up(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"), [("missing/0.png", "does not exist"), ("0.psd", "cannot be written as this")]
 )
-def test_picture_that_cannot_be_written_is_one_line(tmp_path, name, words):
+def test_unwritable_image_is_one_line(tmp_path, name, words):
     with pytest.raises(OutputError, match=words):
         PictureSink([tmp_path / name]).write(0, plain((1, 2, 3, 255)))
 
@@ -74,7 +74,7 @@ def test_picture_that_cannot_be_written_is_one_line(tmp_path, name, words):
         ((100, 1200), 5, (1, 5)),
     ],
 )
-def test_layout_fills_the_picture(size, count, wanted):
+def test_sheet_layout_fills_the_image(size, count, wanted):
     assert sheet_layout(size, count) == wanted
 
 
@@ -113,7 +113,7 @@ def test_cells_have_the_aspect_of_what_they_show():
     assert sheet_layout((900, 600), 8, 4.0) == (2, 4)
 
 
-def test_sheet_that_is_given_up_leaves_nothing(tmp_path):
+def test_aborted_sheet_leaves_no_file(tmp_path):
     sink = SheetSink(tmp_path / "sheet.png", (120, 92), [0])
     sink.write(0, plain((1, 2, 3, 255), sink.cell))
     sink.abort()

@@ -30,7 +30,7 @@ def test_opaque_png_has_no_alpha(size: tuple[int, int]) -> None:
         np.testing.assert_array_equal(np.array(picture), pixels[..., :3])
 
 
-def test_png_of_a_view_of_a_larger_array_is_right() -> None:
+def test_png_of_a_view_into_a_larger_array_is_correct() -> None:
     pixels = noise(20, 40, seed=2)[::-1, 3:33]
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         np.testing.assert_array_equal(np.array(picture), pixels)

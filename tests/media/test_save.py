@@ -34,12 +34,12 @@ def test_save_replaces_a_file(tmp_path):
     assert names(tmp_path) == ["a.skel"]
 
 
-def test_save_text_writes_utf8_lf_and_bytes_that_were_no_utf8(tmp_path):
+def test_save_text_writes_utf8_lf_and_preserves_invalid_bytes(tmp_path):
     save_text(tmp_path / "a.skel", "é\n\udce9\n")
     assert (tmp_path / "a.skel").read_bytes() == b"\xc3\xa9\n\xe9\n"
 
 
-def test_save_takes_odd_names(tmp_path):
+def test_save_accepts_unusual_names(tmp_path):
     for name in ["with blank {}%s.skel", "new\nline.skel", "é\udcff.skel", "x" * 250 + ".skel"]:
         save_bytes(tmp_path / name, b"new")
         assert (tmp_path / name).read_bytes() == b"new"
@@ -54,7 +54,7 @@ def test_save_keeps_permissions(tmp_path):
 
 
 @pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
-def test_save_gives_a_new_file_what_the_mask_leaves(tmp_path, mask, mode):
+def test_save_applies_the_umask_to_a_new_file(tmp_path, mask, mode):
     before = os.umask(mask)
     try:
         save_bytes(tmp_path / "a.skel", b"new")
@@ -75,7 +75,7 @@ def test_save_follows_a_link(tmp_path):
     assert names(tmp_path / "folder") == ["real.skel"]
 
 
-def test_save_through_a_link_to_nothing_creates_what_it_names(tmp_path):
+def test_save_through_a_dangling_link_creates_its_target(tmp_path):
     (tmp_path / "link.skel").symlink_to("real.skel")
     save_bytes(tmp_path / "link.skel", b"new")
     assert (tmp_path / "link.skel").is_symlink()
@@ -99,14 +99,14 @@ def test_save_refuses_a_file_as_a_folder(tmp_path):
     assert (tmp_path / "a").read_bytes() == b"old"
 
 
-def test_save_refuses_a_link_that_leads_to_itself(tmp_path):
+def test_save_refuses_a_circular_link(tmp_path):
     (tmp_path / "loop").symlink_to("loop")
     text = refused(tmp_path / "loop")
     assert text.startswith(f"{tmp_path / 'loop'}: ")
     assert names(tmp_path) == ["loop"]
 
 
-def test_save_refuses_a_name_that_no_system_can_have(tmp_path):
+def test_save_refuses_an_invalid_name(tmp_path):
     text = refused(f"{tmp_path}/a\0b.skel")
     assert text.startswith(f"{tmp_path}/a\\x00b.skel: ")
     assert "embedded null" in text
@@ -223,5 +223,5 @@ def test_file_size_limit_keeps_the_old_file(tmp_path):
         ("\udcc3\udca9", None),  # would come back as the letter that these bytes are in UTF-8
     ],
 )
-def test_as_words_takes_only_what_comes_back(name, words):
+def test_as_words_accepts_only_text_that_round_trips(name, words):
     assert as_words(name) == words

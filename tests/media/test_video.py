@@ -28,7 +28,7 @@ def quarters(width: int, height: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
-def test_colours_come_back(tmp_path, suffix):
+def test_colours_round_trip(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     write(VideoSink(path, (64, 48), 25.0), [quarters(64, 48)] * 5)
     frames = decoded(path)
@@ -171,7 +171,7 @@ def delays(path: Path) -> list[int]:
         (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames per second on average"),
     ],
 )
-def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
+def test_gif_delays_are_correct_on_average(tmp_path, rate, wanted, words):
     path = tmp_path / "x.gif"
     sink = VideoSink(path, (64, 48), rate)
     write(sink, [counting(frame) for frame in range(6)])
@@ -179,7 +179,7 @@ def test_gif_delays_are_right_on_average(tmp_path, rate, wanted, words):
     assert delays(path) == wanted
 
 
-def test_gif_colours_come_from_all_that_was_looked_at(tmp_path):
+def test_gif_colours_come_from_all_sampled_frames(tmp_path):
     path = tmp_path / "x.gif"
     sink = VideoSink(path, (64, 48), 10.0)
     first, last = np.zeros((48, 64, 4), np.uint8), quarters(64, 48)
@@ -192,7 +192,7 @@ def test_gif_colours_come_from_all_that_was_looked_at(tmp_path):
 
 
 @pytest.mark.parametrize("transparent", [False, True])
-def test_gif_of_gradients_with_a_moving_bar_is_right_in_every_frame(tmp_path, transparent):
+def test_gif_of_gradients_with_a_moving_bar_is_correct_in_every_frame(tmp_path, transparent):
     """Most pixels stay from frame to frame, and are not stored again."""
     path = tmp_path / "x.gif"
     x, y = np.meshgrid(np.linspace(60, 220, 96), np.linspace(80, 240, 64))
@@ -222,7 +222,7 @@ def test_gif_of_gradients_with_a_moving_bar_is_right_in_every_frame(tmp_path, tr
             assert error.mean() <= 6 and (error > 60).sum() <= 40, index
 
 
-def test_better_quality_is_larger_and_nearer(tmp_path):
+def test_higher_quality_is_larger_and_more_accurate(tmp_path):
     noise = np.random.default_rng(3).integers(0, 255, (64, 96, 4), dtype=np.uint8)
     noise[..., 3] = 255
     errors, sizes = [], []
@@ -236,7 +236,7 @@ def test_better_quality_is_larger_and_nearer(tmp_path):
     assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
 
 
-def test_encoder_that_stands_in_works(tmp_path, monkeypatch):
+def test_fallback_encoder_works(tmp_path, monkeypatch):
     kind = video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "mpeg4"), False, True)
     monkeypatch.setitem(video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"

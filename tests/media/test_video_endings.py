@@ -54,13 +54,13 @@ def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
         ("x.gif", 60.0, 75.0, "x.gif: expected 0.01 to 50 frames per second, found 60"),
     ],
 )
-def test_numbers_without_sense_are_refused(tmp_path, name, rate, quality, words):
+def test_invalid_settings_are_refused(tmp_path, name, rate, quality, words):
     with pytest.raises(ViewerError) as caught:
         VideoSink(tmp_path / name, (64, 48), rate, quality)
     assert str(caught.value).endswith(words)
 
 
-def test_kinds_are_listed_for_other_suffixes():
+def test_formats_are_listed_for_other_suffixes():
     with pytest.raises(UnsupportedFormatError) as caught:
         video_kind(Path("x.avi"))
     assert str(caught.value) == ('videos cannot be written as ".avi"; supported: .mp4, .webm, .gif')
@@ -74,7 +74,7 @@ def test_kinds_are_listed_for_other_suffixes():
         ("pipe.mp4", "is not a regular file, and a video must be written to one"),
     ],
 )
-def test_places_where_no_video_can_be_are_refused_at_once(tmp_path, name, words):
+def test_unwritable_video_paths_are_refused_at_once(tmp_path, name, words):
     (tmp_path / "folder.mp4").mkdir()
     os.mkfifo(tmp_path / "pipe.mp4")
     with pytest.raises(OutputError) as caught:
@@ -85,7 +85,7 @@ def test_places_where_no_video_can_be_are_refused_at_once(tmp_path, name, words)
 # Nothing broken stays
 
 
-def test_video_appears_only_when_it_is_whole(tmp_path):
+def test_video_appears_only_when_complete(tmp_path):
     path = tmp_path / "x.mp4"
     path.write_bytes(b"precious")
     path.chmod(0o640)
@@ -100,7 +100,7 @@ def test_video_appears_only_when_it_is_whole(tmp_path):
 
 @pytest.mark.parametrize("n_frames", [0, 1, 30])
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
-def test_aborted_video_leaves_nothing(tmp_path, suffix, n_frames):
+def test_aborted_video_leaves_no_file(tmp_path, suffix, n_frames):
     path = tmp_path / f"x{suffix}"
     path.write_bytes(b"precious")
     sink = VideoSink(path, (64, 48), 25.0)
@@ -155,7 +155,7 @@ for limit in (0, 1000, size // 3, size - 40_000, size - 1000, size - 1):
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
-def test_full_disk_is_one_line_and_leaves_nothing(tmp_path, suffix):
+def test_full_disk_is_one_line_and_leaves_no_file(tmp_path, suffix):
     """A limit on the size of files stands for the end of a disk."""
     path = tmp_path / f"x{suffix}"
     run = subprocess.run(

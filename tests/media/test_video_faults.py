@@ -78,7 +78,7 @@ class Disk:
 
 @pytest.mark.parametrize("is_kept", [True, False], ids=["stays full", "has room again"])
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_fault_at_every_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, is_kept):
+def test_failure_at_any_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, is_kept):
     path, frames = tmp_path / f"x{suffix}", noisy_frames(24)
     path.write_bytes(b"precious")
     for number in count(1):
@@ -105,7 +105,7 @@ def test_fault_at_every_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, 
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_fault_of_closing_counts(tmp_path, monkeypatch, suffix):
+def test_failure_on_close_is_reported(tmp_path, monkeypatch, suffix):
     """Network drives report a full disk only there."""
     path = tmp_path / f"x{suffix}"
     path.write_bytes(b"precious")
@@ -129,7 +129,7 @@ def test_fault_of_closing_counts(tmp_path, monkeypatch, suffix):
     assert path.read_bytes() == b"precious"
 
 
-def test_video_file_tells_places_as_a_file_does(tmp_path):
+def test_video_file_reports_positions_like_a_file(tmp_path):
     path = tmp_path / "x"
     path.write_bytes(b"")
     file = VideoFile(path)
@@ -156,7 +156,7 @@ for level in range(17):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_every_fill_level_is_one_line_or_a_video(tiny_disk, suffix):
+def test_every_disk_fill_level_gives_one_line_or_a_video(tiny_disk, suffix):
     """In a process of its own, which FFmpeg used to end with a segmentation fault."""
     folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
     run = subprocess.run(

@@ -1,4 +1,4 @@
-"""How two pictures are compared: exactly on one rasteriser, by structure between two."""
+"""Image comparison: exact on one rasteriser, structural between two."""
 
 from __future__ import annotations
 

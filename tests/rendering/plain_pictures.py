@@ -1,4 +1,4 @@
-"""Small pictures without perspective or shading, and what is covered in them."""
+"""Small images without perspective or shading, and their covered pixels."""
 
 from __future__ import annotations
 

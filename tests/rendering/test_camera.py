@@ -1,4 +1,4 @@
-"""The orbit camera: where points land, by hand and by projecting with plain numpy."""
+"""The orbit camera: projected points, by hand and with plain numpy."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def project(camera: Camera, points, aspect: float = 1.0, box=BOX):
         ("z", 180, 0, (0, 4, 0)),
     ],
 )
-def test_eye_stands_where_the_angles_say(up, azimuth, inclination, wanted):
+def test_eye_position_follows_the_angles(up, azimuth, inclination, wanted):
     camera = Camera(distance=4.0, azimuth=azimuth, inclination=inclination, up=up)
     np.testing.assert_allclose(eye(camera), wanted, atol=1e-12)
     camera.target = np.array([10.0, 20.0, 30.0])
@@ -113,7 +113,7 @@ def test_perspective_matrix_has_its_textbook_entries():
     np.testing.assert_allclose(matrix[3], [0, 0, -1, 0], atol=1e-12)
 
 
-def test_perspective_lands_a_known_point_on_a_known_place():
+def test_perspective_projects_a_known_point_correctly():
     """3 ahead and 1.5 up at 45 degrees half angle is half way up; 1 right of it a third."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
     np.testing.assert_allclose(project(camera, [1.0, 1.5, 1.0])[0, :2], [1 / 3, 0.5], atol=1e-9)
@@ -122,7 +122,7 @@ def test_perspective_lands_a_known_point_on_a_known_place():
     )
 
 
-def test_orthographic_lands_a_known_point_whatever_its_depth():
+def test_orthographic_projection_ignores_depth():
     """Half the height seen at the target is 4 tan 45 = 4."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0, orthographic=True)
     for depth in (-1.0, 0.0, 1.0):
@@ -166,7 +166,7 @@ def test_fit_shows_every_point_and_wastes_little(up, orthographic, aspect, azimu
     assert (camera.azimuth, camera.inclination) == (azimuth, inclination)
 
 
-def test_fit_gives_the_distance_worked_by_hand():
+def test_fit_distance_matches_hand_calculation():
     """Two points 1 from the middle, seen at 45 degrees half angle, with 8 % of room."""
     points = np.array([[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]])
     for orthographic in (False, True):
@@ -227,7 +227,7 @@ def test_orbit_keeps_target_and_distance():
     assert np.linalg.norm(eye(camera) - [1.0, 2.0, 3.0]) == pytest.approx(7.0)
 
 
-def test_pan_by_one_moves_by_the_height_of_the_picture():
+def test_pan_by_one_moves_by_the_height_of_the_view():
     """At distance 4 and 45 degrees half angle 8 units are seen."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
     pan(camera, 1.0, 0.5)
@@ -235,7 +235,7 @@ def test_pan_by_one_moves_by_the_height_of_the_picture():
 
 
 @pytest.mark.parametrize("orthographic", [False, True])
-def test_pan_carries_the_scene_with_the_pointer(orthographic):
+def test_pan_moves_the_scene_with_the_pointer(orthographic):
     camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 30.0, 20.0, orthographic=orthographic)
     point = camera.target.copy()
     pan(camera, -0.25, -0.1)
@@ -282,7 +282,7 @@ FACING += [("z", front) for front in ("+x", "-x", "+y", "-y")]
 
 
 @pytest.mark.parametrize(("up", "front"), FACING)
-def test_front_view_stands_on_the_axis_that_is_faced(up, front):
+def test_front_view_lies_on_the_front_axis(up, front):
     camera = facing_camera(front, up)
     look_from(camera, "front")
     np.testing.assert_allclose(camera_axes(camera)[2], AXES[front], atol=1e-12)
@@ -305,14 +305,14 @@ def test_first_view_is_35_degrees_from_the_front(up, front):
     assert -180 <= camera.azimuth <= 180 and camera.inclination == 15
 
 
-def test_usual_front_is_the_first_view_there_always_was():
+def test_default_front_gives_the_default_view():
     for up, front in (("y", "+z"), ("z", "-y")):
         camera, plain = facing_camera(front, up), Camera(up=up)
         assert (camera.azimuth, camera.inclination) == (plain.azimuth, plain.inclination)
 
 
 @pytest.mark.parametrize("orthographic", [False, True])
-def test_fit_leaves_as_much_of_the_height_as_is_asked(orthographic):
+def test_fit_leaves_the_requested_margin(orthographic):
     camera = Camera(azimuth=0.0, inclination=0.0, orthographic=orthographic)
     tall = np.array([[-0.1, -1.0, 0.0], [0.1, 1.0, 0.0]])
     fit(camera, tall, 1.0, 0.7)

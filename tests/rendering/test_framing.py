@@ -1,4 +1,4 @@
-"""Cameras that see a whole motion, all the way round, and find whom they follow."""
+"""Cameras that frame a whole motion, also as a turntable, and find their follow target."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def all_points(seconds) -> np.ndarray:
     return np.concatenate(clouds)
 
 
-def test_box_and_points_are_those_of_all_frames():
+def test_box_and_points_cover_all_frames():
     times = np.linspace(0.0, 1.0, 11)
     points, box = frame_motion(recording_of(moving_arm(), times=times[[0, 1, 2, 3, 4, 6, 10]]))
     every = all_points(times[[0, 1, 2, 3, 4, 6, 10]])
@@ -64,7 +64,7 @@ def test_box_and_points_are_those_of_all_frames():
     np.testing.assert_allclose(camera.target, exact.target, atol=1e-12)
 
 
-def test_at_most_32_frames_are_looked_at(monkeypatch):
+def test_at_most_32_frames_are_sampled(monkeypatch):
     looked = []
     monkeypatch.setattr(
         "viewer.rendering.framing.pose_scene", lambda scene, recording, time: looked.append(time)
@@ -73,14 +73,14 @@ def test_at_most_32_frames_are_looked_at(monkeypatch):
     assert len(looked) == 32 and looked[0] == 0.0 and looked[-1] == 5.0
 
 
-def test_scene_stays_as_it_is():
+def test_framing_does_not_change_the_scene():
     actor = moving_arm()
     before = actor.pose.copy()
     frame_motion(recording_of(actor))
     assert (actor.pose.figure_translation == before.figure_translation).all()
 
 
-def test_frames_without_anybody_do_not_count():
+def test_frames_without_people_do_not_count():
     _, box = frame_motion(recording_of(moving_arm(), times=(0.55, 0.2)))
     wanted = all_points([0.2])
     np.testing.assert_allclose(box, [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-12)
@@ -88,7 +88,7 @@ def test_frames_without_anybody_do_not_count():
     assert nobody.tolist() == [[0, 0, 0]] and empty.tolist() == [[0, 0, 0]] * 2
 
 
-def test_still_scene_is_fitted_as_it_is_posed():
+def test_still_scene_is_fitted_as_posed():
     actor = moving_arm()
     actor.pose.figure_translation[:] = (9.0, 0.0, 0.0)
     _, box = frame_motion(recording_of(actor, moves=False))
@@ -107,7 +107,7 @@ def test_following_camera_fits_what_stays_around_it():
 
 @pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize("orthographic", [False, True])
-def test_turning_camera_sees_all_the_way_round(up, orthographic):
+def test_orbiting_camera_keeps_everything_in_view(up, orthographic):
     points = np.random.default_rng(1).uniform(-1, 1, (500, 3)) * [8.0, 1.0, 0.5]
     camera = Camera(up=up, azimuth=90.0, orthographic=orthographic)
     fit_turntable(camera, points, ASPECT, 360.0)
@@ -118,7 +118,7 @@ def test_turning_camera_sees_all_the_way_round(up, orthographic):
         assert is_seen(turned, points)
 
 
-def test_camera_that_does_not_turn_is_fitted_as_ever():
+def test_camera_that_does_not_orbit_is_fitted_as_usual():
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
     camera, plain = Camera(), Camera()
     fit_turntable(camera, points, ASPECT, 0.0)
@@ -176,7 +176,7 @@ def test_name_finds_actor_or_joint(name, actor, joint, origin):
     np.testing.assert_allclose(follow.origin, origin, atol=1e-12)
 
 
-def test_name_may_mean_several():
+def test_name_may_match_several():
     scene = Scene([Actor(arm(3)), captured(4), Actor(arm(2)), captured(7)])
     assert follow_candidates(scene, "j1") == [(0, 1), (2, 1)]
     assert follow_candidates(scene, "arm") == [(0, 0), (2, 0)]
@@ -185,7 +185,7 @@ def test_name_may_mean_several():
     assert follow_candidates(scene, "7:nose") == [(3, 1)] and follow_candidates(scene, "5") == []
 
 
-def test_joints_may_have_a_colon_in_their_names():
+def test_joint_names_may_contain_a_colon():
     figure = arm(2)
     names = ("mixamorig:Hips", "mixamorig:Spine")
     named = replace(figure, skeleton=replace(figure.skeleton, names=names))
@@ -213,7 +213,7 @@ def test_unknown_name_lists_the_actors(name):
         ("mixamorig:Hps", "did you mean mixamorig:Hips?"),
     ],
 )
-def test_unknown_name_comes_with_the_nearest_of_its_owner(name, hint):
+def test_unknown_joint_suggests_the_nearest_of_its_actor(name, hint):
     figure = arm(2)
     names = ("mixamorig:Hips", "mixamorig:Spine")
     named = replace(figure, name="fox", skeleton=replace(figure.skeleton, names=names))

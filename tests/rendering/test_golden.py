@@ -1,4 +1,4 @@
-"""Stored pictures, and proof that comparing with them notices what it should."""
+"""Golden images, and tests of the comparison itself."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def golden_renderer() -> str:
 
 @pytest.mark.golden("{name}")
 @pytest.mark.parametrize("name", SHOTS)
-def test_picture_is_as_stored(offscreen, name):
+def test_image_matches_golden_image(offscreen, name):
     shot = SHOTS[name]()
     pixels = draw(offscreen, shot)
     path = GOLDEN / f"{name}.png"
@@ -78,7 +78,7 @@ def write(path: Path, pixels) -> None:
     picture.save(path, optimize=True)
 
 
-def test_every_stored_picture_is_drawn():
+def test_every_golden_image_is_rendered():
     stored = {path.stem for path in GOLDEN.glob("*.png")}
     assert {name for name in stored if not name.startswith("app_")} == set(SHOTS)
 
@@ -120,14 +120,14 @@ class Fixed(Shot):
 
 @pytest.mark.parametrize("name", changed_scenes())
 @pytest.mark.parametrize("same_rasteriser", [True, False])
-def test_the_metric_notices(offscreen, name, same_rasteriser):
+def test_the_metric_detects_changes(offscreen, name, same_rasteriser):
     wanted = draw(offscreen, Shot(Scene([bent(arm(4), *BEND)]), options()))
     shot = changed_scenes()[name]
     found = draw(offscreen, Fixed(shot.scene, shot.options))
     assert complaints(found, wanted, same_rasteriser) != []
 
 
-def test_the_metric_notices_one_missing_triangle(offscreen):
+def test_the_metric_detects_one_missing_triangle(offscreen):
     """Between rasterisers it is too small to see; on the same one it is not."""
     figure = arm(4, sides=8, rings=16)
     wanted = draw(offscreen, Shot(Scene([bent(figure, *BEND)]), options()))
@@ -144,7 +144,7 @@ def test_the_metric_notices_one_missing_triangle(offscreen):
     assert complaints(draw(offscreen, shot), wanted, same_rasteriser=True) != []
 
 
-def test_the_metric_accepts_the_same_picture(offscreen):
+def test_the_metric_accepts_the_same_image(offscreen):
     pixels = draw(offscreen, SHOTS["arm-texture"]())
     assert complaints(pixels, pixels.copy(), True) == complaints(pixels, pixels.copy(), False) == []
 
@@ -156,7 +156,7 @@ def test_the_metric_accepts_rounding():
     assert complaints(found.astype(np.uint8), wanted, True) == []
 
 
-def test_ssim_error_is_zero_for_equal_and_large_for_unlike_pictures():
+def test_ssim_error_is_zero_for_equal_and_large_for_different_images():
     rng = np.random.default_rng(1)
     first, second = rng.integers(0, 256, (2, 64, 64, 4)).astype(np.uint8)
     first[..., 3] = second[..., 3] = 255
@@ -167,21 +167,21 @@ def test_ssim_error_is_zero_for_equal_and_large_for_unlike_pictures():
     assert ssim_error(first, inverted) > 1.5
 
 
-def test_ssim_error_of_flat_pictures_is_that_of_their_means():
+def test_ssim_error_of_uniform_images_is_that_of_their_means():
     """Without variance SSIM is (2ab + c1) / (a^2 + b^2 + c1), by hand for 100 and 200."""
     first, second = np.full((2, 16, 16, 4), 255, dtype=np.uint8)
     first[..., :3], second[..., :3] = 100, 200
     assert ssim_error(first, second) == pytest.approx(1 - 40_006.5025 / 50_006.5025, abs=1e-9)
 
 
-def test_silhouette_share_counts_pixels_of_one_picture_only():
+def test_silhouette_fraction_counts_pixels_in_only_one_image():
     first, second = np.zeros((2, 10, 10, 4), dtype=np.uint8)
     first[:5, :, 3] = 255
     second[:4, :, 3] = 255
     assert silhouette_share(first, second) == pytest.approx(0.1)
 
 
-def test_a_mesh_and_its_figure_are_told_apart_by_size(offscreen):
+def test_a_mesh_and_its_figure_are_distinguished_by_size(offscreen):
     pixels = draw(offscreen, SHOTS["ball"]())
     assert complaints(pixels[:-1], pixels, True) == ["size (299, 300, 4) instead of (300, 300, 4)"]
     assert isinstance(SHOTS["ball"]().scene.actors[0].figure, Figure)

@@ -1,4 +1,4 @@
-"""Pictures without a window: sizes, samples, several contexts, threads, memory."""
+"""Images without a window: sizes, samples, several contexts, threads, memory."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_render_twice_gives_the_same_pixels(scene):
     np.testing.assert_array_equal(viewer.render(scene, (64, 48)), viewer.render(scene, (64, 48)))
 
 
-def test_size_and_samples_may_change_from_picture_to_picture(scene):
+def test_size_and_samples_may_change_between_images(scene):
     """A released framebuffer that is still bound makes the next one fail."""
     for size in ((64, 48), (32, 32), (100, 20), (64, 48)):
         for samples in (1, 4):
@@ -58,17 +58,17 @@ def test_size_and_samples_may_change_from_picture_to_picture(scene):
 
 
 @pytest.mark.parametrize("size", [(0, 48), (64, 0), (-1, 48), (64, -48), (1_000_000, 48)])
-def test_sizes_that_cannot_be_drawn_are_refused(scene, size):
+def test_unsupported_sizes_are_refused(scene, size):
     with pytest.raises(ViewerError, match=rf"expected 1 to \d+ pixels .* {size[0]} x {size[1]}$"):
         viewer.render(scene, size)
     assert viewer.render(scene, (8, 8)).shape == (8, 8, 4)
 
 
-def test_a_picture_of_one_pixel_is_drawn(scene):
+def test_an_image_of_one_pixel_is_rendered(scene):
     assert viewer.render(scene, (1, 1)).shape == (1, 1, 4)
 
 
-def test_a_very_wide_picture_shows_the_whole_figure(scene):
+def test_a_very_wide_image_shows_the_whole_figure(scene):
     options = DisplayOptions(background="transparent", grid=False)
     alpha = viewer.render(scene, (2000, 10), options=options)[..., 3]
     assert alpha.any()
@@ -98,7 +98,7 @@ def test_one_sample_is_not_noted(scene):
         assert offscreen.renderer.notes == []
 
 
-def test_two_offscreens_draw_in_turn(scene):
+def test_two_offscreen_renderers_alternate(scene):
     other = Scene([bent(arm(3), (1, "z", -0.6))])
     wanted, wanted_other = viewer.render(scene, (64, 48)), viewer.render(other, (64, 48))
     first, second = Offscreen(), Offscreen()
@@ -192,7 +192,7 @@ scene = Scene([Actor(figure)])
 
 
 @LINUX
-def test_many_renders_take_no_more_memory():
+def test_many_renders_do_not_leak_memory():
     """Poses, sizes, actors and options change all the time."""
     code = """
 for i in range(180):
@@ -208,7 +208,7 @@ print(resident() - before)
 
 
 @LINUX
-def test_threads_that_end_take_their_contexts_with_them():
+def test_contexts_are_freed_with_their_threads():
     code = """
 def work():
     thread = threading.Thread(target=lambda: viewer.render(scene, (64, 48)))
@@ -266,7 +266,7 @@ def test_more_joints_than_a_texture_holds_are_refused(ctx):
     ],
 )
 @pytest.mark.parametrize("how", ["refused", "out of memory"])
-def test_a_picture_without_room_says_how_much_it_needs(ctx, monkeypatch, samples, words, how):
+def test_an_image_without_memory_reports_its_size(ctx, monkeypatch, samples, words, how):
     made = []
 
     def no_room(context, doing):
@@ -300,11 +300,11 @@ def test_a_picture_without_room_says_how_much_it_needs(ctx, monkeypatch, samples
     ("size", "samples", "n_bytes"),
     [((16384, 16384), 4, 9_663_676_416), ((16384, 16384), 0, 2_147_483_648), ((1, 1), 8, 68)],
 )
-def test_memory_is_that_of_samples_depth_and_picture(size, samples, n_bytes):
+def test_memory_counts_samples_depth_and_image(size, samples, n_bytes):
     assert target_bytes(size, samples) == n_bytes
 
 
-def test_the_largest_picture_with_samples_is_refused_with_its_memory(ctx):
+def test_the_largest_multisampled_image_is_refused_with_its_memory(ctx):
     """16384 x 16384 pixels are within llvmpipe's limits, four samples of each are not."""
     if "llvmpipe" not in ctx.info["GL_RENDERER"] or ctx.info["GL_MAX_RENDERBUFFER_SIZE"] != 16384:
         pytest.skip("other limits")
@@ -314,7 +314,7 @@ def test_the_largest_picture_with_samples_is_refused_with_its_memory(ctx):
     assert ctx.error == "GL_NO_ERROR"
 
 
-def test_a_target_is_kept_while_its_size_and_samples_are(scene):
+def test_a_target_is_reused_for_the_same_size_and_samples(scene):
     with Offscreen() as offscreen, offscreen.context:
         first = offscreen.target((64, 48), 4)
         assert offscreen.target((64, 48), 4) is first

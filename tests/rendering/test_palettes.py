@@ -1,4 +1,4 @@
-"""Palettes: neighbours are told apart, by eyes that lack a kind of cone as well."""
+"""Palettes: neighbours are distinguishable, also with colour vision deficiency."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_neighbouring_joints_differ(name, eyes):
 
 
 @pytest.mark.parametrize("count", [1, 24, 48])
-def test_joints_have_colours_of_their_own(count):
+def test_joints_have_distinct_colours(count):
     palette = joint_palette(np.arange(count) - 1)
     assert palette.shape == (count, 4) and palette.dtype == np.uint8
     assert len(np.unique(palette, axis=0)) == count
@@ -93,13 +93,13 @@ def test_counts_go_from_dark_grey_over_rising_colours():
     assert count_palette(1).shape == (2, 4)
 
 
-def test_parts_are_those_of_their_shading():
+def test_part_colours_match_the_part_shading():
     linear = part_colors(9)
     expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     np.testing.assert_allclose(part_palette(9)[:, :3] / 255.0, expected, atol=0.5001 / 255)
 
 
-def test_nothing_is_no_colour_of_a_map():
+def test_zero_colour_is_not_in_any_colour_map():
     grey = lab(np.array([NOTHING]))
     for pixels in (colormap(), diverging_map()):
         assert np.linalg.norm(lab(pixels) - grey, axis=1).min() > 0.05
@@ -116,13 +116,13 @@ def test_difference_map_is_white_in_the_middle_and_darkens_to_both_sides():
 
 
 @pytest.mark.parametrize("eyes", EYES)
-def test_sides_of_the_difference_map_are_told_apart(eyes):
+def test_sides_of_the_difference_map_are_distinguishable(eyes):
     colors = lab(diverging_map(101), EYES[eyes])
     for step in (15, 30, 50):
         assert np.linalg.norm(colors[50 - step] - colors[50 + step]) > 0.08
 
 
-def test_conversions_of_colours():
+def test_colour_conversions():
     values = np.linspace(0.0, 1.0, 11)
     np.testing.assert_allclose(decode_srgb(encode_srgb(values)), values, atol=1e-4)
     assert decode_srgb(np.array(0.5)) == pytest.approx(0.21404114)

@@ -1,4 +1,4 @@
-"""Body parts in distinct colours, hidden parts, and the coarser mesh."""
+"""Body parts in distinct colours, hidden parts, and the reduced mesh."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_figure_without_parts_is_plain(offscreen):
     assert np.abs(picture[drawn(picture)][:, :3] - expected).max() <= 1.0
 
 
-def test_figures_with_and_without_parts_do_not_disturb_each_other(offscreen):
+def test_figures_with_and_without_parts_do_not_interfere(offscreen):
     both = alone(striped())
     other = scene_of(square(z=-1.0, half=1.9)).actors[0]
     both.actors.append(other)
@@ -82,7 +82,7 @@ def test_hidden_parts_are_not_drawn_but_their_borders_are(offscreen):
     assert drawn(front_view(offscreen, scene)).sum() == 60 * 60
 
 
-def test_everything_hidden_draws_no_edges_either(offscreen):
+def test_hiding_everything_draws_no_edges_either(offscreen):
     scene = alone(striped())
     picture = front_view(offscreen, scene, hidden_parts=(0, 1, 2), wireframe=True)
     assert not drawn(picture).any()
@@ -105,7 +105,7 @@ def coarse():
     return replace(striped(), reduced=ReducedMesh([24, 0, 4], [[1, 2, 0]]))
 
 
-def test_coarser_mesh_is_drawn_if_asked_for(offscreen):
+def test_reduced_mesh_is_drawn_on_request(offscreen):
     scene = alone(coarse())
     assert drawn(front_view(offscreen, scene)).sum() == 60 * 60
     found = drawn(front_view(offscreen, scene, reduced=True))
@@ -115,7 +115,7 @@ def test_coarser_mesh_is_drawn_if_asked_for(offscreen):
     assert (columns + rows >= 78).all()
 
 
-def test_coarser_mesh_follows_the_pose(offscreen):
+def test_reduced_mesh_follows_the_pose(offscreen):
     scene = alone(coarse())
     scene.actors[0].pose.dofs[2] = np.pi  # the root about z: the upper left half
     rows, columns = np.nonzero(drawn(front_view(offscreen, scene, reduced=True)))
@@ -123,7 +123,7 @@ def test_coarser_mesh_follows_the_pose(offscreen):
     assert (columns + rows <= 80).all()
 
 
-def test_coarser_mesh_obeys_hidden_parts_and_has_colours(offscreen):
+def test_reduced_mesh_obeys_hidden_parts_and_has_colours(offscreen):
     scene = alone(coarse())
     picture = front_view(offscreen, scene, reduced=True, shading="parts")
     assert near(pixel(picture, 1.4, 0.0), SKY, 12)
@@ -132,7 +132,7 @@ def test_coarser_mesh_obeys_hidden_parts_and_has_colours(offscreen):
     assert not drawn(front_view(offscreen, scene, reduced=True, hidden_parts=(0, 1))).any()
 
 
-def test_figure_without_a_coarser_mesh_draws_its_own(offscreen):
+def test_figure_without_a_reduced_mesh_draws_its_own(offscreen):
     assert drawn(front_view(offscreen, alone(grid_figure()), reduced=True)).sum() == 60 * 60
 
 
@@ -157,7 +157,7 @@ def test_fewer_triangles_go_through_the_pipeline(offscreen):
 
 
 @pytest.mark.parametrize("count", [0, 1, 8, 9, 24])
-def test_part_colours_are_distinct_and_the_second_round_is_darker(count):
+def test_part_colours_are_distinct_and_repeat_darker(count):
     colors = part_colors(count)
     assert colors.shape == (count, 3)
     assert len(np.unique(colors, axis=0)) == count

@@ -1,4 +1,4 @@
-"""Clicks on known places: which actor, joint, triangle and keypoint, and where in the scene."""
+"""Picking at known positions: actor, joint, triangle, keypoint and scene position."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_triangle_of_the_mesh_is_found(offscreen):
         assert found.point == pytest.approx([x, y, 0.0], abs=4.0 / PIXELS)
 
 
-def test_nothing_is_found_beside_everything(offscreen):
+def test_nothing_is_picked_on_the_background(offscreen):
     scene = Scene([Actor(grid_figure())])
     assert click(offscreen, scene, 1.8, 1.8) is None
     assert click(offscreen, Scene([]), 0.0, 0.0) is None
@@ -62,7 +62,7 @@ def test_nothing_is_found_beside_everything(offscreen):
     assert click(offscreen, scene, 0.0, 0.0) is None
 
 
-def test_three_pixels_beside_it_still_count_and_four_do_not(offscreen):
+def test_pick_tolerance_is_three_pixels(offscreen):
     scene = Scene([Actor(grid_figure())])
     # The edge is at 1.5, the right border of pixel 69 of 80.
     assert click(offscreen, scene, 4 * 72.5 / PIXELS - 2, 0.0) is not None
@@ -92,7 +92,7 @@ def test_perspective_depth_is_exact(offscreen):
     assert found.point == pytest.approx([3 * 20.5 / 40, -3 * 0.5 / 40, -1.0], abs=1e-5)
 
 
-def test_pictures_of_any_shape_are_picked_alike(offscreen):
+def test_images_of_any_aspect_ratio_are_picked_correctly(offscreen):
     scene = Scene([Actor(grid_figure())])
     with offscreen.context:
         for size in ((160, 80), (80, 160), (1920, 1080)):
@@ -110,7 +110,7 @@ def test_pictures_of_any_shape_are_picked_alike(offscreen):
             assert found.point == pytest.approx([0.0, 1.0, 0.0], abs=pixel)
 
 
-def test_bent_meshes_are_found_where_they_are(offscreen):
+def test_posed_meshes_are_picked_where_they_are_drawn(offscreen):
     scene = Scene([bent(arm(3), (1, "z", np.pi / 2))])
     scene.actors[0].placement[0, 3] = -1.0
     # The first segment reaches from -1 to 0, the others go up from there.
@@ -207,7 +207,7 @@ def test_instances_are_told_apart(offscreen, monkeypatch, count):
     assert click(offscreen, scene, -0.5, 1.6).actor == 0
 
 
-def test_triangles_of_a_reduced_mesh_are_its_own(offscreen):
+def test_picking_returns_reduced_mesh_triangles(offscreen):
     coarse = ReducedMesh([0, 4, 20, 24], [[0, 1, 3], [0, 3, 2]])
     scene = Scene([Actor(grid_figure(reduced=coarse))])
     assert click(offscreen, scene, 0.5, -0.5, reduced=True).triangle == 0
@@ -220,7 +220,7 @@ def test_culled_triangles_are_not_found(offscreen):
     assert click(offscreen, scene, 0.0, 0.0, cull=True) is None
 
 
-def test_picking_leaves_the_next_picture_as_it_was(offscreen):
+def test_picking_does_not_change_the_next_image(offscreen):
     scene = Scene([bent(arm(3), (1, "z", 0.5))])
     options, box = DisplayOptions(show="both"), scene_box(scene)
     before = offscreen.render(scene, (80, 80), parallel(), options, box)

@@ -1,4 +1,4 @@
-"""Looking through calibrated cameras: points land on the pixels that OpenCV's formula gives."""
+"""Calibrated cameras: points project to the pixels given by OpenCV's formula."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ def pixel(view: CameraView, point, size) -> np.ndarray:
         ((-0.5, -1.0, 1.0), (200.0, 465.0)),  # nearer: 0.5 * 800 / 4, 820 / 4
     ],
 )
-def test_points_land_where_the_camera_saw_them(point, wanted):
+def test_points_project_to_their_observed_pixels(point, wanted):
     assert pixel(camera_view(), point, (640, 480)) == pytest.approx(wanted, abs=1e-9)
 
 
-def test_every_point_lands_at_k_times_its_place():
+def test_every_point_projects_by_the_intrinsic_matrix():
     rng = np.random.default_rng(0)
     axis = rng.normal(size=3)
     axis /= np.linalg.norm(axis)
@@ -79,13 +79,13 @@ def test_every_point_lands_at_k_times_its_place():
             assert found == pytest.approx(seen[:2] / seen[2], abs=1e-8)
 
 
-def test_a_larger_picture_is_the_same_picture():
+def test_a_larger_image_shows_the_same_view():
     point = (0.4, -0.3, 0.2)
     small, large = (pixel(camera_view(), point, size) for size in ((640, 480), (1920, 1440)))
     assert large + 0.5 == pytest.approx(3.0 * (small + 0.5))
 
 
-def test_pictures_of_another_shape_show_the_whole_in_their_middle():
+def test_images_of_another_aspect_ratio_are_letterboxed():
     point = (0.4, -0.3, 0.2)
     small = pixel(camera_view(), point, (640, 480))
     assert pixel(camera_view(), point, (800, 480)) == pytest.approx(small + np.array([80.0, 0.0]))
@@ -104,7 +104,7 @@ def test_without_a_size_the_principal_point_is_in_the_middle():
     )
 
 
-def test_what_is_drawn_lands_there_too():
+def test_rendered_points_match_the_projection():
     """Two captured points, 1 apart, and a square's corners."""
     layout = PointLayout("two", ("a", "b"), np.zeros((0, 2)), [-1, -1])
     dots = Actor(Figure("dots", points=layout))
@@ -127,7 +127,7 @@ def test_what_is_drawn_lands_there_too():
     assert (columns[~right].mean(), rows[~right].mean()) == pytest.approx((185.71, 226.53), abs=0.5)
 
 
-def test_depth_range_holds_what_is_drawn_from_inside_too():
+def test_depth_range_covers_the_scene_from_inside_too():
     for distance in (0.5, 3.0, 30.0):
         view = camera_view(translation=[0.0, 0.0, distance])
         camera = Camera(fixed=view)
@@ -157,7 +157,7 @@ def test_leaving_the_fixed_view_stays_where_it_was(up):
     assert camera.azimuth == pytest.approx(50.0)
 
 
-def test_a_camera_that_turns_its_back_orbits_all_the_same():
+def test_a_camera_facing_away_can_still_orbit():
     view = camera_view(rotation=np.diag([-1.0, -1.0, 1.0]), translation=[0.0, 0.0, 4.0])
     away = camera_view(rotation=np.eye(3), translation=[0.0, 0.0, 0.0])
     for one in (view, away):
@@ -165,7 +165,7 @@ def test_a_camera_that_turns_its_back_orbits_all_the_same():
         assert camera.distance > 0.0 and np.isfinite(camera.view_matrix()).all()
 
 
-def test_wide_pictures_see_as_much_to_the_sides():
+def test_wide_images_keep_the_horizontal_field_of_view():
     camera = camera_from_view(camera_view(), (480, 480), "y")
     # 640 columns fit into the width, so 640 rows are seen.
     assert camera.fov == pytest.approx(math.degrees(2 * math.atan(320 / 820)))
@@ -178,7 +178,7 @@ def test_a_fixed_camera_is_never_parallel():
     assert camera.is_parallel
 
 
-def test_distortion_by_hand():
+def test_distortion_matches_hand_calculation():
     """Corner of the picture with K = diag(100, 100, 1), the principal point at (50, 50)."""
     k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
 
@@ -208,7 +208,7 @@ def test_a_camera_very_far_away_keeps_a_depth_range():
         assert -1.0 <= clip[2] / clip[3] <= 1.0
 
 
-def test_a_lens_that_divides_by_zero_bends_beyond_all_bounds():
+def test_distortion_with_a_zero_denominator_is_infinite():
     """Corners at r^2 = 0.5, so k4 = -2 makes the divisor 1 - 2 * 0.5 = 0."""
     k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
     view = camera_view(intrinsic=k, size=(101, 101), distortion=[0.0] * 5 + [-2.0])

@@ -1,4 +1,4 @@
-"""What single pixels must be: orientation, colours, transparency, by hand."""
+"""Single pixels against hand calculation: orientation, colours, transparency."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ RED, GREEN, BLUE, YELLOW = (220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 21
 # Places
 
 
-def test_a_square_covers_the_pixels_worked_by_hand(offscreen):
+def test_a_square_covers_the_expected_pixels(offscreen):
     """-1 to 1 of -2 to 2 on 100 pixels: columns 25 to 74."""
     assert covered(draw(offscreen, scene_of(square()))) == (25, 74, 25, 74)
 
 
-def test_perspective_covers_the_pixels_worked_by_hand(offscreen):
+def test_perspective_covers_the_expected_pixels(offscreen):
     """1 unit nearer at distance 2 everything is twice as large: -0.5 to 0.5 as -1 to 1."""
     camera = front(orthographic=False)
     assert covered(draw(offscreen, scene_of(square(1.0, 0.5)), camera=camera)) == (25, 74, 25, 74)
@@ -78,14 +78,14 @@ def test_two_actors_are_drawn_and_a_hidden_one_is_not(offscreen):
 # Both sides
 
 
-def test_a_clockwise_mesh_looks_as_a_counter_clockwise_one(offscreen):
+def test_a_clockwise_mesh_looks_like_a_counter_clockwise_one(offscreen):
     options = plain(lights=Lights())
     first = draw(offscreen, scene_of(square()), options)
     second = draw(offscreen, scene_of(square(clockwise=True)), options)
     np.testing.assert_array_equal(first, second)
 
 
-def test_a_clockwise_ball_looks_as_a_counter_clockwise_one(offscreen):
+def test_a_clockwise_ball_looks_like_a_counter_clockwise_one(offscreen):
     ball = sphere(20)
     turned = replace(ball, triangles=ball.triangles[:, ::-1], triangle_materials=None)
     for flat in (False, True):
@@ -142,7 +142,7 @@ def test_linear_light_becomes_the_srgb_byte(offscreen, linear, byte):
     assert near(pixels[50, 50], [byte] * 3, tolerance=1)
 
 
-def test_a_texture_comes_out_as_it_went_in(offscreen):
+def test_unlit_texture_colours_are_unchanged(offscreen):
     for color in (RED, GREEN, (1, 2, 3), (128, 128, 128), (231, 100, 10)):
         pixels = draw(offscreen, scene_of(square(material=picture([[color]]))))
         assert near(pixels[50, 50], color, tolerance=1)
@@ -177,7 +177,7 @@ def test_the_highlight_follows_blinn_phong(offscreen):
     assert near(pixels[50, 50], [srgb(0.5 * (0.5 + 0.4 * 0.75**4))] * 3, tolerance=1)
 
 
-def test_lights_turn_with_the_camera_or_stay_in_the_scene(offscreen):
+def test_lights_follow_the_camera_or_the_scene(offscreen):
     scene = scene_of(sphere(24))
     for follows, same in ((True, True), (False, False)):
         setting = lights(0.1, 0.8, azimuth=60.0, follow_camera=follows)

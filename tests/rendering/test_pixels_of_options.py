@@ -17,7 +17,7 @@ from viewer.rig.scene import Actor, Scene
 # Display options
 
 
-def test_flat_shading_has_one_colour_a_triangle(offscreen):
+def test_flat_shading_has_one_colour_per_triangle(offscreen):
     ball = sphere(4)
     options = plain(lights=lights(0.1, 0.7, azimuth=30.0))
     smooth, flat = (
@@ -77,7 +77,7 @@ def test_a_background_colour_is_drawn_as_given(offscreen):
 
 
 @pytest.mark.parametrize("text", ["blue", "#12345", "#1234567", "#12345g", "", "336699"])
-def test_a_background_that_is_no_colour_is_refused(offscreen, text):
+def test_an_invalid_background_is_refused(offscreen, text):
     with pytest.raises(ViewerError, match=r'background: expected "gradient", .* or "#'):
         draw(offscreen, Scene([]), plain(background=text))
 
@@ -137,7 +137,7 @@ def box_figure(box) -> Figure:
     ],
     ids=["a box", "inverted", "flat"],
 )
-def test_boxes_cover_the_pixels_worked_by_hand(offscreen, box, wanted):
+def test_boxes_cover_the_expected_pixels(offscreen, box, wanted):
     scene = Scene([Actor(box_figure(box))])
     pixels = draw(offscreen, scene, plain(show="skeleton"))
     assert covered(pixels) == wanted
@@ -177,7 +177,7 @@ def test_the_selected_joint_is_highlighted_alone(offscreen):
     assert red > green + 40 > blue + 80
 
 
-def test_binding_space_shows_the_mesh_unposed(offscreen):
+def test_bind_pose_shows_the_mesh_unposed(offscreen):
     figure = arm(3)
     posed = Scene([bent(figure, (1, "z", 1.0))])
     camera = front(target=np.array([1.5, 0.0, 0.0]))
@@ -237,7 +237,7 @@ def test_one_sample_has_hard_edges_and_four_have_soft_ones(offscreen):
     assert len(levels[4]) == 5
 
 
-def test_more_samples_than_the_driver_has_draw_its_most(offscreen):
+def test_more_samples_than_supported_use_the_maximum(offscreen):
     scene = scene_of(sphere(24))
     most = offscreen.context.max_samples
     np.testing.assert_array_equal(

@@ -1,4 +1,4 @@
-"""Where points are in the picture: by hand for a camera on an axis, and behind it."""
+"""Projected points: by hand for a camera on an axis, and behind it."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ def test_pixels_are_those_of_a_pinhole(view):
     assert found.depths[2] < found.depths[0] == found.depths[1] < found.depths[3]
 
 
-def test_what_is_behind_or_beside_is_not_seen(view):
+def test_points_behind_or_outside_the_view_are_not_visible(view):
     points = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 4.0], [9.0, 0.0, 0.0], [0.0, 4.5, 0.0]])
     assert not project(view, SIZE, points).seen.any()
 
 
-def test_no_points_are_no_points(view):
+def test_no_points_project_to_no_points(view):
     assert project(view, SIZE, np.zeros((0, 3))).pixels.shape == (0, 2)
 
 
 @pytest.mark.parametrize("orthographic", [False, True])
-def test_pixels_lead_back_to_points_as_deep_as_others(orthographic):
+def test_pixels_unproject_to_points_at_a_given_depth(orthographic):
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=4.0, orthographic=orthographic)
     view, points = view_of(camera, SIZE, BOX), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 2.0]])
     found = unproject(view, SIZE, points, np.array([[112.5, 25.0], [100.0, 75.0]]))
@@ -50,7 +50,7 @@ def test_pixels_lead_back_to_points_as_deep_as_others(orthographic):
     assert_allclose(found, [[1, 2, 0], [0, -2 if orthographic else -1, 2]], atol=1e-12)
 
 
-def test_segment_in_front_has_both_its_ends(view):
+def test_segment_in_front_keeps_both_ends(view):
     ends, seen = project_segments(view, SIZE, np.zeros((1, 3)), np.array([[1.0, 2.0, 0.0]]))
     assert seen.all()
     assert_allclose(ends, [[[100, 50], [112.5, 25]]], atol=1e-9)
@@ -68,7 +68,7 @@ def test_segment_that_ends_behind_the_eye_keeps_its_direction(view):
     assert way[0] > 1.0 and math.isclose(way[0], -way[1], rel_tol=1e-9)
 
 
-def test_segment_behind_the_eye_is_not_seen(view):
+def test_segment_behind_the_eye_is_not_visible(view):
     behind = np.array([[0.0, 0.0, 5.0], [1.0, 0.0, 4.5]])
     assert not project_segments(view, SIZE, behind, behind[::-1])[1].any()
 
@@ -83,6 +83,6 @@ def test_segment_behind_the_eye_is_not_seen(view):
         ((9999, 9999), 4.0),
     ],
 )
-def test_marks_grow_with_the_picture(size, scale):
+def test_marks_grow_with_the_image(size, scale):
     # 720 x 1440 counts as 540 pixels high, which is less than marks go down to.
     assert picture_scale(size) == pytest.approx(scale)

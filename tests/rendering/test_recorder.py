@@ -1,4 +1,4 @@
-"""Many frames in order: the pixels of single pictures, on copies, and an orderly end any time."""
+"""The recorder: frames match single images, use copies, and end cleanly at any time."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def one_by_one(offscreen, recording, cameras=None) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("background", ["gradient", "transparent"])
-def test_frames_are_those_of_single_pictures(offscreen, scene, background):
+def test_frames_match_single_images(offscreen, scene, background):
     options = DisplayOptions(background=background, grid=False)
     recording, sink = recording_of(scene, options=options), Kept()
     run(offscreen, recording, sink)
@@ -101,7 +101,7 @@ def test_frames_are_those_of_single_pictures(offscreen, scene, background):
     assert (sink.frames[0] != sink.frames[2]).any()
 
 
-def test_scene_of_the_caller_stays_as_it_is(offscreen, scene):
+def test_recording_does_not_change_the_scene(offscreen, scene):
     actor = scene.actors[0]
     actor.pose.dofs[4] = 0.25
     before = actor.pose.copy()
@@ -150,7 +150,7 @@ def test_turntable_is_a_seamless_loop(offscreen):
     assert recording.camera.azimuth == 170.0
 
 
-def test_camera_goes_with_whom_it_follows(offscreen, scene):
+def test_camera_follows_its_target(offscreen, scene):
     """The arm moves along x by 2 a second and turns nothing else."""
     straight = moving_arm(turns=False)
     options = DisplayOptions(background="transparent", grid=False)
@@ -189,7 +189,7 @@ def test_progress_counts_every_frame(offscreen, scene):
     assert all(a.seconds <= b.seconds for a, b in itertools.pairwise(steps))
 
 
-def test_samples_are_seen_before_the_first_frame(offscreen, scene):
+def test_sampled_frames_are_rendered_before_the_first_frame(offscreen, scene):
     sink = Kept(n_samples=3)
     run(offscreen, recording_of(scene), sink)
     assert len(sink.seen) == 3
@@ -203,7 +203,7 @@ def test_more_samples_than_frames_are_all_frames(offscreen, scene):
     assert len(sink.seen) == len(TIMES)
 
 
-def test_frames_are_written_beside_the_drawing(offscreen, scene):
+def test_frames_are_written_while_rendering(offscreen, scene):
     sink = Kept(workers=3)
     run(offscreen, recording_of(scene), sink)
     assert sorted(sink.frames) == list(range(len(TIMES)))
@@ -211,7 +211,7 @@ def test_frames_are_written_beside_the_drawing(offscreen, scene):
 
 
 @pytest.mark.parametrize("n_frames", [0, 1, 2])
-def test_few_frames(offscreen, scene, n_frames):
+def test_recordings_of_few_frames(offscreen, scene, n_frames):
     recording, sink = recording_of(scene), Kept()
     recording.times = TIMES[:n_frames]
     run(offscreen, recording, sink)
@@ -227,7 +227,7 @@ def test_sizes_may_change_from_one_recording_to_the_next(offscreen, scene):
 
 
 @pytest.mark.parametrize("at", [0, 2, 5, "close"])
-def test_sink_that_fails_ends_the_recording(offscreen, scene, at):
+def test_failing_sink_ends_the_recording(offscreen, scene, at):
     sink = Kept(fails_at=at)
     with pytest.raises(OutputError, match="disk full"):
         run(offscreen, recording_of(scene), sink)
@@ -256,7 +256,7 @@ def test_closing_the_generator_cancels(offscreen, scene, n_steps):
     assert sink.ended == ["abort"] and threading.active_count() == before
 
 
-def test_other_things_may_be_drawn_between_steps(offscreen, scene):
+def test_other_scenes_may_be_rendered_between_steps(offscreen, scene):
     recording, sink = recording_of(scene), Kept()
     other = Scene([Actor(arm(2))])
     with Offscreen() as window:
@@ -273,7 +273,7 @@ def test_other_things_may_be_drawn_between_steps(offscreen, scene):
             assert (sink.frames[index] == wanted).all(), index
 
 
-def test_little_waits_however_slow_the_sink_is(offscreen, scene):
+def test_few_frames_are_queued_however_slow_the_sink(offscreen, scene):
     class Slow(Kept):
         def write(self, frame, pixels):
             gate.wait(10)
@@ -292,7 +292,7 @@ def test_little_waits_however_slow_the_sink_is(offscreen, scene):
     assert drawn == 12 == len(sink.frames)
 
 
-def test_size_that_cannot_be_drawn_is_refused(offscreen, scene):
+def test_unsupported_size_is_refused(offscreen, scene):
     recording, sink = recording_of(scene), Kept()
     recording.size = (1_000_000, 10)
     with pytest.raises(ViewerError, match="picture size: expected 1 to"):

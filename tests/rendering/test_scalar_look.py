@@ -1,4 +1,4 @@
-"""How numbers become colours: ranges that one bad triangle does not take over."""
+"""Mapping of values to colours: ranges that are robust to outliers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.scalars import SCALARS, compute
 from viewer.rig.skin import skin_from_lists
 
 
-def test_hundredth_of_the_largest_amounts_is_left_out():
+def test_largest_percent_of_values_is_left_out():
     # Of 1 to 1000 the 99th of a hundred is 990 or just above it; signs do not matter.
     numbers = np.arange(1.0, 1001.0)
     low, high = typical_span(numbers)
@@ -23,21 +23,21 @@ def test_hundredth_of_the_largest_amounts_is_left_out():
     assert typical_span(numbers) == (-500.0, high)
 
 
-def test_what_does_not_change_does_not_count():
+def test_zero_values_do_not_count():
     # 50 of 10,000 vertices move: nearly all numbers are 0, the range is that of the 50.
     numbers = np.zeros(10_000)
     numbers[:50] = np.linspace(-20, 30, 50)
     assert typical_span(numbers) == (-20.0, 30.0)
 
 
-def test_few_numbers_are_all_typical():
+def test_small_samples_are_all_typical():
     assert typical_span(np.array([0.0, -3.0, 7.0])) == (-3.0, 7.0)
     assert typical_span(np.zeros(5)) == (0.0, 0.0)
     assert typical_span(np.arange(100.0)) == (0.0, 99.0)
 
 
 @pytest.mark.parametrize("name", SCALARS)
-def test_only_views_of_strain_are_robust_and_no_fixed_range_is(name):
+def test_only_automatic_strain_ranges_are_robust(name):
     figure = grid_figure()
     is_robust = name in ("stretch", "stretch-mean", "area")
     assert SCALARS[name].robust == is_robust
@@ -46,7 +46,7 @@ def test_only_views_of_strain_are_robust_and_no_fixed_range_is(name):
     assert not look_of(name, figure, (-1.0, 1.0), fixed).is_typical
 
 
-def test_one_bad_vertex_does_not_take_the_colours_of_the_rest():
+def test_one_outlier_does_not_flatten_the_other_colours():
     # Weights of joint 1 grow to the right; one vertex follows it alone.
     figure = grid_figure(40)
     x = (figure.mesh.positions[:, 0] + 1.5) / 3.0

@@ -1,4 +1,4 @@
-"""Scalar quantities: the numbers on the GPU, their range, and their colours in the picture."""
+"""Scalar quantities: values on the GPU, their range, and their rendered colours."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_colours_of_the_map_run_from_zero_to_the_largest_value(offscreen, larges
         assert np.abs(near - pixel(picture, x, 0.5)[:3]).max(axis=1).min() <= 6
 
 
-def test_brightest_place_is_where_the_value_is_largest(offscreen):
+def test_brightest_pixel_is_where_the_value_is_largest(offscreen):
     picture = view_of(offscreen, rising())
     brightness = picture[..., :3] @ LUMA
     row = brightness[40, drawn(picture)[40]]
@@ -121,7 +121,7 @@ def posed(figure, seed=0):
 
 
 @pytest.mark.parametrize("name", ["methods", "correctives", "pruning"])
-def test_every_split_vertex_has_the_number_of_its_vertex(buffers, name):
+def test_every_split_vertex_has_the_value_of_its_vertex(buffers, name):
     figure = buffers.mesh.figure
     pose, how = posed(figure), Skinning(max_influences=2)
     buffers.update(name, pose, how)
@@ -131,7 +131,7 @@ def test_every_split_vertex_has_the_number_of_its_vertex(buffers, name):
     assert buffers.range == (numbers.min(), numbers.max())
 
 
-def test_numbers_are_computed_when_something_changed_only(buffers, monkeypatch):
+def test_values_are_computed_only_after_a_change(buffers, monkeypatch):
     calls = []
     original = scalars.compute
 
@@ -157,7 +157,7 @@ def test_numbers_are_computed_when_something_changed_only(buffers, monkeypatch):
     assert calls[-1] == "methods"
 
 
-def test_numbers_of_weights_are_computed_for_all_poses_at_once(buffers):
+def test_weight_values_are_computed_once_for_all_poses(buffers):
     pose, how = posed(buffers.mesh.figure), Skinning()
     versions = []
     for change in (
@@ -172,13 +172,13 @@ def test_numbers_of_weights_are_computed_for_all_poses_at_once(buffers):
     assert versions == [1, 1, 1, 2]
 
 
-def test_joint_that_a_figure_has_not_is_no_weight(buffers):
+def test_missing_joint_has_no_weight(buffers):
     buffers.update("weight:nobody", None, Skinning())
     assert buffers.range == (0.0, 0.0)
     assert not values_of(buffers).any()
 
 
-def test_numbers_grow_with_the_figure(buffers):
+def test_values_scale_with_the_figure(buffers):
     pose = posed(buffers.mesh.figure)
     buffers.update("methods", pose, Skinning())
     before = buffers.range[1]
@@ -187,19 +187,19 @@ def test_numbers_grow_with_the_figure(buffers):
     assert buffers.range[1] == pytest.approx(2.0 * before)
 
 
-def test_binding_space_has_numbers_of_zero_and_a_range(buffers):
+def test_bind_pose_has_values_of_zero_and_a_range(buffers):
     buffers.update("pruning", posed(buffers.mesh.figure), Skinning(max_influences=1))
     buffers.update("pruning", None, Skinning(max_influences=1))
     assert not values_of(buffers).any()
     assert buffers.range == (0.0, 0.0)
 
 
-def test_figure_without_a_skin_can_be_drawn_so(offscreen):
+def test_figure_without_a_skin_can_be_drawn_with_scalars(offscreen):
     picture = view_of(offscreen, scene_of(square()), "pruning")
     assert drawn(picture).sum() == 40 * 40
 
 
-def test_rest_pose_of_this_file_differs_from_its_poses(buffers):
+def test_rest_pose_values_differ_from_posed_ones(buffers):
     rest = rest_pose(buffers.mesh.figure.skeleton)
     buffers.update("methods", rest, Skinning())
     assert buffers.range[1] == pytest.approx(0.0, abs=1e-14)
@@ -239,7 +239,7 @@ def test_weight_is_dark_grey_only_where_the_whole_triangle_has_none(offscreen):
     assert not near(low, NOTHING) and high[0] > 200
 
 
-def test_fixed_range_moves_the_colours_and_cuts_what_is_beyond(offscreen):
+def test_fixed_range_shifts_and_clamps_the_colours(offscreen):
     scene = two_joints(LEFT_TO_RIGHT)
     pixels = colormap()[:, :3].astype(int)
     picture = shown(offscreen, scene, "weight:j1", scalar_range=(0.25, 0.5))
@@ -273,7 +273,7 @@ def test_isolines_lie_at_tenths_of_the_range(offscreen):
     assert np.abs(tenths - np.round(tenths)).max() <= 0.27
 
 
-def test_isolines_are_usual_for_weights_only(offscreen):
+def test_isolines_are_on_by_default_for_weights_only(offscreen):
     scene = two_joints(LEFT_TO_RIGHT)
     usual = shown(offscreen, scene, "weight:j1", isolines=None)
     np.testing.assert_array_equal(usual, shown(offscreen, scene, "weight:j1", isolines=True))
@@ -281,7 +281,7 @@ def test_isolines_are_usual_for_weights_only(offscreen):
     np.testing.assert_array_equal(usual, shown(offscreen, scene, "entropy"))
 
 
-def test_place_of_one_value_has_no_isoline(offscreen):
+def test_region_of_one_value_has_no_isoline(offscreen):
     rows = [[(0, 0.5), (1, 0.5)]] * 4
     picture = shown(offscreen, two_joints(rows), "weight:j1", isolines=True)
     found = picture[drawn(picture)]
@@ -299,7 +299,7 @@ def test_dominant_joints_meet_in_a_sharp_border(offscreen):
     assert (is_first | is_second).sum() >= 58
 
 
-def test_three_categories_of_a_triangle_each_have_their_corner(offscreen):
+def test_each_corner_of_a_triangle_shows_its_category(offscreen):
     rows = [[(0, 1.0)], [(1, 1.0)], [(2, 1.0)], [(0, 1.0)]]
     picture = shown(offscreen, two_joints(rows), "dominant")
     colors = joint_palette(np.array([-1, 0, 1]))
@@ -321,7 +321,7 @@ def test_vertex_without_influence_is_grey_among_dominant_joints(offscreen):
     assert near(pixel(picture, 0.2, 0.1), NOTHING, 1)
 
 
-def test_parts_have_the_colours_of_the_shading_of_parts(offscreen):
+def test_parts_have_the_colours_of_the_part_shading(offscreen):
     scene = two_joints(LEFT_TO_RIGHT)
     parts = BodyParts(("a", "b"), np.array([0, 1, 1, 0]))
     scene = alone(replace(scene.actors[0].figure, body_parts=parts))
@@ -347,7 +347,7 @@ def test_selected_joint_is_shown_by_a_view_without_a_joint(offscreen):
     np.testing.assert_array_equal(found, wanted)
 
 
-def test_name_for_the_selected_joint():
+def test_selected_joint_has_a_reserved_name():
     actor = two_joints(LEFT_TO_RIGHT).actors[0]
     assert name_for("weight", actor, 2) == "weight:j2"
     assert name_for("weight:j0", actor, 2) == "weight:j0"
@@ -356,7 +356,7 @@ def test_name_for_the_selected_joint():
     assert name_for("weight", alone(grid_figure()).actors[0], 7) == "weight"
 
 
-def test_same_colour_is_the_same_number_on_all_figures(offscreen):
+def test_same_colour_means_the_same_value_on_all_figures(offscreen):
     small, large = rising(0.5).actors[0], rising(1.0).actors[0]
     both = Scene([small, large])
     how = Skinning(correctives=False)
@@ -367,7 +367,7 @@ def test_same_colour_is_the_same_number_on_all_figures(offscreen):
     assert offscreen.renderer.scalar_range == (0.0, 1.0)
 
 
-def test_figure_without_what_is_shown_is_drawn_as_usual(offscreen):
+def test_figure_without_the_quantity_is_drawn_normally(offscreen):
     having = rising().actors[0]
     lacking = alone(grid_figure()).actors[0]
     having.placement[0, 3], lacking.placement[0, 3] = -2.0, 2.0

@@ -37,7 +37,7 @@ def test_bright_light_follows_the_tone_curve(offscreen, light):
     assert pixel.max() < 255
 
 
-def test_numbers_shown_as_colours_have_no_tone_curve(offscreen):
+def test_scalar_colours_have_no_tone_curve(offscreen):
     """A normal towards the eye is full blue."""
     assert draw(offscreen, scene_of(WHITE), plain(shading="normals"))[50, 50, 2] == 255
 

@@ -5,7 +5,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import frozen
 
 
-def test_frozen_copies_what_the_caller_can_change():
+def test_frozen_copies_writable_arrays():
     values = np.array([1.0, 2.0])
     kept = frozen("x", values, (2,))
     values[0] = 9.0
@@ -13,7 +13,7 @@ def test_frozen_copies_what_the_caller_can_change():
     assert values.flags.writeable
 
 
-def test_frozen_copies_a_read_only_view_of_something_that_can_change():
+def test_frozen_copies_a_read_only_view_of_a_writable_array():
     base = np.array([1.0, 2.0, 3.0])
     view = base[:2]
     view.flags.writeable = False
@@ -22,7 +22,7 @@ def test_frozen_copies_a_read_only_view_of_something_that_can_change():
     assert kept.tolist() == [1.0, 2.0]
 
 
-def test_frozen_takes_a_locked_array_as_it_is():
+def test_frozen_keeps_a_read_only_array():
     values = np.array([1.0, 2.0])
     values.flags.writeable = False
     assert frozen("x", values, (2,)) is values
@@ -50,7 +50,7 @@ def test_frozen_converts_lists_and_types():
         ([[0.0, -np.inf]], (1, 2), "x: expected finite numbers, found -inf at index 0, 1"),
     ],
 )
-def test_frozen_refuses_with_the_name_and_what_it_found(values, shape, message):
+def test_frozen_error_gives_the_name_and_the_value(values, shape, message):
     with pytest.raises(RigError) as caught:
         frozen("x", values, shape)
     assert str(caught.value) == message
@@ -59,13 +59,13 @@ def test_frozen_refuses_with_the_name_and_what_it_found(values, shape, message):
 @pytest.mark.parametrize(
     "values", [[0.5], [2.0**40], [np.nan], np.array([2**40]), [-(2.0**31) - 1]]
 )
-def test_frozen_refuses_to_cut_numbers_down_to_integers(values):
+def test_frozen_refuses_to_truncate_to_integers(values):
     with pytest.raises(RigError) as caught:
         frozen("parents", values, (1,), np.int32)
     assert str(caught.value) == "parents: expected whole numbers that fit int32"
 
 
 @pytest.mark.parametrize("values", [["a"], [[1.0], [1.0, 2.0]], [object()]])
-def test_frozen_refuses_what_is_no_array_of_numbers(values):
+def test_frozen_refuses_non_numeric_arrays(values):
     with pytest.raises(RigError, match=r"^x: expected numbers, found "):
         frozen("x", values, (None,))

@@ -40,7 +40,7 @@ def test_too_many_weights_are_refused():
     assert str(caught.value) == "expected at most 3 shape weights, found 4"
 
 
-def test_shapes_belong_to_the_shape_unless_told_otherwise():
+def test_blend_shapes_belong_to_the_shape_group_by_default():
     assert shapes().groups == ("shape",) * 3
     assert (shapes().n_shapes, shapes().n_vertices) == (3, 2)
 
@@ -84,7 +84,7 @@ def test_deferred_offsets_are_read_once_and_only_for_a_weight_that_is_not_zero()
     assert loads == [1]
 
 
-def test_corrective_weights_are_the_rows_of_the_rotations_less_the_identity():
+def test_corrective_weights_are_rotation_entries_minus_the_identity():
     rotations = np.array([turn_x(0.3), turn_z(np.pi / 2), np.eye(3)])
     found = corrective_weights(rotations)
     # Rz(90) is ((0,-1,0), (1,0,0), (0,0,1)); the root does not count.
@@ -103,7 +103,7 @@ def random_correctives(n_joints, n_vertices=7, seed=0):
 @pytest.mark.parametrize(
     "turned", [(), (1,), (5,), (1, 2), (2, 4), (1, 5), (1, 2, 3, 4, 5)], ids=str
 )
-def test_correctives_are_the_weighted_sum_whatever_joints_turn(turned):
+def test_correctives_are_the_weighted_sum_for_any_rotated_joints(turned):
     offsets = random_correctives(6)
     rotations = np.tile(np.eye(3), (6, 1, 1))
     for joint in turned:
@@ -113,7 +113,7 @@ def test_correctives_are_the_weighted_sum_whatever_joints_turn(turned):
     assert_allclose(Correctives(offsets).displacement(weights), expected, atol=1e-13)
 
 
-def test_active_rows_are_the_runs_of_turned_joints():
+def test_active_rows_are_runs_of_rotated_joints():
     weights = np.zeros((5, 9))
     weights[[0, 1, 3], [8, 0, 4]] = 1.0, -2.0, 1e-300
     assert active_rows(weights.ravel()) == [slice(0, 18), slice(27, 36)]
@@ -122,7 +122,7 @@ def test_active_rows_are_the_runs_of_turned_joints():
     assert active_rows(np.zeros(0)) == []
 
 
-def test_deferred_correctives_are_read_when_a_joint_turns():
+def test_deferred_correctives_are_read_when_a_joint_rotates():
     offsets = random_correctives(3)
     deferred, loads = counted(offsets)
     lazy = Correctives(deferred)
@@ -139,7 +139,7 @@ def test_correctives_need_nine_rows_a_joint():
     assert str(caught.value) == "offsets: expected nine for each joint but the root, found 10"
 
 
-def test_joints_are_regressed_as_by_the_dense_matrix():
+def test_sparse_regression_matches_the_dense_matrix():
     rng = np.random.default_rng(1)
     dense = rng.normal(size=(6, 20)) * (rng.random((6, 20)) < 0.3)
     dense[4] = 0.0  # a joint with an empty regressor row stays at the origin

@@ -16,7 +16,7 @@ def load(shared, name):
     return viewer.load(shared / f"{name}.skel", shared / f"{name}.skin").actors[0].figure
 
 
-def test_knee_of_the_robot(shared):
+def test_robot_knee(shared):
     robot = viewer.load(shared / "test.skel").actors[0].figure.skeleton
     pose = rest_pose(robot)
     assert robot.names[5] == "knee_r"

@@ -15,7 +15,7 @@ SHAPE = mesh([[0, 0, 0], [1, 0, 0]])
 SKIN = skin_from_lists([[(0, 1.0)], [(0, 1.0)]], ONE)
 
 
-def test_figure_may_lack_any_part_but_both():
+def test_figure_needs_a_mesh_or_a_skeleton():
     assert not Figure("a", mesh=SHAPE).is_attached
     assert not Figure("a", skeleton=skeleton([-1])).is_attached
     assert not Figure("a", mesh=SHAPE, skin=SKIN).is_attached
@@ -52,7 +52,7 @@ def test_skeleton_points_without_boxes_are_the_joints():
     assert_allclose(skeleton_points(arm, rest_pose(arm)), [[0, 1, 0], [0, 3, 0]], atol=1e-15)
 
 
-def test_skeleton_points_hold_all_corners_of_turned_boxes():
+def test_skeleton_points_include_all_corners_of_rotated_boxes():
     box = [[[0, 0, 0], [1, 2, 3]]]
     arm = skeleton([-1], [(0, "z", math.pi / 2)], offsets=[[10, 0, 0]], boxes=box)
     points = skeleton_points(arm, rest_pose(arm))
@@ -61,7 +61,7 @@ def test_skeleton_points_hold_all_corners_of_turned_boxes():
     assert {tuple(np.round(point, 12) + 0.0) for point in points} == corners
 
 
-def test_attached_figure_has_all_its_parts():
+def test_assembled_figure_has_all_its_parts():
     bones = skeleton([-1])
     whole = Figure("whole", mesh=SHAPE, skeleton=bones, skin=SKIN).attached()
     assert (whole.mesh, whole.skeleton, whole.skin) == (SHAPE, bones, SKIN)
@@ -75,7 +75,7 @@ def test_attached_figure_has_all_its_parts():
         ({"mesh": SHAPE, "skeleton": skeleton([-1])}, "skin"),
     ],
 )
-def test_missing_part_of_an_attached_figure_is_named(parts, missing):
+def test_missing_part_of_an_assembled_figure_is_named(parts, missing):
     figure = Figure("a", **parts)
     for ask in (figure.attached, getattr(figure, f"require_{missing}")):
         with pytest.raises(RigError, match=f"^figure a has no {missing}$"):

@@ -22,7 +22,7 @@ def test_flat_hand_leaves_the_mean_out():
     assert hand_vectors(HAND, np.array([2.0, -1.0]), flat=True).tolist() == [[2, -3, 0], [0, 4, 0]]
 
 
-def test_no_coefficients_give_the_mean_hand():
+def test_empty_coefficients_give_the_mean_hand():
     assert hand_vectors(HAND, np.zeros(0), flat=False).ravel().tolist() == MEAN
     assert hand_vectors(HAND, np.zeros(0), flat=True).tolist() == [[0, 0, 0]] * 2
 
@@ -34,7 +34,7 @@ def test_more_coefficients_than_components_are_refused():
 
 
 @pytest.mark.parametrize("flat", [True, False])
-def test_coefficients_come_back(flat):
+def test_coefficients_round_trip(flat):
     rng = np.random.default_rng(0)
     components = rng.normal(size=(20, 45))  # not orthogonal
     hand = Hand("right", np.arange(15), components, rng.normal(size=45))
@@ -44,7 +44,7 @@ def test_coefficients_come_back(flat):
         assert_allclose(hand_coefficients(hand, vectors, flat, count), wanted, atol=1e-12)
 
 
-def test_coefficients_give_the_nearest_hand_they_can_make():
+def test_coefficients_give_the_nearest_representable_hand():
     # Of (5, 7, 0, 0, 0, 0) component 0, of length sqrt 5, holds 5 / 5 and component 1 holds 7 / 3.
     vectors = np.array([[5.0, 7, 0], [0, 0, 0]])
     assert_allclose(hand_coefficients(HAND, vectors, True, 1), [1.0], atol=1e-14)

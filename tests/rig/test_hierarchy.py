@@ -19,19 +19,19 @@ def walks_back(parents: list[int], joint: int) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_members_of_cycles_are_those_who_meet_themselves(seed: int) -> None:
+def test_cycle_members_are_their_own_ancestors(seed: int) -> None:
     rng = np.random.default_rng(seed)
     parents = rng.integers(-1, 30, 30)
     expected = [walks_back(parents.tolist(), joint) for joint in range(30)]
     assert cycle_members(parents).tolist() == expected
 
 
-def test_what_is_no_index_is_no_parent() -> None:
+def test_invalid_index_is_not_a_parent() -> None:
     parents = np.array([-1.0, 0.5, np.nan, 99.0, -7.0, 5.0])
     assert cycle_members(parents).tolist() == [False] * 5 + [True]
 
 
-def test_a_long_ring() -> None:
+def test_a_long_cycle() -> None:
     parents = np.roll(np.arange(1000), 1)
     assert cycle_members(parents).all()
     parents[0] = -1

@@ -20,7 +20,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 CORNERS = np.array([[0.0, 0, 0], [4, 0, 0], [0, 8, 0], [0, 0, 16]])
 
 
-def test_place_on_a_triangle_is_the_weighted_mean_of_its_corners():
+def test_keypoint_on_a_triangle_is_the_weighted_mean_of_its_corners():
     points = Keypoints(("a", "b"), [-1, -1], [[0, 1, 2], [3, 3, 1]], [[0.5, 0.25, 0.25], [0, 1, 0]])
     found = keypoint_positions(points, CORNERS, np.zeros((1, 3)))
     assert found.tolist() == [[1, 2, 0], [0, 0, 16]]
@@ -56,7 +56,7 @@ def test_keypoints_follow_the_pose():
     assert_allclose(posed_keypoints(figure, pose), expected, atol=1e-14)
 
 
-def test_keypoints_follow_the_place_of_the_figure():
+def test_keypoints_follow_the_placement():
     figure = arm()
     pose = rest_pose(figure.skeleton)
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 0, 1)
@@ -94,7 +94,7 @@ def test_keypoints_are_those_of_the_whole_mesh_with_shape_and_correctives(tmp_pa
         assert_allclose(found, expected, atol=1e-13)
 
 
-def test_some_vertices_move_as_the_whole_figure_does(tmp_path):
+def test_subset_of_vertices_moves_as_in_the_whole_figure(tmp_path):
     figure = family_figure("smpl", tmp_path)
     chosen = np.array([90, 3, 3, 41], dtype=np.int32)
     part = some_vertices(figure, chosen)
@@ -129,7 +129,7 @@ def test_keypoints_read_no_more_of_the_file_than_they_need(tmp_path):
         ),
     ],
 )
-def test_annotations_refuse_what_does_not_fit(make, message):
+def test_annotations_refuse_mismatched_arrays(make, message):
     with pytest.raises(RigError) as caught:
         make()
     assert str(caught.value) == message

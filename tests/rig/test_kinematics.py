@@ -21,7 +21,7 @@ def random_locals(n_joints, seed):
 
 
 @pytest.mark.parametrize("n_joints", [1, 2, 3, 4, 5, 62])
-def test_chain_equals_the_plain_product(n_joints):
+def test_chain_equals_the_direct_product(n_joints):
     parents = np.arange(-1, n_joints - 1, dtype=np.int32)
     local = random_locals(n_joints, n_joints)
     expected = plain_kinematics(parents, local)
@@ -29,21 +29,21 @@ def test_chain_equals_the_plain_product(n_joints):
     assert_allclose(forward_kinematics(parents, local), expected, atol=1e-12)
 
 
-def test_chain_of_1000_equals_the_plain_product():
+def test_chain_of_1000_equals_the_direct_product():
     parents = np.arange(-1, 999, dtype=np.int32)
     local = random_locals(1000, 7)
     world, expected = forward_kinematics(parents, local), plain_kinematics(parents, local)
     assert_allclose(world, expected, atol=1e-10)  # 1000 products of rounding 1e-16 and length 1000
 
 
-def test_chain_of_unit_steps_counts_them():
+def test_chain_of_unit_offsets_adds_up():
     parents = np.arange(-1, 999, dtype=np.int32)
     local = np.tile(matrix(None, (1.0, 0, 0)), (1000, 1, 1))
     assert forward_kinematics(parents, local)[:, 0, 3].tolist() == list(range(1, 1001))
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_random_tree_equals_the_plain_product(seed):
+def test_random_tree_equals_the_direct_product(seed):
     rng = np.random.default_rng(seed)
     n_joints = int(rng.integers(1, 80))
     # A few joints become further roots.
@@ -53,7 +53,7 @@ def test_random_tree_equals_the_plain_product(seed):
     assert_allclose(forward_kinematics(parents.astype(np.int32), local), expected, atol=1e-12)
 
 
-def test_star_equals_the_plain_product():
+def test_star_equals_the_direct_product():
     parents = np.array([-1] + [0] * 50, dtype=np.int32)
     local = random_locals(51, 3)
     assert_allclose(
@@ -78,7 +78,7 @@ def test_forward_kinematics_changes_neither_argument():
     assert np.array_equal(local, before)
 
 
-def test_world_matrices_turn_the_child_about_its_parent():
+def test_world_matrices_rotate_the_child_about_its_parent():
     # An arm of length 2 along x, on a root at (0, 1, 0) rotated by 90 degrees about z.
     arm = skeleton([-1, 0], [(0, "z", math.pi / 2)], offsets=[[0, 1, 0], [2, 0, 0]])
     world = world_matrices(arm, rest_pose(arm))

@@ -21,7 +21,7 @@ def test_a_result_is_made_once() -> None:
     assert made == [1]
 
 
-def test_the_oldest_makes_room() -> None:
+def test_the_oldest_result_is_evicted() -> None:
     memo: Memo[Owner, int] = Memo(kept=2)
     owner, made = Owner(), []
 
@@ -32,7 +32,7 @@ def test_the_oldest_makes_room() -> None:
     assert made == [1, 2, 3, 1]
 
 
-def test_results_go_with_their_owner() -> None:
+def test_results_are_freed_with_their_owner() -> None:
     memo: Memo[Owner, Owner] = Memo()
     owner = Owner()
     gone = weakref.ref(memo.get(owner, "a", Owner))
@@ -42,7 +42,7 @@ def test_results_go_with_their_owner() -> None:
     assert gone() is None
 
 
-def test_threads_that_take_each_others_room_get_their_own() -> None:
+def test_threads_evicting_each_other_get_their_own_results() -> None:
     """One result is kept, and a second thread requests another one while the first is computed."""
     memo: Memo[Owner, str] = Memo(kept=1)
     owner, inside, go = Owner(), threading.Event(), threading.Event()
@@ -63,7 +63,7 @@ def test_threads_that_take_each_others_room_get_their_own() -> None:
     assert memo.get(owner, "slow", lambda: "again") == "slow"
 
 
-def test_threads_that_change_places_all_the_time_never_fail() -> None:
+def test_threads_alternating_constantly_never_fail() -> None:
     memo: Memo[Owner, int] = Memo(kept=1)
     owner = Owner()
     wrong: list[int] = []

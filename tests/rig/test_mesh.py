@@ -51,7 +51,7 @@ def test_mesh_refuses_parts_that_do_not_fit(changes, message):
     assert str(caught.value) == message
 
 
-def test_material_picture_needs_four_channels():
+def test_material_texture_needs_four_channels():
     with pytest.raises(RigError) as caught:
         Texture("a.png", np.zeros((2, 2, 3), np.uint8))
     assert str(caught.value) == "image: expected shape any x any x 4, found 2 x 2 x 3"
@@ -82,7 +82,7 @@ def test_vertex_normals_are_weighted_by_area():
     assert normals[4].tolist() == [1, 0, 0]
 
 
-def test_vertex_normals_point_up_where_there_is_no_area():
+def test_vertex_normals_point_up_for_zero_area():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [7, 7, 7]])
     normals = vertex_normals(positions, np.array([[0, 1, 2]]))
     assert normals.tolist() == [[0, 1, 0]] * 4

@@ -37,7 +37,7 @@ def check_split(mesh: Mesh) -> None:
     assert len(set(zip(sources.tolist(), uv_indices.tolist(), strict=True))) == len(sources)
 
 
-def test_cube_is_split_once_per_corner_of_a_side():
+def test_cube_is_split_once_per_face_corner():
     uvs, corners = atlas()
     cube = build(uvs=uvs, uv_triangles=corners)
     sources, _, _ = split_seams(cube)
@@ -51,14 +51,14 @@ def test_coordinates_that_follow_the_vertices_split_nothing():
     check_split(cube)
 
 
-def test_mesh_with_one_coordinate_a_vertex_is_left_as_it_is():
+def test_mesh_with_one_coordinate_per_vertex_is_unchanged():
     for cube in (build(uvs=np.zeros((8, 2))), build()):
         sources, uv_indices, triangles = split_seams(cube)
         assert sources.tolist() == uv_indices.tolist() == list(range(8))
         assert triangles is cube.triangles
 
 
-def test_vertices_of_no_triangle_stay():
+def test_vertices_without_triangles_stay():
     positions = np.vstack([[[9.0, 9, 9]], CORNERS, [[8.0, 8, 8]]])
     uvs, corners = atlas()
     cube = build(positions, CUBE + 1, uvs=uvs, uv_triangles=corners)

@@ -47,7 +47,7 @@ def test_several_weights_add_up_from_the_base():
     assert changed.mesh.normals.tolist() == [[0, 0, 1], [4, 0, -2], [0, 0.5, 0.5]]
 
 
-def test_skinning_turns_the_morphed_normals_and_then_makes_them_unit():
+def test_skinning_rotates_the_morphed_normals_then_normalises_them():
     whole = with_morphs(figure(), [LIFTED, WIDE])
     pose = figure_pose(whole)
     pose.shape_weights[:] = 0.5, 2.0
@@ -73,7 +73,7 @@ def test_joints_bindings_and_weights_of_0_stay():
     assert_array_equal(changed.skin.inverse_bind, plain.skin.inverse_bind)
 
 
-def test_target_without_normals_leaves_those_of_the_mesh():
+def test_target_without_normals_keeps_those_of_the_mesh():
     bare = MorphTarget("bare", [0], [[1.0, 1, 1]])
     changed = shaped(with_morphs(figure(), [bare]), np.array([1.0]))
     assert changed.mesh.normals.tolist() == NORMALS
@@ -84,7 +84,7 @@ def test_names_and_groups_are_those_of_the_targets():
     assert shapes.names == ("lifted", "wide") and shapes.groups == ("morph", "morph")
 
 
-def test_more_morphs_follow_those_there_are():
+def test_additional_morphs_are_appended():
     one_by_one = with_morphs(with_morphs(figure(), [LIFTED]), [WIDE]).blend_shapes
     together = with_morphs(figure(), [LIFTED, WIDE]).blend_shapes
     assert one_by_one.names == together.names
@@ -92,13 +92,13 @@ def test_more_morphs_follow_those_there_are():
     assert_array_equal(one_by_one.normal_offsets, together.normal_offsets)
 
 
-def test_no_targets_leave_the_figure_itself():
+def test_no_targets_return_the_figure_itself():
     plain = figure()
     assert with_morphs(plain, []) is plain
 
 
 @pytest.mark.parametrize("index", [3, -1])
-def test_vertex_outside_the_mesh_is_refused_with_both_numbers(index):
+def test_vertex_outside_the_mesh_is_refused_with_index_and_count(index):
     target = MorphTarget("smile", [0, index], np.zeros((2, 3)), np.zeros((2, 3)))
     with pytest.raises(RigError) as caught:
         with_morphs(figure(), [target])
@@ -124,7 +124,7 @@ def test_target_that_lists_a_vertex_twice_is_refused():
     assert str(caught.value) == "morph smile: a vertex is listed twice"
 
 
-def test_normal_offsets_may_wait_in_the_file():
+def test_normal_offsets_may_be_read_lazily():
     asked = []
 
     def load():
@@ -144,7 +144,7 @@ def test_normal_offsets_of_another_shape_are_refused():
     assert str(caught.value) == "normal_offsets: expected shape (1, 3, 3), found (1, 2, 3)"
 
 
-def test_recorded_pose_brings_the_weights_of_morphs_back():
+def test_recorded_pose_restores_morph_weights():
     whole = with_morphs(figure(), [LIFTED, WIDE])
     pose = figure_pose(whole)
     pose.shape_weights[:] = 0.25, 0.75

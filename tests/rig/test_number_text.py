@@ -31,7 +31,7 @@ def test_zero_has_no_minus(value, spec, text):
     assert number_text(value, spec) == text
 
 
-def test_angles_come_in_the_unit_that_is_shown():
+def test_angles_use_the_shown_unit():
     assert angle_text(math.pi / 2, in_degrees=True) == "90.0\N{DEGREE SIGN}"
     assert angle_text(0.5, in_degrees=False) == "0.500 rad"
     assert angle_text(-1e-6, in_degrees=True, sign="+") == "+0.0\N{DEGREE SIGN}"
@@ -57,6 +57,6 @@ def test_short_numbers_keep_three_digits():
         (-0.00004, "%.4f rad", 0.0),
     ],
 )
-def test_widgets_get_a_plain_zero_where_they_would_show_a_minus(value, text, shown):
+def test_widgets_get_zero_instead_of_negative_zero(value, text, shown):
     found = plain_zero(value, text)
     assert found == shown and math.copysign(1.0, found) == (-1.0 if shown < 0.0 else 1.0)

@@ -36,13 +36,13 @@ def euler_joint(order, values, offset=(0.0, 0.0, 0.0)):
 @pytest.mark.parametrize(
     "angles", [(0, 0, 0), (0.1, 0.2, 0.3), (-1.5, 2.0, 3.0), (math.pi / 2,) * 3, (9.0, -8.0, 7.0)]
 )
-def test_local_matrix_is_the_printed_one(angles):
+def test_local_matrix_matches_the_documented_one(angles):
     joint = euler_joint("xyz", angles, (1.0, -2.0, 3.0))
     local = local_matrices(joint, rest_pose(joint))
     assert_allclose(local[0], printed_matrix(*angles, (1.0, -2.0, 3.0)), atol=ROUNDING)
 
 
-def test_quarter_turns_about_x_then_y_then_z_by_hand():
+def test_quarter_turns_about_x_then_y_then_z_match_hand_calculation():
     # z axis: x rotates it to -y, y preserves it, z rotates -y to +x.
     joint = euler_joint("xyz", [math.pi / 2] * 3)
     local = local_matrices(joint, rest_pose(joint))[0]
@@ -67,7 +67,7 @@ def test_dof_rows_of_several_joints_may_be_interleaved():
     assert_allclose(local[1], matrix(turn_x(-0.7) @ turn_z(0.3), (5, 1, 1)), atol=ROUNDING)
 
 
-def test_translation_dofs_are_added_to_the_offset_and_not_turned():
+def test_translation_dofs_are_added_to_the_offset_unrotated():
     rows = [(0, "tx", 1.0), (0, "z", math.pi / 2), (0, "ty", 2.0), (0, "tz", 3.0), (0, "tx", 0.5)]
     joint = skeleton([-1], rows, offsets=[[10, 20, 30]])
     local = local_matrices(joint, rest_pose(joint))[0]

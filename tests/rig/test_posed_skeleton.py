@@ -40,7 +40,7 @@ def runs(monkeypatch):
     return counted
 
 
-def test_matrices_are_those_of_the_pose(actor):
+def test_matrices_match_the_pose(actor):
     figure, pose = actor.figure, actor.pose
     posed, world = posed_skeleton(figure.skeleton, pose), world_matrices(figure.skeleton, pose)
     assert_array_equal(posed.world, world)
@@ -49,7 +49,7 @@ def test_matrices_are_those_of_the_pose(actor):
     )
 
 
-def test_kinematics_run_once_until_a_number_changes(actor, runs):
+def test_kinematics_run_once_until_a_value_changes(actor, runs):
     skeleton, pose = actor.figure.skeleton, actor.pose
     first = posed_skeleton(skeleton, pose)
     assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
@@ -59,7 +59,7 @@ def test_kinematics_run_once_until_a_number_changes(actor, runs):
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_every_number_of_the_joints_counts(actor, name):
+def test_every_joint_value_invalidates_the_cache(actor, name):
     skeleton, pose = actor.figure.skeleton, actor.pose
     first, key = posed_skeleton(skeleton, pose), pose.skinning_key
     getattr(pose, name)[-1] += 0.25
@@ -113,7 +113,7 @@ def test_poses_computed_together_keep_theirs(actor, runs):
     assert len(runs) == 1 and posed_skeleton(skeleton, poses[0]) is kept[0]
 
 
-def test_keys_of_poses_tell_every_number_and_restore_it(actor):
+def test_pose_keys_record_and_restore_every_value(actor):
     pose, key = actor.pose, pose_key(actor.pose)
     again = pose_of(key)
     assert pose_key(again) == key
@@ -126,7 +126,7 @@ def test_keys_of_poses_tell_every_number_and_restore_it(actor):
     assert pose_key(again) != key
 
 
-def test_keys_know_arrays_of_other_layout_and_count():
+def test_keys_distinguish_array_layouts_and_sizes():
     square = np.arange(9.0).reshape(3, 3)
     key = NumberKey(square[:, ::2], np.zeros(0))
     assert key.updated(square[:, ::2], np.zeros(0)) is key

@@ -18,7 +18,7 @@ def test_actor_takes_the_rest_pose_of_its_figure():
     assert cloud([[0, 0, 0]]).pose is None
 
 
-def test_actors_of_one_figure_move_on_their_own():
+def test_actors_of_one_figure_move_independently():
     figure = Figure("a", skeleton=skeleton([-1], [(0, "tx", 0.0)]))
     first, second = Actor(figure), Actor(figure)
     first.pose.dofs[0] = 5.0
@@ -63,12 +63,12 @@ def test_scene_box_keeps_every_point_of_a_small_figure():
     assert scene_box(Scene([cloud(points)]))[1].tolist() == [1e30] * 3
 
 
-def test_scene_is_up_as_its_first_figure():
+def test_scene_up_axis_is_that_of_its_first_figure():
     assert Scene([]).up == "y"
     assert Scene([Actor(Figure("a", mesh=mesh([[0, 0, 0]]), up="z"))]).up == "z"
 
 
-def test_actor_without_pose_or_motion_says_so():
+def test_actor_without_pose_or_motion_is_reported():
     actor = cloud([[0, 0, 0]])
     with pytest.raises(RigError, match=r"^cloud has no pose, as it has no skeleton$"):
         actor.require_pose()

@@ -103,7 +103,7 @@ def test_rest_pose_of_a_shaped_figure_returns_the_shaped_mesh():
     assert_allclose(moves, [[0, 2.5, 0], [0, 2.5, 0], [0, 2.5, 0], [-1.4, 2.5, 0]], atol=1e-15)
 
 
-def test_joint_turns_about_its_shaped_place():
+def test_joint_rotates_about_its_shaped_position():
     figure = arm()
     pose = figure_pose(figure)
     pose.shape_weights[:] = 1.0, 0.0
@@ -246,7 +246,7 @@ class Owner:
     """An object that supports weak references."""
 
 
-def test_memo_makes_once_keeps_a_few_and_forgets_with_the_owner():
+def test_memo_caches_a_few_results_per_owner():
     memo, owner, made = Memo(kept=2), Owner(), []
 
     def make(value):
@@ -262,7 +262,7 @@ def test_memo_makes_once_keeps_a_few_and_forgets_with_the_owner():
     assert made[-1] == "other"
 
 
-def test_shaped_figures_go_with_their_figure():
+def test_shaped_figures_are_freed_with_their_figure():
     figure = arm()
     gone = weakref.ref(shaped(figure, np.array([1.0, 0.0])))
     assert gone() is not None

@@ -108,7 +108,7 @@ def test_clamp_dofs_leaves_unlimited_values_alone():
     ]
 
 
-def test_joint_labels_tell_repeated_and_unnamed_joints_apart():
+def test_joint_labels_distinguish_repeated_and_unnamed_joints():
     assert joint_labels(LEG) == ("root", "knee#1", "#2", "knee#3")
     assert tuple(joint_label(LEG, joint) for joint in range(4)) == joint_labels(LEG)
 
@@ -125,7 +125,7 @@ def test_find_dof_finds_every_label():
 @pytest.mark.parametrize(
     ("label", "dof"), [("ROOT.X", 1), ("root.TY", 0), ("#1.z", 3), ("KNEE#1.x", 2), ("#0.x", 1)]
 )
-def test_find_dof_takes_any_case_and_a_bare_index(label, dof):
+def test_find_dof_accepts_any_case_and_a_bare_index(label, dof):
     assert find_dof(LEG, label) == dof
 
 
@@ -134,7 +134,7 @@ def test_find_dof_prefers_the_exact_case():
     assert (find_dof(both, "arm.x"), find_dof(both, "Arm.x")) == (1, 0)
 
 
-def test_find_dof_takes_names_with_dots_and_blanks():
+def test_find_dof_accepts_names_with_dots_and_blanks():
     dotted = skeleton([-1], [(0, "x", 0.0)], names=["left arm.001"])
     assert find_dof(dotted, "left arm.001.x") == 0
 
@@ -152,7 +152,7 @@ def test_find_dof_takes_names_with_dots_and_blanks():
         ("root#1.x", 'no joint is called "root#1"; did you mean root?'),
     ],
 )
-def test_find_dof_says_what_is_wrong(label, message):
+def test_find_dof_reports_errors(label, message):
     with pytest.raises(RigError) as caught:
         find_dof(LEG, label)
     assert str(caught.value) == message

@@ -27,7 +27,7 @@ def test_weight_sums_are_as_stored():
     assert weight_sums(MIXED).tolist() == [0.75, 0.0, 0.0, 0.0]
 
 
-def test_has_influence_needs_a_weight_that_is_not_zero():
+def test_has_influence_needs_a_nonzero_weight():
     assert has_influence(MIXED).tolist() == [True, False, False, True]
 
 

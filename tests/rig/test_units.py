@@ -15,7 +15,7 @@ def test_factors_are_those_of_the_units():
 
 
 @pytest.mark.parametrize("unit", SIZES)
-def test_sizes_hold_people_from_newborn_to_tallest(unit):
+def test_sizes_cover_people_from_newborn_to_tallest(unit):
     low, high = SIZES[unit]
     smallest = 0.5 if unit != "m" else 0.3
     assert low * METRES[unit] <= smallest and high * METRES[unit] == pytest.approx(3.5)
@@ -24,7 +24,7 @@ def test_sizes_hold_people_from_newborn_to_tallest(unit):
 @pytest.mark.parametrize(
     ("size", "expected"), [(0.0, False), (0.29, False), (0.3, True), (3.5, True), (3.6, False)]
 )
-def test_metres_are_between_infant_and_giant(size, expected):
+def test_metres_are_inferred_between_infant_and_giant(size, expected):
     assert is_metres(size) == expected
 
 
@@ -54,5 +54,5 @@ def test_small_lengths_are_millimetres_in_every_known_unit(unit, text):
         ("furlong", 1.0, ""),
     ],
 )
-def test_unit_of_a_figure_of_the_same_kind_is_judged_by_its_size(unit, scale, expected):
+def test_unit_of_a_similar_figure_is_inferred_from_its_size(unit, scale, expected):
     assert unit_of_scaled(unit, scale) == expected

@@ -1,4 +1,4 @@
-"""The scene's clock: what time is shown after so much wall clock time, in every mode."""
+"""The scene clock: scene time as a function of wall-clock time in every mode."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_shows_the_start_of_all_clips_and_ends_with_the_longest():
     assert not playback.playing
 
 
-def test_scene_that_says_its_time_is_shown_there():
+def test_clock_starts_at_the_time_of_the_scene():
     scene = Scene([actor(keyed())])
     scene.time = 2.5
     playback = Clock()
@@ -75,7 +75,7 @@ def test_scene_that_says_its_time_is_shown_there():
         ("run on", -4.0, 1.0, -3.0, True),
     ],
 )
-def test_time_moves_by_the_mode(mode, speed, seconds, shown, playing):
+def test_time_advances_by_playback_mode(mode, speed, seconds, shown, playing):
     playback = clock(keyed(), mode=mode, speed=speed)
     for _ in range(10):
         playback.advance(seconds / 10)
@@ -99,7 +99,7 @@ def test_last_captured_frame_lasts_as_long_as_the_others():
     assert playback.time == pytest.approx(0.05)
 
 
-def test_steps_go_to_whole_frames_and_stop():
+def test_steps_snap_to_whole_frames_and_stop_at_the_ends():
     playback = clock(captured())
     playback.advance(0.6)  # between frames 2 and 3
     playback.step(1)
@@ -115,7 +115,7 @@ def test_steps_go_to_whole_frames_and_stop():
     assert playback.time == 2.0
 
 
-def test_range_keeps_to_the_clips_and_to_order():
+def test_range_stays_within_the_clips_and_ordered():
     playback = clock(keyed())
     playback.set_range(9.0, 2.0)
     assert (playback.start, playback.end) == (2.0, 5.0)
@@ -124,7 +124,7 @@ def test_range_keeps_to_the_clips_and_to_order():
     assert playback.time == pytest.approx(2.5)
 
 
-def test_playing_once_again_starts_over():
+def test_playing_a_finished_clip_restarts_it():
     playback = clock(keyed(), mode="once")
     playback.advance(100.0)
     assert (playback.time, playback.playing) == (5.0, False)
@@ -136,7 +136,7 @@ def test_playing_once_again_starts_over():
     assert backwards.time == 5.0
 
 
-def test_one_frame_neither_moves_nor_divides_by_zero():
+def test_single_frame_neither_advances_nor_divides_by_zero():
     for mode in ("loop", "once", "ping-pong"):
         playback = clock(captured(frames=1), mode=mode)
         playback.advance(1.0)
@@ -156,7 +156,7 @@ def test_whole_range_grows_with_captures_but_a_chosen_one_stays():
     assert (playback.whole, playback.start, playback.end) == ((0.0, 3.0), 0.5, 1.0)
 
 
-def test_nothing_that_moves_does_not_play():
+def test_scene_without_motion_does_not_play():
     playback = Clock()
     playback.show(Scene([actor(None)]))
     playback.playing = True
@@ -164,7 +164,7 @@ def test_nothing_that_moves_does_not_play():
     assert playback.time == 0.0
 
 
-def test_frames_are_those_of_the_chosen_actor_so_that_each_can_be_reached():
+def test_every_frame_of_the_active_actor_can_be_reached():
     one, other = actor(captured(4, 30.0, 0)), actor(captured(5, 50.0, 0))
     other.offset = 0.005
     scene = Scene([one, other])
@@ -188,7 +188,7 @@ def test_frames_are_those_of_the_chosen_actor_so_that_each_can_be_reached():
     assert playback.frame_range == (0, 3) and playback.frame == 1
 
 
-def test_the_clock_has_no_time_but_that_of_its_scene():
+def test_the_clock_reads_its_time_from_the_scene():
     scene = Scene([actor(keyed())])
     playback = Clock()
     playback.show(scene)
@@ -215,7 +215,7 @@ def test_actors_are_posed_once_until_time_clips_or_gaps_change():
     assert playback.pose(again=True) and playback.n_posed == 6
 
 
-def test_another_scene_is_posed_though_time_is_the_same():
+def test_new_scene_is_posed_even_at_the_same_time():
     playback = Clock()
     for _ in range(2):
         scene = Scene([actor(captured())])

@@ -8,7 +8,7 @@ from viewer.app.core.jobs import CountedJob, Report
 from viewer.errors import RigError
 
 
-def test_counted_job_says_how_far_it_is_and_what_was_done() -> None:
+def test_counted_job_reports_progress_and_result() -> None:
     reached, go = threading.Event(), threading.Event()
 
     def act(report: Report) -> list[str]:
@@ -25,7 +25,7 @@ def test_counted_job_says_how_far_it_is_and_what_was_done() -> None:
     assert job.is_done and job.lines == ["done"] and job.error == ""
 
 
-def test_counted_job_keeps_its_title_where_the_work_says_nothing() -> None:
+def test_counted_job_keeps_its_title_if_no_step_is_named() -> None:
     def act(report: Report) -> list[str]:
         report(0, 1, "")
         return []
@@ -55,7 +55,7 @@ def test_cancelled_job_is_done_at_once_and_ends_before_its_next_step() -> None:
     assert not after and job.lines == [] and job.error == "" and job.title == "first"
 
 
-def test_refusals_are_kept_as_words() -> None:
+def test_errors_are_kept_as_messages() -> None:
     def refuse(report: Report) -> list[str]:
         raise RigError("figure box has no mesh")
 

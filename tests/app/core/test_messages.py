@@ -1,4 +1,4 @@
-"""What was said is kept, counted and bounded; the window that lists it; its place in the view."""
+"""The message log (kept, counted, bounded), its window, and message positions in the view."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def texts_of(log):
     return [(message.text, message.count) for message in log]
 
 
-def test_log_counts_what_is_said_again_and_moves_it_to_the_end():
+def test_log_counts_repeated_messages_and_moves_them_to_the_end():
     log = MessageLog()
     for text in ("a", "b", "a", "c", "a"):
         log.add(text)
@@ -34,7 +34,7 @@ def test_log_keeps_the_latest_thousand():
     assert texts_of(log)[0] == ("message 3", 1) and texts_of(log)[-1] == ("message 1002", 1)
 
 
-def test_log_tells_what_keys_did_from_the_rest():
+def test_log_separates_key_feedback_from_messages():
     log = MessageLog()
     log.add("no normals")
     log.add("Wireframe on", "status")
@@ -55,7 +55,7 @@ def test_message_line(message, line):
     assert message_line(message) == line
 
 
-def test_warnings_of_a_scene_are_said_and_kept_from_the_start(rig):
+def test_scene_warnings_are_shown_and_logged_from_the_start(rig):
     scene = viewer.load(*rig)
     scene.diagnostics = (
         Diagnostic("M007.computed", Path("tiny.skin"), values={"n": 3, "vertex": 0}),
@@ -66,7 +66,7 @@ def test_warnings_of_a_scene_are_said_and_kept_from_the_start(rig):
     assert [message.text for message in state.messages.log] == list(scene.warnings)
 
 
-def test_notes_go_but_stay_in_the_log(hand, monkeypatch):
+def test_notes_disappear_but_stay_in_the_log(hand, monkeypatch):
     hand.state.say("three joints were left out")
     hand.step(1)
     assert hand.says("three joints")
@@ -76,7 +76,7 @@ def test_notes_go_but_stay_in_the_log(hand, monkeypatch):
     assert ("three joints were left out", 1) in texts_of(hand.state.messages.log)
 
 
-def test_note_that_is_said_again_is_shown_once(hand):
+def test_repeated_note_is_shown_once(hand):
     for _ in range(5):
         hand.state.say("the driver has no such thing")
     assert [note.text for note in hand.state.messages.notes] == ["the driver has no such thing"]
@@ -108,7 +108,7 @@ def test_key_and_menu_open_the_window_and_escape_closes_it(hand, texts):
     assert hand.state.messages.is_open
 
 
-def test_window_says_that_there_is_nothing(hand, texts):
+def test_empty_message_window_says_so(hand, texts):
     hand.key("m", "ctrl")
     hand.step(2)
     assert "no messages yet" in texts
@@ -140,7 +140,7 @@ def test_keys_act_while_the_window_is_open(hand):
     ("heights", "room", "count"),
     [
         ([10, 10, 10], 30, 3),
-        ([10, 10, 10], 29, 1),  # one, and the line that tells of the other two
+        ([10, 10, 10], 29, 1),  # one, and the line that counts the other two
         ([10, 10, 10], 19, 0),
         ([10] * 20, 1000, 8),
         ([10] * 8, 1000, 8),
@@ -192,7 +192,7 @@ def test_progress_messages_and_legend_never_overlap(drive, rig, size, has_legend
     hand.state.job = None
 
 
-def test_messages_without_room_are_only_counted(drive, rig, texts):
+def test_messages_that_do_not_fit_are_only_counted(drive, rig, texts):
     hand = drive(*rig, size=(700, 250), samples=1)
     hand.state.messages.notes.clear()
     hand.state.say(*("a long message, " + "and more " * 30 + str(n) for n in range(3)))
@@ -205,13 +205,13 @@ def test_messages_without_room_are_only_counted(drive, rig, texts):
     assert "3 messages (Window > Messages)" in texts
 
 
-def test_picture_of_the_interface_shows_warnings_however_long_it_takes(drive, rig, monkeypatch):
+def test_interface_image_shows_warnings_however_long_rendering_takes(drive, rig, monkeypatch):
     scene = viewer.load(*rig)
     values = {"n": 3, "vertex": 0}
     scene.diagnostics = (Diagnostic("M007.computed", Path("tiny.skin"), values=values),)
     hand = drive(scene=scene, samples=1)
     for note in hand.state.messages.notes:
-        note.until = 1e11  # as if it had been said just before the next line
+        note.until = 1e11  # as if shown just before the next line
     plain = hand.app.picture()
     monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
     late = hand.app.picture()

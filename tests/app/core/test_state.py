@@ -1,4 +1,4 @@
-"""The state of the window: its core, and what features keep in it."""
+"""Window state: the core and the state of features."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_a_feature_s_state_can_be_replaced():
     assert state.put(other) is other and state.of(Notebook) is other is not first
 
 
-def test_choices_of_actors_are_counted_and_drop_the_selected_joint():
+def test_changing_the_active_actor_is_counted_and_deselects_the_joint():
     state = make_state(viewer.load())
     state.selected_joint, before = 1, state.n_choices
     state.choose_actor(0)

@@ -1,4 +1,4 @@
-"""Changes that the history notices, and what undo brings back."""
+"""Changes detected by the undo history, and what undo restores."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_an_edited_placement_is_a_step(watched):
     assert history.observe(scene, options, busy=False)
 
 
-def test_poses_set_by_the_clock_are_no_step(watched):
+def test_poses_set_by_the_clock_are_not_undo_steps(watched):
     history, scene, options = watched
     scene.actors[0].pose.dofs[0] += 0.25
     history.follow(1.0)

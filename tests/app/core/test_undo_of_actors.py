@@ -1,4 +1,4 @@
-"""Undoing brings back who was there, not only how they were posed."""
+"""Undo restores the set of actors, not only their poses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def names(hand):
     return [actor.name for actor in hand.state.scene.actors]
 
 
-def test_actors_that_came_and_went_are_undone(hand):
+def test_added_and_removed_actors_are_undone(hand):
     state = hand.state
     first = state.actor
     other = Actor(first.figure)
@@ -33,7 +33,7 @@ def test_actors_that_came_and_went_are_undone(hand):
     hand.assert_sane()
 
 
-def test_chosen_actor_stays_chosen_where_it_is_now(hand):
+def test_active_actor_stays_active_at_its_new_index(hand):
     state = hand.state
     first, other = state.actor, Actor(state.actor.figure)
     state.scene.actors[:] = [other, first]
@@ -45,7 +45,7 @@ def test_chosen_actor_stays_chosen_where_it_is_now(hand):
     assert state.chosen_actor == 1 and state.actor is first
 
 
-def test_poses_of_actors_that_went_come_back_with_them(hand):
+def test_poses_of_removed_actors_are_restored_with_them(hand):
     state = hand.state
     dof = hand.dof_index("arm.x")
     first = state.actor
@@ -53,14 +53,14 @@ def test_poses_of_actors_that_went_come_back_with_them(hand):
     hand.step(2)
     state.scene.actors[0] = Actor(first.figure)
     hand.step(2)
-    first.pose.dofs[dof] = -3.0  # nobody sees it
+    first.pose.dofs[dof] = -3.0  # invisible
     hand.key("z", "ctrl")
     assert state.actor is first and first.pose.dofs[dof] == 0.7
     hand.key("z", "ctrl")
     assert first.pose.dofs[dof] == 0.2
 
 
-def test_another_look_is_no_step(hand):
+def test_display_change_is_not_an_undo_step(hand):
     state = hand.state
     state.options.wireframe = True
     hand.step(2)
@@ -73,7 +73,7 @@ def test_another_look_is_no_step(hand):
     assert not state.options.wireframe and state.actor.visible
 
 
-def test_people_that_are_still_read_join_every_step(drive, rig):
+def test_people_still_loading_join_every_undo_step(drive, rig):
     hand = drive(scene=people(rig, [True] * 5), samples=1)
     state = hand.state
     state.scene.actors.append(Actor(state.actor.figure))

@@ -1,4 +1,4 @@
-"""The camera fits the free view until somebody moves it; the ground follows shapes."""
+"""The camera fits the free view until the user moves it; the ground follows shapes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROOM = 1.08  # around a fitted figure
 
 
 def reach(hand, points=None):
-    """Return how far points come to the edges of the view: 1 is at an edge, across and up."""
+    """Return the extent of points relative to the view, across and up: 1 is at an edge."""
     points = scene_points(hand.state.scene) if points is None else points
     x, y, width, height = hand.state.view_rect
     seen = view_frame(hand.state).project(points) - (x + width / 2, y + height / 2)
@@ -41,14 +41,14 @@ def is_fitted(hand, points=None):
 
 
 def resize(hand, width, height):
-    """Let the window have another size; the framebuffer of the tests is large enough."""
+    """Resize the window; the framebuffer of the tests is large enough."""
     hand.io.display_size = (width, height)
     hand.step(4)
 
 
 @pytest.fixture
 def wide(drive, tmp_path):
-    """A hand on a bar ten times as wide as high, just opened in a window."""
+    """A test driver on a bar ten times as wide as high, just opened in a window."""
     hand = drive(bar(tmp_path / "bar.obj"), size=(1200, 700), samples=1)
     hand.state.framing.restart()
     hand.step(2)
@@ -98,7 +98,7 @@ def _slide(hand):
 
 
 @pytest.mark.parametrize("move", [_orbit, _zoom, _pan, _slide])
-def test_fit_is_over_when_somebody_moves_the_camera(wide, move):
+def test_moving_the_camera_ends_the_fit(wide, move):
     move(wide)
     camera = wide.state.camera.copy()
     wide.key("tab")
@@ -148,7 +148,7 @@ def test_second_file_is_fitted_and_seen_from_its_front(wide, tmp_path):
     wide.open(sided_skel(tmp_path / "turned.skel", "-z"))
     wide.step(3)
     assert wide.state.camera.front == 180
-    assert wide.state.camera.azimuth == pytest.approx(-160)  # 20 degrees from ahead, as before
+    assert wide.state.camera.azimuth == pytest.approx(-160)  # 20 degrees from the front, as before
     assert is_fitted(wide)
     resize(wide, 1000, 700)
     assert is_fitted(wide)
@@ -162,7 +162,7 @@ def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_
     hand.key("_3")
     assert hand.state.camera.azimuth == -90
     hand.pick("Front axis", 0)
-    assert hand.state.camera.front == 90  # +x is ahead now
+    assert hand.state.camera.front == 90  # +x is the front now
     assert abs(hand.state.camera.azimuth) == 180  # and its left hand is seen as before
     hand.key("_1")
     assert hand.state.camera.azimuth == 90
@@ -170,7 +170,7 @@ def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_
     assert hand.state.camera.front == 180
 
 
-def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
+def test_whole_motion_is_framed_as_in_a_recording(drive, rig):
     scene = people(rig, [True] * 40)
     hand = drive(scene=scene, size=(1200, 700), samples=1)
     hand.state.framing.restart()
@@ -194,7 +194,7 @@ def test_whole_motion_is_fitted_as_a_recording_is(drive, rig):
     assert hand.state.camera.distance == camera.distance
 
 
-def test_fit_keeps_up_with_a_capture_that_is_read(streaming):
+def test_fit_keeps_up_with_a_loading_capture(streaming):
     streaming.start(capture(100, 5, 3))
     finish(streaming)
     streaming.step(40)
@@ -209,7 +209,7 @@ def test_fit_keeps_up_with_a_capture_that_is_read(streaming):
     assert is_fitted(streaming, points)
 
 
-def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
+def test_fit_keeps_a_camera_moved_while_a_capture_loads(streaming):
     streaming.start(capture(100, 5, 3))
     _zoom(streaming)
     camera = streaming.state.camera.copy()
@@ -221,7 +221,7 @@ def test_fit_leaves_a_camera_that_was_moved_while_a_capture_is_read(streaming):
 
 
 @pytest.mark.parametrize("edit", ["key", "offset and key", "undo"])
-def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
+def test_views_fit_the_edited_motion(drive, rig, tmp_path, edit):
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=(1200, 700), samples=1)
     hand.state.framing.restart()
@@ -232,7 +232,7 @@ def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
         hand.step(3)
     place_key(hand.state, (0, 1), value=20.0)  # root x, at its end
     hand.step(3)
-    assert hand.state.camera.distance == before  # the edit is to be seen
+    assert hand.state.camera.distance == before  # the edit must be visible
     if edit == "undo":
         hand.key("z", "ctrl")
         hand.step(3)
@@ -246,7 +246,7 @@ def test_views_fit_the_motion_as_it_was_edited(drive, rig, tmp_path, edit):
         assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
 
 
-def test_tools_cover_nothing_that_is_fitted(drive, tmp_path):
+def test_toolbar_does_not_cover_the_fitted_view(drive, tmp_path):
     hand = drive(sided_skel(tmp_path / "tall.skel", "+z", 3.0), size=(1200, 700), samples=1)
     points = scene_points(hand.state.scene)
     fit(hand.state.camera, points, hand.state.aspect)
@@ -263,7 +263,7 @@ def _is_covered(hand, points):
     return ((seen[:, 0] > x0) & (seen[:, 1] < y1)).any()
 
 
-def test_ground_stays_under_the_feet_of_another_shape(box):
+def test_ground_stays_under_the_feet_when_the_shape_changes(box):
     box.state.framing.restart()
     box.step(2)
     camera = box.state.camera.copy()
@@ -272,7 +272,7 @@ def test_ground_stays_under_the_feet_of_another_shape(box):
     box.step(2)
     taller = box_body.HEIGHT * (1 + 3.0 * box_body.STATURE)
     assert box.state.box[:, 1] == pytest.approx([-taller / 2, taller / 2])
-    # The camera stays: that the figure grew is to be seen.
+    # The camera stays, so that the growth of the figure is visible.
     assert box.state.camera.distance == camera.distance
     box.state.actor.pose.shape_weights[0] = 0.0
     box.step(2)
@@ -292,7 +292,7 @@ def test_ground_does_not_follow_poses(box):
     assert box.state.box[0, 1] == pytest.approx(-taller / 2)
 
 
-def test_picture_is_drawn_anew_when_the_ground_moves(box):
+def test_view_is_redrawn_when_the_ground_moves(box):
     box.step(2)
     before = box.scene_picture()
     box.state.actor.pose.shape_weights[0] = 3.0
@@ -301,7 +301,7 @@ def test_picture_is_drawn_anew_when_the_ground_moves(box):
 
 
 def test_ground_of_a_moving_figure_follows_its_shape(box):
-    """The lowest frame is looked at first, the others after it."""
+    """The lowest frame is evaluated first, the others after it."""
     actor = box.state.actor
     count = actor.figure.skeleton.n_joints
     actor.clip = walk([True] * 20, count)
@@ -320,7 +320,7 @@ def test_ground_of_a_moving_figure_follows_its_shape(box):
     assert box.state.camera.distance == camera.distance
 
 
-def test_another_figure_in_place_of_one_is_looked_at_as_it_is(box, rig):
+def test_scene_box_follows_a_replaced_figure(box, rig):
     box.step(2)
     other = viewer.load(*rig).actors[0]
     box.state.actor.figure, box.state.actor.pose = other.figure, other.pose

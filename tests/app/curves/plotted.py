@@ -1,4 +1,4 @@
-"""A clip of the tiny rig in the Curves panel, and places in its plot."""
+"""A clip of the tiny rig in the Curves panel, and positions in its plot."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _scale(hand):
 
 
 def _at(hand, time, degrees):
-    """Return where a time and a value are on the screen."""
+    """Return the screen position of a time and a value."""
     (x0, y0), (across, up) = _center(hand, "key arm.x 0"), _scale(hand)
     return (
         x0 + across * (time - _arm(hand).times[0]),

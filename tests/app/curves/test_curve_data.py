@@ -30,7 +30,7 @@ def turning(angles, rows=None, rate=10.0, **more):
     return SampledClip("turn", Timing(rate, rows, start=5.0), turns, **more)
 
 
-def test_curves_of_keys_are_the_dofs():
+def test_keyed_clip_has_a_curve_per_dof():
     curves = curves_of(Actor(rig(), clip=Clip("c", (), 0.0, 1.0)))
     assert [(c.label, c.number, c.axis, c.is_angle) for c in curves] == [
         ("root.tx", 0, 0, False),
@@ -39,13 +39,13 @@ def test_curves_of_keys_are_the_dofs():
     ]
 
 
-def test_curves_of_frames_are_the_place_and_three_angles_a_joint():
+def test_sampled_animation_has_curves_for_position_and_three_angles_per_joint():
     labels = [c.label for c in curves_of(Actor(rig(), clip=turning([0.0])))]
     joints = [f"{name}.{axis}" for name in ("root", "#1") for axis in "xyz"]
     assert labels == ["place.x", "place.y", "place.z", *joints]
 
 
-def test_curves_of_points_are_coordinates_and_nothing_has_none():
+def test_captured_points_have_coordinate_curves_and_still_figures_none():
     layout = PointLayout("one", ("nose",), np.zeros((0, 2)), np.zeros(1))
     clip = PointClip("p", Timing(10.0, np.arange(1)), np.ones((1, 1, 4)))
     labels = [c.label for c in curves_of(Actor(Figure("p", points=layout), clip=clip))]
@@ -62,7 +62,7 @@ def test_channels_are_found_by_their_target():
     assert keyed_values(clip, (2,), times).tolist() == [[7], [7]]
 
 
-def test_frames_are_met_exactly_and_angles_run_on():
+def test_curves_pass_through_frames_and_angles_are_unwrapped():
     angles = np.linspace(0, 1.4, 15)
     clip = turning(angles)
     times, values = sampled_points(clip, 3 + 3 * 1 + 1, 0.0, 99.0)
@@ -76,13 +76,13 @@ def test_frames_are_met_exactly_and_angles_run_on():
     assert_allclose(sampled_points(long, 5, 0, 9)[1], np.arange(40) / 2, atol=1e-9)
 
 
-def test_gaps_are_gaps():
+def test_missing_frames_leave_gaps_in_curves():
     _, values = sampled_points(turning([0.1, 0.2, 0.3], rows=[0, -1, -1, 1, 2]), 7, 0, 9)
     assert_array_equal(np.isnan(values), [False, True, True, False, False])
     assert_allclose(values[[0, 3, 4]], [0.1, 0.2, 0.3], atol=1e-12)
 
 
-def test_place_is_that_of_the_figure_and_of_the_root_in_it():
+def test_position_combines_figure_and_root():
     inner = np.zeros((2, 2, 3))
     inner[:, 0] = [[1, 2, 3], [4, 5, 6]]
     clip = turning([0, 0], figure_translations=np.array([[10.0, 0, 0], [20, 0, 0]]),
@@ -95,7 +95,7 @@ def test_place_is_that_of_the_figure_and_of_the_root_in_it():
     assert sampled_points(turning([0, 0]), 1, 0, 9)[1].tolist() == [0, 0]
 
 
-def test_unseen_points_are_gaps():
+def test_unseen_points_leave_gaps():
     points = np.ones((3, 2, 4))
     points[:, 1, 2] = 4, 5, 6
     points[1, 1, 3] = 0.0
@@ -105,7 +105,7 @@ def test_unseen_points_are_gaps():
 
 
 @pytest.mark.parametrize(("low", "high"), [(5.0, 1005.0), (5.0, 6.0), (500.0, 510.0), (990, 2e3)])
-def test_long_motions_are_thinned_out_only_as_needed(low, high):
+def test_long_motions_are_decimated_only_as_needed(low, high):
     count, rate = 10_000, 10.0
     angles = np.sin(np.arange(count) / 50)
     clip = turning(angles, rate=rate)
@@ -113,14 +113,14 @@ def test_long_motions_are_thinned_out_only_as_needed(low, high):
     assert len(times) <= 2000
     frames = np.round((times - 5.0) * rate).astype(int)
     assert_allclose(values, angles[frames], atol=1e-12)
-    # All that is looked at is there, from end to end.
+    # The visible range is covered from end to end.
     assert times[0] <= low and (times[-1] >= high or frames[-1] >= count - 1 - np.diff(frames)[0])
     # ... with every frame if they are few.
     if (high - low) * rate < 900:
         assert (np.diff(frames) == 1).all()
 
 
-def test_neighbouring_looks_share_their_points():
+def test_adjacent_views_share_their_samples():
     clip = turning(np.zeros(10_000))
     first = sampled_points(clip, 7, 100.0, 110.0)
     assert sampled_points(clip, 7, 100.5, 110.5) is first

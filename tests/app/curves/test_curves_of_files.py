@@ -75,7 +75,7 @@ def test_opened_clip_is_never_replaced(curves, tmp_path):
     assert (tmp_path / "wave.anim").read_text() == clip_text()
 
 
-def test_keys_are_left_alone_while_something_is_typed(curves):
+def test_keys_are_unchanged_while_typing(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.click("Curve filter")
     curves.type("arm")
@@ -100,7 +100,7 @@ def _sampled(rig):
     return scene
 
 
-def test_frames_are_shown_and_nothing_about_them_can_be_changed(drive, rig):
+def test_frames_are_shown_read_only(drive, rig):
     hand = drive(scene=_sampled(rig), size=SIZE, samples=1)
     hand.show_panel("Curves")
     hand.state.selected_joint = 1
@@ -135,7 +135,7 @@ def test_captured_points_have_curves_too(drive):
     assert hand.state.of(Curves).rows == (3,) and not hand.state.error
 
 
-def test_choice_starts_anew_with_another_actor(drive, rig, tmp_path):
+def test_selection_resets_with_another_actor(drive, rig, tmp_path):
     (tmp_path / "wave.anim").write_text(clip_text())
     scene = viewer.load(*rig, tmp_path / "wave.anim")
     scene.actors += _sampled(rig).actors
@@ -151,7 +151,7 @@ def test_choice_starts_anew_with_another_actor(drive, rig, tmp_path):
     assert hand.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
 
 
-def test_thousands_of_keys_are_drawn_but_not_taken_hold_of(curves):
+def test_thousands_of_keys_are_drawn_but_cannot_be_dragged(curves):
     from viewer.rig.motion.clip_edit import clip_from_frames
 
     times = np.linspace(0, 2, 4000)
@@ -170,7 +170,7 @@ def test_thousands_of_keys_are_drawn_but_not_taken_hold_of(curves):
     curves.assert_sane()
 
 
-def test_far_times_and_values_do_no_harm(curves):
+def test_extreme_times_and_values_are_harmless(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     _type_into(curves, "Value", "900000000")
@@ -183,7 +183,7 @@ def test_far_times_and_values_do_no_harm(curves):
 
 
 @pytest.mark.golden("app_curves")
-def test_panel_looks_as_it_did(curves):
+def test_panel_matches_golden_image(curves):
     curves.click("curves of arm")
     curves.state.clock.seek(0.5)
     curves.step(3)

@@ -36,7 +36,7 @@ def test_curves_follow_the_selected_joint_and_the_list(curves):
     assert curves.undo_steps == 0
 
 
-def test_filter_lists_only_what_has_it_in_its_name(curves):
+def test_filter_lists_only_matching_names(curves):
     curves.click("Curve filter")
     curves.type("m.z")
     curves.step(2)
@@ -60,7 +60,7 @@ def test_all_keys_of_the_shown_curves_are_drawn_where_they_are(curves):
     assert x0 < x < x1 and y0 < y < y1
 
 
-def test_wheel_zooms_drag_pans_and_fit_shows_all_again(curves):
+def test_wheel_zooms_drag_pans_and_fit_shows_everything(curves):
     before = _scale(curves)[0]
     x, y = _center(curves, "key arm.x 1")
     for _ in range(6):
@@ -80,7 +80,7 @@ def test_wheel_zooms_drag_pans_and_fit_shows_all_again(curves):
 # Keys by mouse
 
 
-def test_dragged_key_goes_where_the_mouse_is_as_one_step(curves):
+def test_dragged_key_follows_the_mouse_as_one_undo_step(curves):
     old, (across, up) = _clip(curves), _scale(curves)
     x, y = _center(curves, "key arm.x 1")
     curves.pull((x, y), (x + 60, y - 24))
@@ -115,7 +115,7 @@ def test_dragged_key_stops_at_its_neighbours(curves):
     assert _arm(curves).times[2] == 2.0
 
 
-def test_shift_takes_more_keys_and_they_move_together(curves):
+def test_shift_extends_the_selection_and_keys_move_together(curves):
     curves.click(_center(curves, "key arm.x 0"))
     curves.click(_center(curves, "key arm.x 1"), held="shift")
     assert _chosen(curves) == [(ARM_X, 0), (ARM_X, 1)]
@@ -126,7 +126,7 @@ def test_shift_takes_more_keys_and_they_move_together(curves):
     assert times[2] == 2.0
 
 
-def test_click_on_nothing_drops_the_choice(curves):
+def test_click_on_empty_space_clears_the_selection(curves):
     curves.click(_center(curves, "key arm.x 1"))
     assert _chosen(curves) == [(ARM_X, 1)]
     curves.click(_at(curves, 1.5, -15.0))
@@ -157,7 +157,7 @@ def test_insert_adds_a_key_to_the_nearest_curve(curves):
     assert arm_z.times == pytest.approx([0, 1.2], abs=0.02) and arm_z.values[1] == -0.1
 
 
-def test_add_key_adds_one_to_each_shown_curve_at_the_present_time(curves):
+def test_add_key_adds_one_to_each_shown_curve_at_the_current_time(curves):
     curves.click("curves of arm")
     curves.state.clock.seek(0.5)
     curves.click("Add key")
@@ -167,7 +167,7 @@ def test_add_key_adds_one_to_each_shown_curve_at_the_present_time(curves):
     assert curves.undo_steps == 1
 
 
-def test_keys_work_while_the_mouse_is_on_a_key_or_line(curves):
+def test_shortcuts_work_while_the_mouse_is_over_a_key_or_line(curves):
     curves.click(_center(curves, "key arm.x 1"))
     assert _chosen(curves) == [(ARM_X, 1)]
     curves.key("delete")  # the mouse is still there
@@ -175,13 +175,13 @@ def test_keys_work_while_the_mouse_is_on_a_key_or_line(curves):
     assert_array_equal(_arm(curves).times, [0.0, 2.0])
     curves.state.clock.seek(1.3)
     curves.step(2)
-    curves.move(_at(curves, 1.3, 5.0))  # on the line of the present time
+    curves.move(_at(curves, 1.3, 5.0))  # on the line of the current time
     curves.key("insert")
     curves.step(2)
     assert _arm(curves).times == pytest.approx([0.0, 1.3, 2.0], abs=0.02)
 
 
-def test_insert_on_a_key_chooses_it_and_makes_no_second_one(curves):
+def test_insert_on_a_key_selects_it_without_adding_another(curves):
     curves.move(_center(curves, "key arm.x 1"))
     curves.key("insert")
     curves.step(2)
@@ -199,7 +199,7 @@ def test_delete_does_nothing_while_a_key_is_dragged(curves):
     assert len(_arm(curves).times) == 3
 
 
-def test_delete_removes_the_chosen_keys(curves):
+def test_delete_removes_the_selected_keys(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.move(_at(curves, 1.5, 10.0))
     curves.key("delete")
@@ -212,7 +212,7 @@ def test_delete_removes_the_chosen_keys(curves):
     assert _arm(curves).times.tolist() == [0, 1]
 
 
-def test_last_key_may_go_and_come_again(curves):
+def test_last_key_can_be_deleted_and_added_again(curves):
     curves.click("curve arm.y")
     curves.step(2)
     curves.click(_center(curves, "key arm.y 0"))
@@ -231,7 +231,7 @@ def _knob(hand, side):
 
 
 @pytest.mark.parametrize("side", [0, 1])
-def test_dragged_tangent_becomes_the_slope_of_its_line(curves, side):
+def test_dragged_tangent_sets_the_slope(curves, side):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     across, up = _scale(curves)
@@ -249,7 +249,7 @@ def test_dragged_tangent_becomes_the_slope_of_its_line(curves, side):
     assert _arm(curves).tangents[1] == ("smooth", "smooth")
 
 
-def test_shift_turns_both_tangents(curves):
+def test_shift_rotates_both_tangents(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     x, y, key = _knob(curves, 1)
@@ -281,7 +281,7 @@ def test_rules_are_chosen_from_lists(curves):
     assert curves.undo_steps == 3
 
 
-def test_numbers_are_typed_in_the_shown_unit(curves):
+def test_values_are_typed_in_the_shown_unit(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     _type_into(curves, "Time", "0.75")

@@ -1,4 +1,4 @@
-"""Undo and redo of key edits: time, curve and pose come back as one state."""
+"""Undo and redo of key edits restore time, curve and pose together."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def go(hand, time):
 
 
 def assert_follows_its_clip(hand, time):
-    """Check that the figure is posed as its clip says at a time, which is the one shown."""
+    """Check that the clock shows a time and the figure has the clip's pose at it."""
     actor = hand.state.actor
     assert hand.state.clock.time == time and hand.state.scene.time == time
     wanted = [float(evaluate(channel, np.array(time))) for channel in actor.clip.channels]
@@ -64,7 +64,7 @@ def test_undoing_a_key_edit_shows_the_restored_clip(curves, name, held, monkeypa
     state = curves.state
     old = state.actor.clip
     state.of(Curves).keys = frozenset({KEY})
-    # Extrapolation is seen outside of the keys alone.
+    # Extrapolation is visible only outside the keys.
     time = -0.25 if name == "extrapolation" else 0.75
     state.clock.mode = "run on"
     go(curves, time)
@@ -98,7 +98,7 @@ def test_undoing_a_dragged_key_shows_the_restored_clip(curves):
     assert curves.dof("arm.x") == pytest.approx(0.6)
 
 
-def test_undo_goes_to_the_time_of_the_edit_and_so_does_redo(curves):
+def test_undo_and_redo_jump_to_the_time_of_the_edit(curves):
     go(curves, 0.75)
     EDITS["value"](curves.state)
     curves.step(2)
@@ -110,7 +110,7 @@ def test_undo_goes_to_the_time_of_the_edit_and_so_does_redo(curves):
     assert_follows_its_clip(curves, 0.75)
 
 
-def test_undoing_what_is_no_motion_leaves_the_time(curves):
+def test_undoing_other_edits_keeps_the_time(curves):
     go(curves, 0.75)
     curves.key("w")
     go(curves, 1.5)
@@ -119,7 +119,7 @@ def test_undoing_what_is_no_motion_leaves_the_time(curves):
     assert_follows_its_clip(curves, 1.5)
 
 
-def test_undo_while_playing_goes_on_with_the_restored_clip(curves):
+def test_undo_while_playing_continues_with_the_restored_clip(curves):
     state = curves.state
     old = state.actor.clip
     go(curves, 0.5)
@@ -133,7 +133,7 @@ def test_undo_while_playing_goes_on_with_the_restored_clip(curves):
     assert_follows_its_clip(curves, state.clock.time)
 
 
-def test_pose_by_hand_comes_back_where_its_key_is_undone(curves):
+def test_manual_pose_is_restored_when_its_key_is_undone(curves):
     state, row = curves.state, ARM_X + 1
     go(curves, 0.75)
     state.actor.pose.dofs[row] = 0.3
@@ -143,7 +143,7 @@ def test_pose_by_hand_comes_back_where_its_key_is_undone(curves):
     assert curves.undo_steps == 2 and curves.dofs()[row] == 0.3
     go(curves, 1.75)
     curves.key("z", "ctrl")
-    assert state.clock.time == 0.75 and curves.dofs()[row] == 0.3  # the hand's, not the clip's
+    assert state.clock.time == 0.75 and curves.dofs()[row] == 0.3  # the manual pose, not the clip's
     curves.key("z", "ctrl")
     assert_follows_its_clip(curves, 0.75)
     curves.key("y", "ctrl")
@@ -172,7 +172,7 @@ def test_undo_of_a_new_clip_and_of_keys_in_it(drive, rig):
     assert_allclose(hand.dofs(), before)
 
 
-def test_undo_of_a_shorter_range_goes_back_to_its_time(curves):
+def test_undo_of_a_shorter_range_restores_the_time(curves):
     go(curves, 1.75)
     set_clip_range(curves.state, 0.0, 1.0)
     curves.step(3)
@@ -181,7 +181,7 @@ def test_undo_of_a_shorter_range_goes_back_to_its_time(curves):
     assert_follows_its_clip(curves, 1.75)
 
 
-def test_undo_of_another_rate_shows_the_same_frame(drive, rig):
+def test_undo_of_a_rate_change_shows_the_same_frame(drive, rig):
     hand = drive(scene=people(rig, [True] * 11), size=SIZE, samples=1)
     go(hand, 0.5)
     before = hand.state.actor.pose.figure_translation.copy()
@@ -204,7 +204,7 @@ def test_undo_of_a_moved_actor_shows_its_clip_at_its_old_offset(curves):
     assert_follows_its_clip(curves, 0.75)
 
 
-def test_captured_points_come_back_with_their_time(drive):
+def test_undo_restores_captured_points_with_the_time(drive):
     hand = drive(scene=Scene([dots([0.5, 0.25, 1, 1])]), size=SIZE, samples=1)
     state = hand.state
     go(hand, state.clock.frame_time(1))
@@ -217,8 +217,8 @@ def test_captured_points_come_back_with_their_time(drive):
     assert_allclose(state.actor.points, before)
 
 
-def test_who_is_absent_comes_back_with_the_time(drive, rig):
-    """Absence is set by the clock; undoing an edit goes to a time with everybody there or not."""
+def test_undo_restores_absence_with_the_time(drive, rig):
+    """The clock sets absence; undoing an edit may jump to a time with absent people."""
     hand = drive(scene=people(rig, [True, True, False, False, True]), size=SIZE, samples=1)
     state = hand.state
     go(hand, 0.2)
@@ -233,7 +233,7 @@ def test_who_is_absent_comes_back_with_the_time(drive, rig):
 
 
 @pytest.mark.parametrize("held", [False, True])
-def test_edits_while_another_actor_plays_have_their_steps(curves, held, monkeypatch):
+def test_edits_while_another_actor_plays_are_undo_steps(curves, held, monkeypatch):
     state = curves.state
     still = Actor(state.actor.figure)
     state.scene.actors.append(still)
@@ -257,7 +257,7 @@ def test_edits_while_another_actor_plays_have_their_steps(curves, held, monkeypa
     assert still.pose.dofs[ARM_X] == 0.4
 
 
-def test_drag_there_and_back_is_no_step(curves, monkeypatch):
+def test_drag_there_and_back_is_not_an_undo_step(curves, monkeypatch):
     pose = curves.state.actor.pose
     monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
     start = pose.dofs[ARM_X]
@@ -286,15 +286,15 @@ def test_undo_twice_before_the_next_frame(curves):
     assert not state.history.can_undo and math.isclose(state.scene.time, 0.75)
 
 
-def test_files_of_a_clip_are_loaded_into_the_state_that_undo_restores(drive, rig, tmp_path):
-    """Poses that were loaded beside a clip are no step of their own."""
+def test_clip_files_are_loaded_into_the_undoable_state(drive, rig, tmp_path):
+    """Poses loaded together with a clip are not a separate undo step."""
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(scene=viewer.load(*rig, tmp_path / "wave.anim"), size=SIZE, samples=1)
     hand.step(3)
     assert hand.undo_steps == 0
 
 
-def test_camera_that_follows_goes_along_with_undo(curves):
+def test_following_camera_moves_with_undo(curves):
     state = curves.state
     go(curves, 0.75)
     start_following(state, 0, 1)
@@ -310,7 +310,7 @@ def test_camera_that_follows_goes_along_with_undo(curves):
     assert_allclose(state.camera.target, target, atol=1e-12)
 
 
-def test_camera_that_follows_stays_where_a_pose_is_edited_by_hand(curves):
+def test_following_camera_stays_put_while_a_pose_is_edited(curves):
     state = curves.state
     start_following(state, 0, 1)
     curves.step(1)

@@ -1,4 +1,4 @@
-"""Poses and pictures dropped on an open figure, and folders dropped on the window."""
+"""Poses and images dropped on an open figure, and folders dropped on the window."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _picture(folder):
 
 @pytest.fixture
 def textured(drive_body, tmp_path):
-    """A hand on a body with texture coordinates, seen from elsewhere, one step in its history."""
+    """A driver on a body with texture coordinates, the camera moved, with one undo step."""
     hand = drive_body("smplx", size=(900, 640))
     hand.state.camera.azimuth, hand.state.camera.distance = 77.0, 9.0
     hand.drag("pelvis.y", 0.6)
@@ -35,7 +35,7 @@ def textured(drive_body, tmp_path):
 
 
 @pytest.mark.parametrize("names", [("pose",), ("picture",), ("picture", "pose")])
-def test_dropped_pose_and_picture_join_the_open_figure(textured, tmp_path, names):
+def test_dropped_pose_and_texture_are_applied_to_the_open_figure(textured, tmp_path, names):
     files = {"pose": tmp_path / "bend.json", "picture": _picture(tmp_path)}
     state = textured.state
     scene, view, before, shown = state.scene, _view(textured), textured.dofs(), state.paths
@@ -48,7 +48,7 @@ def test_dropped_pose_and_picture_join_the_open_figure(textured, tmp_path, names
     assert textured.dof("pelvis.y") == before[textured.dof_index("pelvis.y")]
     has_texture = bool(state.actor.figure.mesh.materials)
     assert has_texture is ("picture" in names)
-    # What is dropped together is one step, its texture too.
+    # Files dropped together are one undo step, including the texture.
     assert textured.undo_steps == 2
     textured.key("z", "ctrl")
     assert textured.dof("left_knee.x") == 0.0
@@ -62,7 +62,7 @@ def test_dropped_pose_and_picture_join_the_open_figure(textured, tmp_path, names
     assert not textured.dofs().any()
 
 
-def test_dropped_pictures_replace_each_other(textured, tmp_path):
+def test_dropped_textures_replace_each_other(textured, tmp_path):
     textured.open(_picture(tmp_path))
     red = textured.scene_picture()
     other = tmp_path / "blue.png"
@@ -72,14 +72,14 @@ def test_dropped_pictures_replace_each_other(textured, tmp_path):
     assert (textured.scene_picture() != red).any()
 
 
-def test_dropped_picture_needs_texture_coordinates(box, tmp_path):
+def test_dropped_texture_needs_texture_coordinates(box, tmp_path):
     figure, before = box.state.actor.figure, _key(box)
     box.open(_picture(tmp_path))
     assert "red.png: cannot apply the picture: box has no texture coordinates" in box.state.error
     assert box.state.actor.figure is figure and _key(box) == before
 
 
-def test_nothing_is_applied_if_one_of_two_does_not_fit(textured, tmp_path):
+def test_no_dropped_file_is_applied_if_one_does_not_fit(textured, tmp_path):
     (tmp_path / "other.json").write_text('{"dofs": {"tail.x": 1}}')
     figure, before = textured.state.actor.figure, _key(textured)
     textured.open(_picture(tmp_path), tmp_path / "other.json")
@@ -119,7 +119,7 @@ def test_dropped_pose_goes_to_the_chosen_actor(drive, rig, tmp_path):
     assert pose_key(hand.state.scene.actors[0].pose) == first
 
 
-def test_dropped_folder_of_tables_opens_as_a_figure(hand, tmp_path):
+def test_dropped_model_folder_opens_as_a_figure(hand, tmp_path):
     hand.open(write_pig(tmp_path / "pig"))
     assert not hand.state.error
     figure = hand.state.actor.figure
@@ -127,7 +127,7 @@ def test_dropped_folder_of_tables_opens_as_a_figure(hand, tmp_path):
     assert hand.state.camera.up == "z" and hand.undo_steps == 0
 
 
-def test_dropped_folder_of_other_things_says_so(hand, tmp_path):
+def test_dropped_folder_of_unknown_files_is_refused(hand, tmp_path):
     (tmp_path / "photos").mkdir()
     scene = hand.state.scene
     hand.open(tmp_path / "photos")

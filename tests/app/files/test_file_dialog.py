@@ -1,4 +1,4 @@
-"""The file dialog: folders, several files, cancelling, and what cannot be read."""
+"""The file dialog: folders, several files, cancelling, and unreadable folders."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.app.files.state import Files
 
 @pytest.fixture
 def dialog(hand, tmp_path):
-    """A hand on an open dialog: rig, a folder with another rig, a text file, a hidden file."""
+    """A driver on an open dialog: rig, a folder with another rig, a text file, a hidden file."""
     inner = tmp_path / "inner"
     inner.mkdir()
     write_rig(inner, "inside")
@@ -54,7 +54,7 @@ def test_dialog_chooses_several_with_ctrl(dialog):
     assert dialog.state.actor.figure.is_attached
 
 
-def test_dialog_plain_click_chooses_anew_and_ctrl_takes_back(dialog):
+def test_dialog_click_replaces_the_selection_and_ctrl_click_deselects(dialog):
     dialog.click("file tiny.skel")
     dialog.click("file tiny.skin")
     assert {path.name for path in dialog.state.of(Files).dialog.chosen} == {"tiny.skin"}
@@ -106,7 +106,7 @@ def test_dialog_follows_a_typed_folder(dialog, tmp_path):
 @pytest.mark.parametrize(
     "text", ["~nobody-is-called-so", "x" * 300, "/nowhere/at/all", "/dev/null"]
 )
-def test_dialog_says_what_is_wrong_with_a_typed_folder(dialog, tmp_path, text):
+def test_dialog_reports_an_invalid_typed_folder(dialog, tmp_path, text):
     _type_folder(dialog, text)
     assert dialog.state.of(Files).dialog.problem
     assert dialog.state.of(Files).dialog.folder == tmp_path.resolve()
@@ -118,7 +118,7 @@ def test_dialog_opens_a_typed_file(dialog, rig):
     assert dialog.state.actor.figure.mesh is None
 
 
-def test_dialog_stays_where_it_was_if_a_folder_cannot_be_read(tmp_path, monkeypatch):
+def test_dialog_keeps_its_folder_if_another_cannot_be_read(tmp_path, monkeypatch):
     dialog = FileDialog(tmp_path)
 
     def refuse(self):

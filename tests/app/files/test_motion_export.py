@@ -1,4 +1,4 @@
-"""Motions exported from the window: beside the frame loop, never over what is open."""
+"""Motion export from the window: in the background, never overwriting open files."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_every_suffix_offered_is_written(moving, tmp_path):
     assert (tmp_path / "slide.bvh").read_text().startswith("HIERARCHY")
 
 
-def test_only_the_range_that_is_played_is_written(moving, tmp_path):
+def test_only_the_playback_range_is_written(moving, tmp_path):
     moving.state.clock.set_range(0.2, 0.5)
     save_motion(moving.state, tmp_path / "part.bvh")
     moving.finish_job()
@@ -43,7 +43,7 @@ def test_only_the_range_that_is_played_is_written(moving, tmp_path):
     assert "Frames: 10\n" in text  # 6 to 15 of 30 a second
 
 
-def test_menu_asks_where_and_says_what_was_written(moving, tmp_path):
+def test_menu_asks_for_a_path_and_reports_what_was_written(moving, tmp_path):
     moving.click("menu File")
     moving.click("Export motion…")
     moving.step(2)
@@ -66,14 +66,14 @@ def test_files_that_are_open_are_never_replaced(moving, tmp_path):
     assert path.read_text() == "precious"
 
 
-def test_folder_that_does_not_exist_is_one_message(moving, tmp_path):
+def test_missing_folder_is_one_message(moving, tmp_path):
     save_motion(moving.state, tmp_path / "no" / "slide.bvh")
     folder = tmp_path / "no"
     assert moving.state.error == f"{folder / 'slide.bvh'}: the folder {folder} does not exist"
     assert moving.state.job is None
 
 
-def test_keys_are_written_at_the_frame_rate_that_is_shown(moving, tmp_path):
+def test_keys_are_written_at_the_shown_frame_rate(moving, tmp_path):
     moving.state.clock.count_by(10.0)
     save_motion(moving.state, tmp_path / "slide.bvh")
     moving.finish_job()
@@ -86,7 +86,7 @@ def test_keys_are_written_at_the_frame_rate_that_is_shown(moving, tmp_path):
 
 @pytest.fixture
 def crowd(drive, rig):
-    """A hand on three people of one capture: the third is there only at its end; and points."""
+    """A driver on three people of one capture: the third appears only at its end; and points."""
     there = np.ones(21, dtype=bool)
     late = np.arange(21) >= 15
     scene = people(rig, there, there, late)
@@ -99,7 +99,7 @@ def frames_of(path):
     return next(int(line.split()[1]) for line in lines if line.startswith("Frames:"))
 
 
-def test_everybody_is_written_a_file_each_as_convert_names_them(crowd, tmp_path):
+def test_every_person_gets_a_file_named_as_by_convert(crowd, tmp_path):
     save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
     assert crowd.state.job.title == "Writing walk-0.bvh and 2 more"
     crowd.finish_job()
@@ -120,7 +120,7 @@ def test_only_the_chosen_actor_is_written_if_asked_for(crowd, tmp_path):
     assert [path.name for path in tmp_path.glob("*.bvh")] == ["walk.bvh"]
 
 
-def test_nobody_there_in_the_range_is_said(drive, rig, tmp_path):
+def test_range_without_people_is_reported(drive, rig, tmp_path):
     scene = people(rig, [True] * 21, [True] * 21)
     scene.actors[1].offset = 10.0
     hand = drive(scene=scene, size=(1000, 700), samples=1)
@@ -145,7 +145,7 @@ def test_all_files_appear_or_none(crowd, tmp_path):
     assert not (tmp_path / "walk-1.bvh").exists()
 
 
-def test_files_of_everybody_that_are_open_are_never_replaced(crowd, tmp_path):
+def test_open_files_are_never_replaced_when_exporting_everyone(crowd, tmp_path):
     path = tmp_path / "walk-1.bvh"
     path.write_text("precious")
     crowd.state.paths = (path,)
@@ -154,7 +154,7 @@ def test_files_of_everybody_that_are_open_are_never_replaced(crowd, tmp_path):
     assert path.read_text() == "precious" and crowd.state.job is None
 
 
-def test_files_of_a_name(crowd, tmp_path):
+def test_file_names_derived_from_one_name(crowd, tmp_path):
     assert motion_files(crowd.state, tmp_path / "a.gltf", True) == [
         *(tmp_path / f"a-{person}.gltf" for person in range(3)),
         *(tmp_path / f"a-{person}.bin" for person in range(3)),
@@ -165,7 +165,7 @@ def test_files_of_a_name(crowd, tmp_path):
 
 @pytest.fixture
 def bodies(drive_body):
-    """A hand on two bodies of the SMPL family in one capture; the second misses a frame."""
+    """A test driver on two bodies of the SMPL family in one capture; the second misses a frame."""
     hand = drive_body("smpl", size=(1000, 700))
     figure = hand.state.actor.figure
     count = figure.skeleton.n_joints
@@ -181,7 +181,7 @@ def bodies(drive_body):
     return hand
 
 
-def test_everybody_goes_into_one_easymocap_folder(bodies, tmp_path):
+def test_all_people_go_into_one_easymocap_folder(bodies, tmp_path):
     save_motion(bodies.state, tmp_path / "out", everyone=True)
     bodies.finish_job()
     assert bodies.state.error == ""
@@ -190,7 +190,7 @@ def test_everybody_goes_into_one_easymocap_folder(bodies, tmp_path):
     assert found == [[3, 7], [3, 7], [3], [3, 7], [3, 7]]
 
 
-def test_amass_is_a_file_each(bodies, tmp_path):
+def test_amass_export_writes_a_file_per_person(bodies, tmp_path):
     save_motion(bodies.state, tmp_path / "take.npz", everyone=True)
     bodies.finish_job()
     assert bodies.state.error == ""
@@ -199,7 +199,7 @@ def test_amass_is_a_file_each(bodies, tmp_path):
     assert (tmp_path / "take-3.npz").exists()
 
 
-def test_folder_that_was_opened_is_never_replaced(bodies, tmp_path):
+def test_opened_folder_is_never_replaced(bodies, tmp_path):
     (tmp_path / "out" / "smpl").mkdir(parents=True)
     bodies.state.paths = (tmp_path / "out",)
     save_motion(bodies.state, tmp_path / "out", everyone=True)
@@ -239,7 +239,7 @@ def test_dialog_warns_of_any_file_that_would_be_replaced(crowd, tmp_path):
     assert "Save###Save" in crowd.state.item_rects
 
 
-def test_dialog_changes_the_suffix_with_the_kind(crowd, tmp_path):
+def test_dialog_changes_the_suffix_with_the_format(crowd, tmp_path):
     _ask(crowd, tmp_path)
     dialog = crowd.state.of(Files).dialog
     kinds = [*motion_suffixes(), FOLDER]
@@ -253,7 +253,7 @@ def test_dialog_changes_the_suffix_with_the_kind(crowd, tmp_path):
     assert dialog.name == "hand.made.bvh"
 
 
-def test_dialog_for_one_actor_does_not_ask_whose(moving, tmp_path):
+def test_dialog_for_one_actor_does_not_ask_for_the_actor(moving, tmp_path):
     _ask(moving, tmp_path)
     assert "Actors##exported" not in moving.state.item_rects and "Format" in moving.state.item_rects
     moving.click("Save###Save")

@@ -1,4 +1,4 @@
-"""Opening files in the window: what stays, what is replaced, what is said."""
+"""Opening files in the window: what is kept and replaced, and messages."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_message_is_copied_by_its_button(hand):
     assert hand.state.error
 
 
-def test_view_answers_again_after_a_message_or_dialog(hand):
+def test_view_responds_again_after_a_message_or_dialog(hand):
     for close in ("escape", "button"):
         hand.state.error = "something"
         hand.step(3)
@@ -93,7 +93,7 @@ def test_camera_keeps_its_direction_for_a_new_figure(hand, tmp_path):
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_dropped_part_joins_its_partner(drive, rig, order):
+def test_dropped_skin_or_skeleton_joins_its_counterpart(drive, rig, order):
     hand = drive(rig[order[0]])
     _open(hand, rig[order[1]])
     assert hand.state.actor.figure.is_attached
@@ -150,7 +150,7 @@ def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):
     loader._started -= 5.0
     hand.step(3)
     assert "Cancel opening" in hand.state.item_rects
-    hand.drag("arm.x", 0.9)  # the window still answers
+    hand.drag("arm.x", 0.9)  # the window still responds
     assert hand.dof("arm.x") != 0.2
     hand.click("Cancel opening")
     assert hand.state.of(Files).loader is None
@@ -175,7 +175,7 @@ def test_escape_cancels_reading(hand, rig, monkeypatch):
     loader.wait()
 
 
-def test_figure_that_the_driver_refuses_keeps_the_scene(hand, tmp_path, monkeypatch):
+def test_figure_refused_by_the_driver_keeps_the_scene(hand, tmp_path, monkeypatch):
     other = tmp_path / "other.skel"
     other.write_text(SKEL)
     scene, picture = hand.state.scene, hand.scene_picture()
@@ -230,7 +230,7 @@ def test_recent_files_open_from_the_menu(hand, rig):
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", "5", "null", '{"a": 1}', "[1, null]", "[" * 20000, "\x00", "[[[]]]"]
 )
-def test_broken_list_of_recent_files_is_empty_or_harmless(hand, text):
+def test_corrupt_list_of_recent_files_is_harmless(hand, text):
     state_folder().mkdir(parents=True)
     (state_folder() / "recent.json").write_text(text)
     recent = load_recent()
@@ -248,7 +248,7 @@ def test_at_most_twelve_groups_are_remembered(tmp_path):
     assert recent[0] == (str((tmp_path / "19.skel").resolve()),)
 
 
-def test_unwritable_state_folder_is_said(tmp_path, monkeypatch):
+def test_unwritable_state_folder_is_reported(tmp_path, monkeypatch):
     blocker = tmp_path / "file"
     blocker.write_text("")
     monkeypatch.setenv("XDG_STATE_HOME", str(blocker))
@@ -263,7 +263,7 @@ def test_undecodable_names_survive_the_list(tmp_path):
     json.loads((state_folder() / "recent.json").read_text("utf-8"))
 
 
-def test_driver_that_refuses_while_drawing_becomes_a_message(hand, monkeypatch):
+def test_driver_error_while_drawing_becomes_a_message(hand, monkeypatch):
     pose = hand.dofs()
 
     def refuse(*arguments, **settings):

@@ -1,4 +1,4 @@
-"""Scenes with findings, and what the Lint panel shows of them."""
+"""Scenes with findings, and queries of the Lint panel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fixtures of the Lint panel."""
+"""Fixtures for Lint panel tests."""
 
 from __future__ import annotations
 

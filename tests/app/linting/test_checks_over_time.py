@@ -20,7 +20,7 @@ def stale(hand, texts):
     return any(text.startswith("The figure, pose or limits have changed") for text in texts)
 
 
-def test_findings_are_stale_while_the_pose_is_another(lint, texts):
+def test_findings_are_stale_while_the_pose_differs(lint, texts):
     hand = lint(LIGHT)
     assert not stale(hand, texts)
     hand.state.actor.pose.dofs[4] = 0.3
@@ -30,7 +30,7 @@ def test_findings_are_stale_while_the_pose_is_another(lint, texts):
     assert not stale(hand, texts)
 
 
-def test_time_makes_nothing_stale_but_posing_does(lint, texts):
+def test_posing_makes_findings_stale_and_time_does_not(lint, texts):
     hand = lint(jump())
     hand.state.clock.playing = True
     hand.step(20)
@@ -45,7 +45,7 @@ def test_time_makes_nothing_stale_but_posing_does(lint, texts):
     assert not stale(hand, texts)
 
 
-def test_recheck_sees_the_pose_and_other_limits(lint, texts):
+def test_recheck_uses_the_current_pose_and_limits(lint, texts):
     hand = lint(column())
     assert codes(hand) == []
     hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_rotation=1.0)
@@ -56,7 +56,7 @@ def test_recheck_sees_the_pose_and_other_limits(lint, texts):
     assert codes(hand) == ["S004"] and not stale(hand, texts)
 
 
-def test_another_scene_has_not_been_checked(lint, rig, texts):
+def test_new_scene_is_unchecked(lint, rig, texts):
     hand = lint(LIGHT)
     hand.click(row_of(hand, "W001"))
     hand.open(*rig)
@@ -70,7 +70,7 @@ def test_another_scene_has_not_been_checked(lint, rig, texts):
     assert hand.state.of(Linting).checked.source is hand.state.scene
 
 
-def test_marks_go_with_the_figure_they_are_on(lint, texts):
+def test_marks_disappear_with_their_figure(lint, texts):
     hand = lint(LIGHT)
     hand.click(row_of(hand, "W001"))
     hand.state.scene.actors[0] = Actor(column())
@@ -78,7 +78,7 @@ def test_marks_go_with_the_figure_they_are_on(lint, texts):
     assert hand.state.of(Linting).marks is None and not marked(hand)
 
 
-def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
+def test_posing_during_a_check_does_not_affect_it(drive, monkeypatch):
     hand = drive(scene=scene_of(column()), size=SIZE, samples=1)
     started, seen, is_held = hold_checks(monkeypatch)
     check_rig(hand.state)
@@ -94,7 +94,7 @@ def test_posing_while_it_checks_changes_nothing_of_it(drive, monkeypatch):
 
 
 def hold_checks(monkeypatch):
-    """Let checks wait after their third step for an event; return it, what came after, and when."""
+    """Block checks after their third step until an event; return it, later steps and times."""
     import threading
 
     go, seen, is_held = threading.Event(), [], threading.Event()

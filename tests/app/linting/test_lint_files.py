@@ -1,4 +1,4 @@
-"""The Lint panel tells what ``viewer lint`` does: files are read again, and gaps lead before."""
+"""The Lint panel matches ``viewer lint``: files are read again; gaps jump to the frame before."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_the_bundled_figure_has_files_too(lint, monkeypatch, capsys):
     assert copied[-1] + "\n" == capsys.readouterr().out
 
 
-def test_rows_say_file_and_line_and_can_be_filtered_by_them(lint, files, texts):
+def test_rows_show_file_and_line_and_can_be_filtered_by_them(lint, files, texts):
     hand = lint(*files)
     texts.clear()
     hand.step()
@@ -83,14 +83,14 @@ def test_rows_say_file_and_line_and_can_be_filtered_by_them(lint, files, texts):
     assert row_of(hand, "C001") in listed and row_of(hand, "W001") not in listed
 
 
-def test_a_reader_s_finding_leads_to_its_vertex(lint, files):
+def test_a_finding_from_a_reader_jumps_to_its_vertex(lint, files):
     hand = lint(*files)
     hand.click(row_of(hand, "M007"))
     assert hand.state.of(Linting).marks.points.shape == (1, 3)
     assert hand.state.camera.target == pytest.approx(hand.state.of(Linting).marks.points[0])
 
 
-def test_files_that_are_gone_or_changed_are_said(lint, files, texts):
+def test_missing_or_changed_files_are_reported(lint, files, texts):
     hand = lint(*files)
     files[1].unlink()
     os.utime(files[0], (time.time() + 100.0,) * 2)
@@ -101,11 +101,11 @@ def test_files_that_are_gone_or_changed_are_said(lint, files, texts):
     assert "a.skel was changed after opening: readers' messages are about the new contents" in texts
 
 
-def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, texts, monkeypatch):
+def test_a_file_only_finding_says_so_and_copies_its_location(lint, files, texts, monkeypatch):
     hand = lint(*files)
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
-    # The second vertex stands in the third line, and the scene has it from before.
+    # The second vertex is on the third line; the scene was loaded before the change.
     files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 nan 0", 1))
     hand.click("Recheck")
     finish(hand)
@@ -122,7 +122,7 @@ def test_a_finding_of_the_file_alone_says_so_and_copies_its_place(lint, files, t
     assert hand.state.of(Linting).chosen == -1 and (hand.state.camera.target == target).all()
 
 
-def test_rows_say_what_a_click_does(lint, files, texts):
+def test_rows_describe_what_a_click_does(lint, files, texts):
     hand = lint(*files)
     row = row_of(hand, "M007")
     hand.move(row)
@@ -148,20 +148,20 @@ def gappy() -> Scene:
     return scene_of(figure, clip)
 
 
-def test_a_gap_leads_to_the_frame_before_it(lint):
+def test_a_gap_jumps_to_the_frame_before_it(lint):
     hand = lint(scene=gappy())
     hand.click(row_of(hand, "C005"))
     playback, view = hand.state.clock, hand.state.of(Linting)
     assert playback.frame + playback.first_frame == 109
     assert view.finding.message == "3 of 60 frames are missing in 1 gap: frames 110 to 112"
     assert hand.state.actor.is_present
-    # Its root is marked, and all of it is seen.
+    # Its root is marked, and all of it is visible.
     assert view.marks.points.tolist() == [[7.0, 0.0, 0.0]]
     assert hand.state.camera.target == pytest.approx([7.0, 2.0, 0.0])
     assert hand.says("Last frame before the gap: the person is absent in the next frame")
 
 
-def test_a_gap_of_captured_points_marks_their_middle(lint):
+def test_a_gap_in_captured_points_marks_their_centre(lint):
     figure, clip = keypoints()
     rows = np.arange(FRAMES)
     rows[30] = -1
@@ -187,7 +187,7 @@ def test_the_ground_is_a_limit(lint):
     assert "Ground height" not in hand.state.item_rects
 
 
-def test_keys_are_counted_as_the_timeline_counts(lint, files):
+def test_keyed_frames_are_numbered_as_in_the_timeline(lint, files):
     hand = lint(*files)
     assert hand.state.of(Linting).checked.options.frame_rate == 30.0
     hand.state.clock.count_by(24.0)

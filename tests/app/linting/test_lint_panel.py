@@ -1,4 +1,4 @@
-"""The Lint panel: checks, its list, where a click leads, marks, and what makes findings stale."""
+"""The Lint panel: checks, the list, jumping to findings, marks, and stale findings."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_menu_entry_opens_the_panel_and_checks(lint):
     assert hand.says("Checked: 0 errors, 1 warning, 0 notes")
 
 
-def test_panel_is_closed_until_it_is_asked_for_and_checks_when_first_shown(drive):
+def test_panel_starts_closed_and_checks_when_first_shown(drive):
     hand = drive(scene=scene_of(LIGHT), size=SIZE, samples=1)
     assert (
         imgui.internal.find_window_by_name("Lint") is None
@@ -66,7 +66,7 @@ def test_reset_layout_closes_it(lint):
     assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
 
 
-def test_worst_comes_first_and_all_words_are_there(lint, texts):
+def test_worst_finding_comes_first_with_its_full_message(lint, texts):
     hand = lint(several())
     findings = hand.state.of(Linting).checked.findings
     assert findings[0].severity == "error" and findings[0].code == "B006"
@@ -78,7 +78,7 @@ def test_worst_comes_first_and_all_words_are_there(lint, texts):
         assert finding.title in texts and finding.message in texts
 
 
-def test_severities_and_words_filter_the_list(lint):
+def test_severities_and_text_filter_the_list(lint):
     hand = lint(several())
     kinds = {finding.severity for finding in hand.state.of(Linting).checked.findings}
     assert {"error", "warning"} <= kinds
@@ -100,7 +100,7 @@ def test_filter_without_a_match_says_so(lint, texts):
     assert "no finding matches" in texts
 
 
-def test_sound_figure_has_nothing(lint, texts):
+def test_valid_figure_has_no_findings(lint, texts):
     hand = lint(column())
     assert codes(hand) == [] and "no findings" in texts
     hand.click("Copy text")
@@ -143,7 +143,7 @@ def test_marks_end_with_the_row_or_escape(lint, end):
     assert hand.state.of(Linting).chosen == -1 and not marked(hand)
 
 
-def test_another_row_takes_the_marks_over(lint):
+def test_selecting_another_row_moves_the_marks(lint):
     hand = lint(several())
     hand.click(row_of(hand, "W002"))
     (first,) = hand.state.of(Linting).marks.points.tolist()[:1]
@@ -171,7 +171,7 @@ def test_flipped_triangle_has_its_edges_marked(lint):
     assert sorted(map(tuple, corners.round(6))) == sorted(map(tuple, expected))
 
 
-def test_finding_of_another_actor_chooses_it(lint):
+def test_finding_of_another_actor_activates_it(lint):
     scene = Scene([Actor(column()), Actor(LIGHT)])
     scene.actors[1].placement[:3, 3] = 10.0, 0.0, 0.0
     hand = lint(scene)
@@ -181,7 +181,7 @@ def test_finding_of_another_actor_chooses_it(lint):
     assert hand.state.camera.target == pytest.approx([9.1, 0.9, 0.9])
 
 
-def test_finding_of_a_clip_goes_to_its_time(lint):
+def test_finding_in_a_clip_jumps_to_its_time(lint):
     hand = lint(jump())
     hand.state.clock.playing = True
     hand.click(row_of(hand, "C003"))
@@ -204,7 +204,7 @@ def test_captured_points_are_marked(lint):
     assert hand.state.of(Linting).marks.points.tolist() == [[0.0, 0.0, 0.0]]
 
 
-def test_camera_turns_to_the_side_that_faces_it(lint):
+def test_camera_turns_to_the_facing_side(lint):
     hand = lint(LIGHT)
     camera = hand.state.camera
     camera.azimuth, camera.inclination = 135.0, 0.0  # from behind, +x and -z
@@ -218,7 +218,7 @@ def test_camera_turns_to_the_side_that_faces_it(lint):
     assert camera.azimuth == before + 40.0
 
 
-def test_limits_are_set_in_their_window(lint):
+def test_limits_are_set_in_their_dialog(lint):
     hand = lint(column())
     hand.click("Limits…")
     hand.step(2)
@@ -255,7 +255,7 @@ def test_all_are_copied_as_text_and_json(lint, monkeypatch):
     assert hand.says("1 finding copied as JSON")
 
 
-def test_too_many_marks_are_cut_and_said():
+def test_too_many_marks_are_truncated_with_a_note():
     rng = np.random.default_rng(0)
     places = Places(vertices=rng.normal(size=(4000, 3)), triangles=rng.normal(size=(1500, 3, 3)))
     marks, note = marks_of(places)
@@ -267,7 +267,7 @@ def test_too_many_marks_are_cut_and_said():
     np.testing.assert_array_equal(marks.points, places.vertices[:3000])
 
 
-def test_what_is_not_finite_is_not_marked():
+def test_non_finite_positions_are_not_marked():
     vertices = np.array([[0.0, 0, 0], [np.nan, 0, 0], [1.0, np.inf, 0]])
     marks, note = marks_of(Places(vertices=vertices))
     assert marks.points.tolist() == [[0.0, 0.0, 0.0]]

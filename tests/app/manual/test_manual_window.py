@@ -1,4 +1,4 @@
-"""The manual in the window: chosen in the menu, read, and closed."""
+"""The manual window: opened from the menu, read, and closed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def shown(hand) -> str:
     return hand.state.of(Manual).topic
 
 
-def test_the_menu_shows_a_page_and_the_list_another(drive, rig, texts) -> None:
+def test_pages_open_from_the_menu_and_the_list(drive, rig, texts) -> None:
     hand = drive(*rig, size=(900, 640), samples=1)
     hand.menu("menu Help", "menu Manual", "Captures##page captures")
     assert shown(hand) == "captures"
@@ -44,7 +44,7 @@ def test_escape_closes_it_and_nothing_else(drive, rig) -> None:
     assert shown(hand) == "" and hand.state.selected_joint == 1
 
 
-def test_a_missing_page_is_a_message(drive, rig, monkeypatch, tmp_path) -> None:
+def test_a_missing_page_shows_a_message(drive, rig, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr("viewer.resources._PACKAGE", tmp_path / "viewer")
     hand = drive(*rig, size=(900, 640), samples=1)
     hand.state.of(Manual).topic = "motion"

@@ -8,7 +8,7 @@ from viewer.app.manual.blocks import Block, blocks_of
 from viewer.manual import PAGES, page_text
 
 
-def test_headings_paragraphs_and_items_are_joined_over_lines() -> None:
+def test_wrapped_headings_paragraphs_and_items_are_joined() -> None:
     text = "# A page\n\n## Part\nOne\nparagraph.\n\n- first\n  item\n- **second** `item`\n"
     assert blocks_of(text) == [
         Block("title", "A page"),
@@ -35,7 +35,7 @@ def test_tables_are_cells_with_escaped_bars() -> None:
 
 
 @pytest.mark.parametrize("topic", PAGES)
-def test_every_page_is_a_title_and_whole_tables(topic: str) -> None:
+def test_every_page_has_a_title_and_complete_tables(topic: str) -> None:
     blocks = blocks_of(page_text(topic))
     assert blocks[0].kind == "title"
     assert [block.kind for block in blocks].count("title") == 1

@@ -1,4 +1,4 @@
-"""The timeline's field "Frames per second": of captures, undoably, and what keys are counted by."""
+"""The field "Frames per second": undoable for captures, and used for counting keyed frames."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def keyed(seconds=4.0):
 
 @pytest.fixture
 def rising(drive, rig):
-    """A hand on a figure with keys over four seconds."""
+    """A test driver on a figure with keys over four seconds."""
     hand = drive(*rig, size=SIZE, samples=1)
     hand.state.actor.clip = keyed()
     hand.step(4)
@@ -36,7 +36,7 @@ def rising(drive, rig):
 
 @pytest.fixture
 def pair(drive, rig):
-    """A hand on two people of one capture: 31 frames, 10 a second; the second comes at 20."""
+    """Two people of one capture: 31 frames, 10 a second; the second appears at frame 20."""
     scene = people(rig, [True] * 31, [False] * 20 + [True] * 11)
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.step(2)
@@ -56,7 +56,7 @@ def test_clip_at_another_rate_has_the_same_frames():
     assert with_rate(clip, 10.0) is clip
 
 
-def test_keys_are_counted_by_the_rate_that_is_typed(rising):
+def test_keyed_frames_are_counted_by_the_typed_rate(rising):
     clip, playback = rising.state.actor.clip, rising.state.clock
     assert playback.n_frames == 121  # four seconds at 30 a second
     rising.enter_value("Frame rate", "24")
@@ -67,14 +67,14 @@ def test_keys_are_counted_by_the_rate_that_is_typed(rising):
     assert rising.undo_steps == 0
 
 
-def test_rate_of_keys_stays_when_the_clip_changes(rising):
+def test_rate_for_keyed_clips_stays_when_the_clip_changes(rising):
     rising.enter_value("Frame rate", "25")
     rising.state.actor.clip = keyed(2.0)
     rising.step(2)
     assert (rising.state.clock.frame_rate, rising.state.clock.n_frames) == (25.0, 51)
 
 
-def test_capture_gets_the_rate_for_all_of_its_people(pair):
+def test_rate_applies_to_everyone_in_a_capture(pair):
     pair.enter_value("Frame rate", "20")
     assert rates(pair) == [20.0, 20.0]
     assert pair.state.clock.whole == (0.0, 1.5)  # 30 frames of a twentieth of a second
@@ -96,7 +96,7 @@ def test_time_and_range_stay_on_their_frames(pair):
     assert pair.state.actor.pose.figure_translation[0] == pytest.approx(12.0)
 
 
-def test_change_of_rate_is_undone_with_its_time_and_pose(pair):
+def test_rate_change_is_undone_with_its_time_and_pose(pair):
     playback = pair.state.clock
     playback.seek(1.2)
     pair.step(2)
@@ -122,7 +122,7 @@ def test_rate_out_of_limits_is_refused_with_a_message(pair, text):
 
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), 0.0, -1.0])
-def test_numbers_that_are_no_rates_are_refused(pair, rate):
+def test_invalid_rates_are_refused(pair, rate):
     set_rate(pair.state, rate)
     assert rates(pair) == [10.0, 10.0]
     assert pair.says(f"frames per second: expected 0.01 to 1000, found {rate:g}")
@@ -144,7 +144,7 @@ def test_points_are_retimed_as_well(drive):
     assert rates(hand) == [50.0] and hand.state.clock.whole == (0.0, 0.04)
 
 
-def test_rate_is_greyed_where_another_actor_gives_the_frames(drive, rig):
+def test_rate_is_greyed_if_another_actor_defines_the_frames(drive, rig):
     scene = people(rig, [True] * 31)
     keys = viewer.load(*rig).actors[0]
     keys.clip = keyed(1.0)
@@ -159,7 +159,7 @@ def test_rate_is_greyed_where_another_actor_gives_the_frames(drive, rig):
     assert hand.state.clock.frame_rate == 10.0
 
 
-def test_people_who_appear_while_reading_have_the_rate_that_was_set(rig):
+def test_people_appearing_while_loading_get_the_chosen_rate(rig):
     first, second = people(rig, [True] * 4, [True] * 4).actors
     first.clip = with_rate(first.clip, 25.0)
     _keep_rate([first], [second])
@@ -168,7 +168,7 @@ def test_people_who_appear_while_reading_have_the_rate_that_was_set(rig):
     assert first.clip.timing.frame_rate == 25.0
 
 
-def test_undoing_the_rate_while_reading_keeps_what_was_read(rig):
+def test_undoing_the_rate_while_loading_keeps_loaded_frames(rig):
     scene, options = people(rig, [True, True, False, False]), DisplayOptions()
     actor, history = scene.actors[0], History()
     history.start(scene, options)

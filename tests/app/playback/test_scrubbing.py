@@ -1,4 +1,4 @@
-"""Scrubbing goes by whole frames, with Alt between them, on the timeline and in the curves."""
+"""Scrubbing snaps to whole frames unless Alt is held, on the timeline and in the curves."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from viewer.app.core.clock import Clock
 
 @pytest.fixture
 def keyed(drive, rig, tmp_path):
-    """A hand on the tiny rig with a clip of keys from 0 to 2 s."""
+    """A test driver on the tiny rig with a clip of keys from 0 to 2 s."""
     (tmp_path / "wave.anim").write_text(clip_text())
     return drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
 
 
 def scrub(hand, share, held=""):
-    """Drag in the timeline from its middle to a share of its length; return where that is."""
+    """Drag in the timeline from its middle to a fraction of its length; return the end point."""
     x0, y0, x1, _ = hand.state.item_rects["Scrubber"]
     x = round(x0 + share * (x1 - x0))
     hand.pull(((x0 + x1) / 2, y0 + 5), (x, y0 + 5), held=held)
@@ -27,7 +27,7 @@ def scrub(hand, share, held=""):
 
 @pytest.mark.parametrize("rate", [30.0, 24.0, 12.5])
 @pytest.mark.parametrize("share", [0.137, 0.611, 0.93])
-def test_scrubbing_stops_at_the_nearest_frame_of_the_counting_rate(keyed, rate, share):
+def test_scrubbing_snaps_to_the_nearest_frame(keyed, rate, share):
     playback = keyed.state.clock
     playback.count_by(rate)
     wanted = scrub(keyed, share)
@@ -44,7 +44,7 @@ def test_scrubbing_with_alt_goes_between_frames(keyed):
     assert abs(playback.time * 2.0 - round(playback.time * 2.0)) > 0.2
 
 
-def test_scrubbing_a_capture_goes_by_its_frames(drive, rig):
+def test_scrubbing_a_capture_snaps_to_its_frames(drive, rig):
     scene = people(rig, [True] * 11, rate=7.0)
     scene.actors[0].offset = 0.3
     hand = drive(scene=scene, size=SIZE, samples=1)
@@ -55,7 +55,7 @@ def test_scrubbing_a_capture_goes_by_its_frames(drive, rig):
 
 
 @pytest.mark.parametrize("held", ["", "alt"])
-def test_time_line_of_the_curves_stops_at_frames_too(keyed, held):
+def test_time_line_in_the_curve_editor_snaps_to_frames_too(keyed, held):
     keyed.show_panel("Curves")
     keyed.state.selected_joint = 1
     keyed.step(3)

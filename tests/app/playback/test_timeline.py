@@ -23,7 +23,7 @@ ARM = 0  # the DOF that the test's clip moves
 
 @pytest.fixture
 def moving(drive, rig):
-    """A hand on the tiny figure with a clip: its last DOF rises by 0.1 a second, from 0 to 0.4."""
+    """A driver on the tiny figure with a clip: its last DOF rises by 0.1 per s from 0 to 0.4."""
     hand = drive(*rig, size=(1280, 800))
     actor = hand.state.actor
     dof = int(np.flatnonzero(actor.figure.skeleton.dof_kinds >= 3)[0])
@@ -34,7 +34,7 @@ def moving(drive, rig):
     )
     actor.clip = Clip("rise", (channel,), 0.0, 4.0)
     hand.dof_row, hand.dof_start = dof, start
-    assert "Scrubber" not in hand.state.item_rects  # nothing moved so far
+    assert "Scrubber" not in hand.state.item_rects  # nothing has moved yet
     hand.step(3)
     hand.state.history.start(hand.state.scene, hand.state.options)
     return hand
@@ -48,7 +48,7 @@ def test_timeline_appears_with_a_clip(moving):
     assert "Scrubber" in moving.state.item_rects
 
 
-def test_space_plays_and_pauses_at_the_pace_of_the_clock(moving):
+def test_space_plays_and_pauses_in_real_time(moving):
     moving.key("space")
     before = moving.state.clock.time
     moving.step(60)  # frames of a sixtieth of a second
@@ -60,7 +60,7 @@ def test_space_plays_and_pauses_at_the_pace_of_the_clock(moving):
     assert moving.state.clock.time == stopped
 
 
-def test_arrows_home_and_end_go_to_frames(moving):
+def test_arrows_home_and_end_step_through_frames(moving):
     moving.key("right_arrow")
     moving.key("right_arrow")
     assert moving.state.clock.time == pytest.approx(2 / 30)
@@ -97,7 +97,7 @@ def test_buttons_do_what_the_keys_do(moving):
     assert not moving.state.clock.playing
 
 
-def test_range_by_keys_is_what_loops(moving):
+def test_range_set_by_shortcuts_is_looped(moving):
     moving.state.clock.seek(1.0)
     moving.key("i")
     moving.state.clock.seek(2.0)
@@ -109,7 +109,7 @@ def test_range_by_keys_is_what_loops(moving):
     assert 1.0 <= playback.time <= 2.0
 
 
-def test_playing_leaves_no_steps_to_undo_but_edits_do(moving):
+def test_playing_adds_no_undo_steps_but_edits_do(moving):
     moving.key("space")
     moving.step(30)
     moving.key("space")
@@ -127,7 +127,7 @@ def test_playing_leaves_no_steps_to_undo_but_edits_do(moving):
     assert_allclose(moving.dofs(), dofs)
 
 
-def test_another_clip_is_undone(moving):
+def test_clip_change_is_undone(moving):
     old = moving.state.actor.clip
     moving.state.actor.clip = Clip("other", old.channels, 0.0, 2.0)
     moving.step(2)
@@ -142,7 +142,7 @@ def test_another_clip_is_undone(moving):
 
 
 def capture(n_frames, part, people, name="take"):
-    """A capture of boxes: person p is there from frame 10 p on; x is the frame's number."""
+    """A capture of boxes: person p is present from frame 10 p on; x is the frame's number."""
 
     def parts():
         for first in range(0, n_frames, part):
@@ -211,7 +211,7 @@ def test_people_appear_while_a_capture_is_read(streaming):
     assert streaming.state.clock.whole == (0.0, 9.9)
 
 
-def test_reading_is_cancelled_by_escape_and_what_was_read_stays(streaming, monkeypatch):
+def test_escape_cancels_loading_and_keeps_loaded_frames(streaming, monkeypatch):
     import threading
 
     gate = threading.Event()
@@ -251,7 +251,7 @@ def test_editing_while_reading_keeps_its_undo(streaming):
     assert streaming.state.scene.actors[0].clip.n_rows == 60
 
 
-def test_error_while_reading_is_said_and_the_scene_stays(streaming):
+def test_error_while_loading_is_shown_and_the_scene_stays(streaming):
     from viewer.errors import FormatError
 
     good = capture(100, 5, 1)
@@ -292,7 +292,7 @@ def test_actors_are_hidden_and_chosen_by_clicks(streaming):
     assert streaming.state.chosen_actor == 0
 
 
-def test_camera_follows_an_actor_as_far_as_before(streaming):
+def test_camera_follows_an_actor_until_following_ends(streaming):
     streaming.start(capture(60, 60, 1))
     streaming.state.of(ShownPanels).closed.add("stats")
     streaming.step(4)

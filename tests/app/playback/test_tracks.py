@@ -1,4 +1,4 @@
-"""The timeline's tracks: nobody's presence is too short to be seen, and tracks have colours."""
+"""Timeline tracks: minimum bar width, ruler labels and track colours."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_bars_are_never_too_narrow(places, drawn):
     assert bars(places, 5, 40) == drawn
 
 
-def test_lone_frame_is_a_span_of_no_length():
+def test_single_frame_is_a_span_of_zero_length():
     present = [False, True, False, False, True, True]
     assert present_spans(walk(present, 1), 0.01) == [(0.1, 0.1), (0.4, 0.5)]
 
@@ -34,11 +34,11 @@ def test_lone_frame_is_a_span_of_no_length():
     ("x", "begin"),
     [(0.0, 3.0), (77.0, 80.0), (77.5, 54.5), (100.0, 77.0)],
 )
-def test_number_of_the_ruler_stays_within_it(x, begin):
+def test_ruler_labels_stay_within_the_ruler(x, begin):
     assert ruler_text_place(x, 20.0, 100.0) == begin
 
 
-def test_last_number_of_the_ruler_is_not_cut_off(drive, rig):
+def test_last_ruler_label_is_not_cut_off(drive, rig):
     scene = people(rig, np.ones(121, dtype=bool))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     _, y0, x1, _ = hand.state.item_rects["Scrubber"]
@@ -49,7 +49,7 @@ def test_last_number_of_the_ruler_is_not_cut_off(drive, rig):
     assert len(last) > 10 and last.max() < x1 - 1
 
 
-def test_srgb_and_back():
+def test_srgb_round_trip():
     color = (0.001, 0.2, 0.9)
     # IEC 61966-2-1: the dark end is 12.92 times the light; 0.2 is 0.4845 by its formula.
     assert encode_color(color)[:2] == pytest.approx((0.01292, 0.484529), abs=1e-6)
@@ -63,7 +63,7 @@ def _row(hand, index):
     return hand.screen()[round((y0 + y1) / 2), round(x0) : round(x1)].astype(int)
 
 
-def test_lone_frame_is_seen_and_tracks_carry_their_actors_colour(drive, rig):
+def test_single_frame_is_visible_and_tracks_have_their_actors_colour(drive, rig):
     lone = np.zeros(2000, dtype=bool)
     lone[1000] = True
     scene = people(rig, np.ones(2000, dtype=bool), lone)
@@ -71,7 +71,7 @@ def test_lone_frame_is_seen_and_tracks_carry_their_actors_colour(drive, rig):
     scene.actors[1].color = decode_color((0.9, 0.1, 0.1))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     first = _row(hand, 0)
-    # The middle of the bar, where neither ruler nor present time are drawn.
+    # The middle of the bar, where neither ruler nor current time are drawn.
     assert np.abs(first - [51, 204, 102]).max(axis=1).min() <= 2
     second = _row(hand, 1)
     red = np.flatnonzero((second[:, 0] > 120) & (second[:, 1] < 70))

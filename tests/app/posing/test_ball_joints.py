@@ -1,4 +1,4 @@
-"""Ball joints of body models: rotation vectors, the file's own numbers, the figure's place."""
+"""Ball joints of body models: rotation vectors, raw pose values and placement."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def euler(x, y, z):
 
 
 def _rotation(hand, joint):
-    """Return what a joint's DOFs say; its other transforms are those of the file."""
+    """Return a joint's rotation by its DOFs; its other transforms must be those of the file."""
     return euler(*(hand.dof(f"{joint}.{axis}") for axis in "xyz"))
 
 
@@ -42,13 +42,13 @@ def _enter_vector(hand, joint, *degrees):
 
 @pytest.fixture
 def vectors(box):
-    """A hand on the box, its joints edited as rotation vectors."""
+    """A test driver on the box, its joints edited as rotation vectors."""
     box.click("Rotation vectors")
     assert box.state.of(Posing).as_vectors
     return box
 
 
-def test_check_box_exchanges_the_sliders_and_no_dof(box):
+def test_check_box_swaps_the_sliders_without_changing_dofs(box):
     labels = {f"joint_1.{axis}" for axis in "xyz"}
     assert labels <= set(box.state.item_rects)
     box.click("Rotation vectors")
@@ -60,7 +60,7 @@ def test_check_box_exchanges_the_sliders_and_no_dof(box):
 TURNS = ((60, 45, -30), (0, 90, 0), (-120, 10, 20), (179, 1, 0), (0, 0, 200), (360, 0, 0))
 
 
-def test_typed_vector_turns_the_joint_as_rodrigues_says(vectors):
+def test_typed_vector_rotates_the_joint_by_rodrigues_formula(vectors):
     for degrees in TURNS:
         vectors.key("r")
         _enter_vector(vectors, "joint_1", *degrees)
@@ -68,7 +68,7 @@ def test_typed_vector_turns_the_joint_as_rodrigues_says(vectors):
         assert not vectors.dofs()[[*range(3), *range(6, 9)]].any()
 
 
-def test_dragged_component_turns_about_its_axis(vectors):
+def test_dragged_component_rotates_about_its_axis(vectors):
     for axis in range(3):
         vectors.drag(f"joint_1.r{'xyz'[axis]}", 0.75)
         vector = np.zeros(3)
@@ -79,7 +79,7 @@ def test_dragged_component_turns_about_its_axis(vectors):
         assert not vectors.dofs().any()
 
 
-def test_drag_passes_half_a_turn_without_a_jump(vectors):
+def test_drag_passes_180_degrees_without_a_jump(vectors):
     vectors.enter_value("joint_1.rx", "150")
     x0, y0, x1, y1 = vectors.state.item_rects["joint_1.ry"]
     y = (y0 + y1) / 2
@@ -102,7 +102,7 @@ def test_drag_passes_half_a_turn_without_a_jump(vectors):
 
 
 @pytest.mark.parametrize("key", ["undo", "reset"])
-def test_held_vector_ends_with_another_pose(vectors, key):
+def test_shown_vector_is_discarded_with_another_pose(vectors, key):
     vectors.enter_value("joint_1.rz", "270")
     vectors.key("z", "ctrl") if key == "undo" else vectors.key("r")
     vectors.step(2)
@@ -137,7 +137,7 @@ def _own(hand, texts):
     return [text for text in texts if text.startswith("file:")]
 
 
-def test_own_numbers_are_rotation_vectors(box, texts):
+def test_raw_pose_values_are_rotation_vectors(box, texts):
     assert _own(box, texts) == ["file: 0.0000  0.0000  0.0000"] * 3
     # Quarter turns about x, then z: a third of a turn about the diagonal, 2 pi / 3 / sqrt 3.
     box.enter_value("joint_1.x", "90")
@@ -149,7 +149,7 @@ def test_own_numbers_are_rotation_vectors(box, texts):
     ]
 
 
-def test_own_numbers_of_an_euler_root_are_angles_about_z_y_x(drive, tmp_path, texts):
+def test_raw_pose_values_of_an_euler_root_are_z_y_x_angles(drive, tmp_path, texts):
     hand = drive(write_pig(tmp_path / "pig"), size=(900, 1000), samples=1)
     root, other = hand.state.actor.figure.skeleton.names[:2]
     for joint in (root, other):
@@ -167,13 +167,13 @@ def test_rigs_without_a_pose_layout_have_angles_only(hand, texts):
     assert "arm.x" in hand.state.item_rects
 
 
-def test_vectors_are_left_behind_with_the_body(vectors, rig):
+def test_vectors_are_discarded_with_the_body(vectors, rig):
     vectors.open(*rig)
     vectors.step(2)
     assert "arm.x" in vectors.state.item_rects and "arm.rx" not in vectors.state.item_rects
 
 
-def test_rows_of_the_figure_move_and_scale_it(box):
+def test_figure_rows_move_and_scale_it(box):
     first, pose = box.scene_picture(), box.state.actor.pose
     size = math.sqrt(0.5**2 + 2.0**2 + 0.25**2)
     for axis, name in enumerate("xyz"):
@@ -189,7 +189,7 @@ def test_rows_of_the_figure_move_and_scale_it(box):
     assert pose.figure_translation[0] == 0.0 and pose.figure_translation[1] > 0
 
 
-def test_typed_scale_keeps_a_figure_that_has_an_inside(box):
+def test_typed_scale_stays_positive(box):
     for text in ("0", "-2", "nan", "1e39", "inf", "1e-40", ""):
         box.enter_value("figure.scale", text)
         box.enter_value("figure.ty", text)
@@ -199,14 +199,14 @@ def test_typed_scale_keeps_a_figure_that_has_an_inside(box):
     assert box.scene_picture().any()
 
 
-def test_rows_of_the_figure_are_closed_at_first_for_rigs(hand):
+def test_figure_rows_start_collapsed_for_rigs(hand):
     assert "figure" in hand.state.item_rects and "figure.tx" not in hand.state.item_rects
     hand.click(hand.place("figure", 0.02))
     hand.enter_value("figure.ty", "0.25")
     assert hand.state.actor.pose.figure_translation.tolist() == [0, 0.25, 0]
 
 
-def test_r_resets_angles_and_place_and_keeps_the_shape(vectors):
+def test_r_resets_pose_and_placement_and_keeps_the_shape(vectors):
     _enter_vector(vectors, "joint_1", 30, 60, 0)
     vectors.enter_value("figure.tx", "0.5")
     vectors.enter_value("figure.scale", "2")
@@ -220,14 +220,14 @@ def test_r_resets_angles_and_place_and_keeps_the_shape(vectors):
     assert vectors.state.actor.pose.figure_scale == 2
 
 
-def test_m_exchanges_left_and_right(vectors):
+def test_m_swaps_left_and_right(vectors):
     _enter_vector(vectors, "joint_0", 10, 20, 30)
     _enter_vector(vectors, "joint_1", 40, -50, 60)
     _enter_vector(vectors, "joint_2", -70, 0, 5)
     vectors.enter_value("figure.tx", "0.5")
     before, steps = vectors.dofs(), vectors.undo_steps
     vectors.key("m")
-    # In a mirror across x a rotation vector keeps its x and turns its y and z round.
+    # Mirrored across x, a rotation vector keeps its x and negates its y and z.
     for joint, degrees in (("0", (10, -20, -30)), ("1", (-70, 0, -5)), ("2", (40, 50, -60))):
         wanted = rodrigues(np.radians(degrees))
         assert_allclose(_rotation(vectors, f"joint_{joint}"), wanted, atol=1e-12)
@@ -237,7 +237,7 @@ def test_m_exchanges_left_and_right(vectors):
     assert_allclose(vectors.dofs(), before, atol=1e-12)
 
 
-def test_m_says_what_is_not_symmetric_and_keeps_the_pose(drive, tmp_path):
+def test_m_reports_asymmetry_and_keeps_the_pose(drive, tmp_path):
     path = tmp_path / "lame.skel"
     path.write_text("balljoint hip { offset 0 0 0 balljoint left_leg { offset 1 -1 0 } }")
     hand = drive(path)

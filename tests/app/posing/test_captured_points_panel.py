@@ -1,4 +1,4 @@
-"""The Joints panel of captured keypoints: what they are, their names and confidences."""
+"""The Joints panel of captured keypoints: description, names and confidences."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.scene import Scene
 
 @pytest.fixture
 def points(drive):
-    """A hand on four points; frame 1 is less sure of them."""
+    """A test driver on four points; frame 1 is less sure of them."""
     return drive(scene=Scene([dots([0.9, 0.05, 0.0, 0.5])]), size=(900, 900), samples=1)
 
 
@@ -22,14 +22,14 @@ def at_frame(hand, frame, texts):
     hand.step(1)
 
 
-def test_panel_says_what_the_points_are(points, texts):
+def test_panel_describes_the_points(points, texts):
     at_frame(points, 0, texts)
     assert "4 captured points (face4), not a skeleton: there are no joints to rotate." in texts
     assert "4 detected at this time." in texts
     assert not any("open its .skel" in text for text in texts)
 
 
-def test_panel_lists_names_and_how_sure_each_is_now(points, texts, monkeypatch):
+def test_panel_lists_names_and_current_confidence(points, texts, monkeypatch):
     bars = []
     draw = imgui.progress_bar
 
@@ -45,7 +45,7 @@ def test_panel_lists_names_and_how_sure_each_is_now(points, texts, monkeypatch):
     assert "3 detected at this time, 1 of them with confidence below 0.1 and not drawn." in texts
 
 
-def test_points_that_are_not_there_are_said_to_be_so(points, texts):
+def test_unseen_points_are_shown_as_unseen(points, texts):
     points.state.clock.mode = "run on"
     at_frame(points, 9, texts)
     assert "Absent at this time." in texts and texts.count("not detected") == 4

@@ -20,7 +20,7 @@ VIEW_RADIUS = 1.2 * RADIUS
 
 
 def framed(drive, scene):
-    """Return a hand on a scene with all of its joints well within the view."""
+    """Return a test driver showing a scene with all joints well within the view."""
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.key("f")
     hand.state.camera.distance *= 1.5
@@ -30,7 +30,7 @@ def framed(drive, scene):
 
 @pytest.fixture
 def arm(drive):
-    """A hand on an arm whose shoulder is selected, with the tool Rotate."""
+    """A test driver on an arm whose shoulder is selected, with the tool Rotate."""
     hand = framed(drive, arm_scene())
     hand.state.selected_joint = 0
     hand.key("e")
@@ -71,7 +71,7 @@ def test_drag_is_one_step_and_undone_at_once(arm):
     assert_array_equal(arm.dofs(), after)
 
 
-def test_click_on_a_ring_chooses_the_joint_whose_dot_lies_there(arm):
+def test_click_on_a_ring_selects_the_joint_under_it(arm):
     camera = arm.state.camera
     camera.orthographic = True
     arm.step(2)
@@ -109,7 +109,7 @@ def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     else:
         arm.press(1)
     assert_array_equal(arm.dofs(), before)
-    # Until the button comes up nothing else happens: no orbit, no drag.
+    # Until the button is released nothing else happens: no orbit, no drag.
     azimuth = arm.state.camera.azimuth
     arm.move(places[-1])
     assert_array_equal(arm.dofs(), before)
@@ -137,7 +137,7 @@ def test_ctrl_snaps_to_fifteen_degrees(arm):
     assert_allclose(world_of(arm, 0)[:3, :3], wanted, atol=1e-6)
 
 
-def test_drag_beside_the_rings_orbits_as_ever(arm):
+def test_drag_outside_the_rings_still_orbits(arm):
     azimuth, before = arm.state.camera.azimuth, arm.dofs()
     x, y = joint_seen(arm, 0)
     arm.pull((x + 30, y + 200), (x + 90, y + 200))
@@ -145,7 +145,7 @@ def test_drag_beside_the_rings_orbits_as_ever(arm):
     assert_array_equal(arm.dofs(), before)
 
 
-def test_select_tool_leaves_the_rings_alone(arm):
+def test_select_tool_shows_no_rings(arm):
     arm.key("q")
     before, azimuth = arm.dofs(), arm.state.camera.azimuth
     drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1))
@@ -201,7 +201,7 @@ def test_any_joint_can_be_dragged_without_selecting_it_first(drive):
     assert hand.state.selected_joint == 2 and hand.dofs().any()
 
 
-def test_root_is_dragged_with_the_figure_and_by_its_arrow(drive):
+def test_root_is_dragged_directly_or_by_its_arrow(drive):
     hand = framed(drive, arm_scene())
     hand.state.selected_joint = 0
     hand.key("d")
@@ -236,7 +236,7 @@ def test_limits_hold_during_random_drags(drive, tmp_path):
     assert locked == 0.3
 
 
-def test_binding_space_and_hidden_actors_have_no_handles(arm):
+def test_bind_pose_and_hidden_actors_have_no_handles(arm):
     arm.state.actor.visible = False
     before = arm.dofs()
     drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1))
@@ -259,7 +259,7 @@ def test_panel_over_the_view_keeps_its_clicks(arm):
     assert_array_equal(arm.dofs(), before)
 
 
-def test_other_scene_ends_a_drag(arm, tmp_path):
+def test_new_scene_ends_a_drag(arm, tmp_path):
     places = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1)
     arm.move(places[0])
     arm.press()

@@ -1,6 +1,6 @@
-"""Golden pictures of the handles, compared coarsely; see test_panel_pictures.py.
+"""Golden images of the gizmo handles, compared coarsely; see test_panel_pictures.py.
 
-``make golden NAME…`` draws them anew; look at them before they are committed.
+``make golden NAME…`` re-renders them; review them before committing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from viewer.loading import bundled_files
 
 
 def _posed(drive, joint, key):
-    """Return a hand on the fox with a joint selected and a tool in hand, without panels."""
+    """Return a test driver showing the fox, a joint selected, a tool active and panels hidden."""
     hand = drive(*bundled_files(), size=(700, 520), samples=1)
     hand.key(key)
     hand.key("tab")
@@ -58,13 +58,13 @@ PICTURES = {"gizmo_rotate": _rotate, "gizmo_turning": _turning, "gizmo_moving": 
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", PICTURES)
-def test_handles_look_as_they_did(drive, name):
+def test_handles_match_golden_images(drive, name):
     hand = PICTURES[name](drive)
     hand.state.messages.notes.clear()
     _compare(hand.screen(), name)
 
 
-def test_comparison_sees_the_handles(drive):
+def test_comparison_detects_missing_handles(drive):
     hand = _rotate(drive)
     with_rings = hand.screen()
     hand.key("q")

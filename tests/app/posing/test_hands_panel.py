@@ -1,4 +1,4 @@
-"""Hands: components add up in rotation vectors, flat and mean hands are what the file says."""
+"""Hands: components add up in rotation vectors, flat and mean hands match the file."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def vectors(driver, which):
     return matrix_to_rotation_vector(rotations[actor.figure.hands[which].joints]).ravel()
 
 
-def test_mean_hand_is_the_files_and_flat_hand_is_zero(hand):
+def test_mean_hand_comes_from_the_file_and_flat_hand_is_zero(hand):
     left = hand.state.actor.figure.hands[0]
     hand.click("left mean")
     assert_allclose(vectors(hand, 0), left.mean, atol=1e-12)
@@ -57,7 +57,7 @@ def test_number_of_components_is_the_number_of_sliders(hand):
     assert "left component 11" in hand.state.item_rects
 
 
-def test_figures_without_hands_have_no_such_panel(drive):
+def test_figures_without_hands_have_no_hands_panel(drive):
     driver = drive(size=(900, 640))
     assert not any("component" in label for label in driver.state.item_rects)
     assert np.size(driver.state.actor.figure.hands) == 0

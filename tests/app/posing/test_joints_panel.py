@@ -154,7 +154,7 @@ def test_reset_button_restores_the_clamped_pose_of_the_file(hand):
     assert hand.dof("root.tx") == 0.0
 
 
-def test_values_that_nobody_moves_keep_every_digit(hand):
+def test_untouched_values_keep_every_digit(hand):
     exact = 0.12345678901234567
     hand.state.actor.pose.dofs[hand.dof_index("arm.x")] = exact
     hand.step(3)
@@ -203,7 +203,7 @@ def test_joint_row_selects_and_deselects(hand):
     assert hand.state.selected_joint == -1
 
 
-def test_joint_row_closes_and_opens_with_its_arrow(hand):
+def test_joint_row_collapses_and_expands_with_its_arrow(hand):
     hand.click(hand.place("joint root", 0.02))
     assert "joint arm" not in hand.state.item_rects and "root.x" not in hand.state.item_rects
     hand.click(hand.place("joint root", 0.02))
@@ -251,7 +251,7 @@ def test_rows_list_children_right_below_their_parent(hand):
     assert not [dof for joint, dof, _ in listed if joint == 1 and dof >= 0]
 
 
-def test_second_figure_is_chosen_posed_and_reset(drive, rig, tmp_path):
+def test_second_figure_is_activated_posed_and_reset(drive, rig, tmp_path):
     other = tmp_path / "other.skel"
     other.write_text("balljoint hip { offset 0 0 0 balljoint knee { offset 0 -1 0 } }")
     hand = drive(*rig, other)

@@ -1,4 +1,4 @@
-"""Arcs of limits: an end of an arc is where the bone would be at that limit."""
+"""Limit arcs: an arc ends where the bone would be at that limit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def limited_arm():
 
 
 @pytest.mark.parametrize("dof", [1, 2])
-def test_ends_of_an_arc_are_where_the_bone_goes(dof) -> None:
+def test_arc_ends_are_at_the_limits_of_the_bone(dof) -> None:
     actor = limited_arm()
     joint = posed_joint(actor, 0)
     arc = next(arc for arc in limit_arcs(joint, actor.pose) if arc.dof == dof)
@@ -33,13 +33,13 @@ def test_ends_of_an_arc_are_where_the_bone_goes(dof) -> None:
         pose = actor.pose.copy()
         pose.dofs[dof] = value
         bone = posed_joint(actor, 1, pose).center - joint.center
-        # The arc is about the axis: of the bone counts what is across it.
+        # The arc is about the axis: only the part of the bone perpendicular to it counts.
         across = unit(bone - (bone @ arc.axis) * arc.axis)
         assert_allclose(end - joint.center, across, atol=1e-9)
 
 
 def test_twist_is_shown_by_an_axis_that_turns_with_the_joint() -> None:
-    # The bone lies along x: a turn about x leaves it where it is.
+    # The bone lies along x: a rotation about x does not move it.
     actor = Actor(arm_figure(limits=LIMITS))
     joint = posed_joint(actor, 0)
     arc = limit_arcs(joint, actor.pose)[0]
@@ -52,7 +52,7 @@ def test_twist_is_shown_by_an_axis_that_turns_with_the_joint() -> None:
     assert (turned.high, turned.is_limited) == (pytest.approx(0.0, abs=1e-12), True)
 
 
-def test_limits_are_told_from_the_present_value() -> None:
+def test_limits_are_distinguished_from_the_current_value() -> None:
     actor = limited_arm()
     found = limit_arcs(posed_joint(actor, 0), actor.pose)
     assert [arc.color for arc in found] == [0, 1, 2]
@@ -65,7 +65,7 @@ def test_dof_without_two_limits_has_no_arc() -> None:
     assert limit_arcs(posed_joint(actor, 0), actor.pose) == []
 
 
-def test_more_than_a_turn_is_drawn_as_one() -> None:
+def test_more_than_360_degrees_is_drawn_as_a_full_circle() -> None:
     actor = Actor(arm_figure(limits={(0, "z"): (-9.0, 9.0)}))
     arc = limit_arcs(posed_joint(actor, 0), actor.pose)[0]
     points = arc_points(arc, np.zeros(3), 1.0)

@@ -1,4 +1,4 @@
-"""Joints dragged: two links in closed form, arrows, and shifts of roots and figures."""
+"""The Move tool: two-link chains in closed form, arrows, and translations of roots and figures."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_joint_comes_to_the_pointer_at_its_depth(scale) -> None:
     assert outcome.target is None and outcome.text == "hand"
 
 
-def test_joint_held_beside_its_middle_keeps_its_way_off_the_pointer() -> None:
+def test_joint_grabbed_off_centre_keeps_its_offset() -> None:
     actor, view = bent_arm(), frame(parallel=True)
     posed = posed_joint(actor, 2)
     x, y = view.place(posed.center)
@@ -79,7 +79,7 @@ def test_drag_there_and_back_leaves_no_drift() -> None:
     assert_allclose(handle.follow(view, (x, y), False).pose.dofs, actor.pose.dofs, atol=1e-9)
 
 
-def test_place_out_of_reach_says_how_far_it_is() -> None:
+def test_unreachable_target_reports_its_distance() -> None:
     actor, view = bent_arm(), frame()
     posed = posed_joint(actor, 2)
     far = np.array([0.0, 2.9, 0.0])
@@ -93,7 +93,7 @@ def test_place_out_of_reach_says_how_far_it_is() -> None:
     assert_allclose(outcome.target, far, atol=1e-9)
 
 
-def test_limits_hold_and_are_named() -> None:
+def test_limits_hold_and_are_reported() -> None:
     actor, view = bent_arm(limits={(1, "z"): (0.5, 1.0)}), frame()
     posed = posed_joint(actor, 2)
     outcome = ReachHandle(posed, actor.pose, view.place(posed.center), 2).follow(
@@ -102,7 +102,7 @@ def test_limits_hold_and_are_named() -> None:
     assert outcome.pose.dofs[1] == 1.0 and outcome.limited == (1,)
 
 
-def test_chain_of_one_turns_only_the_elbow() -> None:
+def test_chain_of_one_rotates_only_the_elbow() -> None:
     actor, view = bent_arm(), frame()
     posed = posed_joint(actor, 2)
     x, y = view.place(posed.center)
@@ -112,15 +112,15 @@ def test_chain_of_one_turns_only_the_elbow() -> None:
     assert [longest_chain(skeleton, joint) for joint in (-1, 0, 1, 2)] == [0, 0, 1, 2]
 
 
-def test_chain_that_nobody_chose_leaves_the_root_alone() -> None:
+def test_default_chain_leaves_the_root_alone() -> None:
     skeleton = bent_arm().figure.skeleton
     assert used_chain(skeleton, 2, 0).tolist() == [1]
     assert used_chain(skeleton, 2, 2).tolist() == [1, 0]
-    assert used_chain(skeleton, 1, 0).tolist() == [0]  # nothing else can turn
+    assert used_chain(skeleton, 1, 0).tolist() == [0]  # nothing else can rotate
     assert used_chain(skeleton, 0, 0).tolist() == []
 
 
-def test_arrows_are_for_roots_and_joints_that_move() -> None:
+def test_only_roots_and_translating_joints_have_arrows() -> None:
     skeleton = arm_figure(root="xyz").skeleton
     assert shifts(skeleton, 0) and not shifts(skeleton, 1)
     assert translation_dofs(skeleton, 0).tolist() == [0, 1, 2]
@@ -130,7 +130,7 @@ def test_arrows_are_for_roots_and_joints_that_move() -> None:
     assert arrows(posed_joint(actor, 1), "world") == []
 
 
-def test_pointer_takes_an_arrow_off_its_foot_and_none_that_points_at_the_eye() -> None:
+def test_arrow_is_picked_along_its_shaft_unless_it_points_at_the_eye() -> None:
     actor, view = Actor(arm_figure()), frame(parallel=True)
     found, center = arrows(posed_joint(actor, 0), "world"), np.zeros(3)
     assert grab_arrow(found, center, view, (300 + 0.7 * LENGTH, 302)).color == 0

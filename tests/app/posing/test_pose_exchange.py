@@ -1,4 +1,4 @@
-"""Poses by clipboard and by dialog; figures written for other programs."""
+"""Copying and saving poses; exporting figures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor, Scene
 
 @pytest.fixture
 def posed(drive_body):
-    """A hand on a body in a pose of many digits, shaped and placed."""
+    """A test driver with a body whose pose, shape and placement have full-precision values."""
     hand = drive_body("smpl", size=(900, 640))
     pose = hand.state.actor.pose
     pose.dofs[:] = 0.9 * np.sin(1.7 * np.arange(len(pose.dofs)))
@@ -58,7 +58,7 @@ def test_copied_json_restores_every_digit(posed):
     assert posed.says("Pose pasted") and not posed.state.error
 
 
-def test_copied_json_names_its_numbers(box):
+def test_copied_json_labels_its_values(box):
     box.enter_value("joint_1.x", "90")
     box.enter_value("figure.ty", "0.25")
     box.key("c", "ctrl")
@@ -69,7 +69,7 @@ def test_copied_json_names_its_numbers(box):
     assert values["own_numbers"] == pytest.approx([0, 0, 0, np.pi / 2, 0, 0, 0, 0, 0])
 
 
-def test_copied_numbers_are_the_models_own_and_come_back(posed):
+def test_raw_pose_vector_round_trips(posed):
     before = posed.state.actor.pose.copy()
     posed.key("c", "ctrl shift")
     words = imgui.get_clipboard_text().split()
@@ -77,13 +77,13 @@ def test_copied_numbers_are_the_models_own_and_come_back(posed):
     posed.key("r")
     posed.key("v", "ctrl")
     after = posed.state.actor.pose
-    # SMPL's numbers are the joints' rotations: neither shape nor place.
+    # SMPL's pose vector holds joint rotations only, no shape or translation.
     assert_allclose(after.dofs, before.dofs, atol=1e-12)
     assert_array_equal(after.shape_weights, before.shape_weights)
     assert after.figure_scale == 1.0 and not after.figure_translation.any()
 
 
-def test_copied_numbers_of_a_rig_are_its_dofs(hand):
+def test_raw_pose_values_of_a_rig_are_its_dofs(hand):
     hand.drag("arm.x", 0.8)
     before = hand.dofs()
     hand.key("c", "ctrl shift")
@@ -102,7 +102,7 @@ NUMBERS = (
 )
 
 
-def test_pasted_numbers_may_stand_in_commas_and_brackets(box):
+def test_pasted_numbers_may_have_commas_and_brackets(box):
     for text in NUMBERS:
         box.key("r")
         _paste(box, text)
@@ -110,7 +110,7 @@ def test_pasted_numbers_may_stand_in_commas_and_brackets(box):
         assert_allclose(box.dofs(), [0, 0, 0, 0.5, 0, 0, 0, -0.25, 0], atol=1e-15)
 
 
-def test_pasted_part_leaves_the_rest(box):
+def test_partial_paste_keeps_other_dofs(box):
     box.enter_value("joint_2.x", "45")
     _paste(box, '{"dofs": {"joint_1.z": 0.75}}')
     assert box.dof("joint_1.z") == 0.75
@@ -134,7 +134,7 @@ RUBBISH = {
 }
 
 
-def test_pasted_rubbish_shows_its_message_and_keeps_the_pose(box):
+def test_invalid_paste_shows_a_message_and_keeps_the_pose(box):
     box.enter_value("joint_1.x", "45")
     before, steps = _key(box), box.undo_steps
     for text, said in RUBBISH.items():
@@ -145,7 +145,7 @@ def test_pasted_rubbish_shows_its_message_and_keeps_the_pose(box):
         assert not box.state.error
 
 
-def test_pasting_into_the_filter_is_no_pose(hand):
+def test_pasting_into_the_filter_does_not_paste_a_pose(hand):
     before = hand.dofs()
     hand.click("Filter")
     _paste(hand, "arm")
@@ -184,7 +184,7 @@ ANGLES = (0.4, -0.3, 0.7, 0.2, 0.9, -0.5, 0.1, 0.6, -0.2)
 
 
 def _arm_text(orders, dofs, **settings):
-    """Return what a window with an arm copies, with its pose and its joints' rotations."""
+    """Return the clipboard text of a window showing an arm, its pose and joint rotations."""
     figure = arm_figure(orders=orders, **settings)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = dofs
@@ -195,7 +195,7 @@ def _arm(drive, *orders, **settings):
     return drive(scene=Scene([Actor(arm_figure(orders=orders, **settings))]))
 
 
-def test_another_window_takes_rotations_where_its_dofs_are_others(drive):
+def test_rotations_are_pasted_where_dofs_differ(drive):
     text, _, wanted = _arm_text(("xyz", "xyz", "xyz"), ANGLES, name="first")
     hand = _arm(drive, "zyx", "yxz", "xzy", name="second")
     _paste(hand, text)
@@ -206,7 +206,7 @@ def test_another_window_takes_rotations_where_its_dofs_are_others(drive):
     assert hand.says("transferred 3 of 3 joints of first") and hand.says("Pose pasted")
 
 
-def test_another_window_with_the_same_dofs_takes_every_digit(drive):
+def test_paste_with_the_same_dofs_keeps_every_digit(drive):
     orders = "xyz", "z", "xyz"
     text, pose, _ = _arm_text(orders, (1.0, 2.0, -1 / 3, *ANGLES[:7]), root="xyz")
     hand = _arm(drive, *orders, root="xyz", name="other")
@@ -214,7 +214,7 @@ def test_another_window_with_the_same_dofs_takes_every_digit(drive):
     assert _key(hand) == pose_key(pose) and not hand.says("taken over")
 
 
-def test_moves_that_another_actor_does_not_take_are_said(drive):
+def test_untransferred_joint_translations_are_reported(drive):
     first = _arm_text(("xyz", "z", "xyz"), (0.5, 0.25, *[0] * 6), root="y", name="first")
     hand = _arm(drive, "zyx", "z", "xyz", root="y", name="second")
     _paste(hand, first[0])
@@ -226,7 +226,7 @@ def test_moves_that_another_actor_does_not_take_are_said(drive):
 
 
 def _name(hand, text):
-    """Write another name into the dialog."""
+    """Type a different name into the dialog."""
     hand.click(hand.place("Name", 0.3))
     hand.key("a", "ctrl")
     hand.key("delete")
@@ -290,7 +290,7 @@ def test_save_button_says_what_it_replaces(box, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "beside"), [("out.skel", "out.skin"), ("out.gltf", "out.bin")])
-def test_save_button_counts_files_beside_the_one_that_is_named(box, tmp_path, name, beside):
+def test_save_button_considers_companion_files(box, tmp_path, name, beside):
     (tmp_path / beside).write_text("old")
     box.menu("menu File", "Export…")
     box.step(3)
@@ -300,7 +300,7 @@ def test_save_button_counts_files_beside_the_one_that_is_named(box, tmp_path, na
     assert "Save###Save" in box.state.item_rects
 
 
-def test_click_on_a_file_takes_its_name(box, tmp_path):
+def test_click_on_a_file_enters_its_name(box, tmp_path):
     (tmp_path / "old.json").write_text("old")
     box.menu("menu File", "Save pose…")
     box.step(3)
@@ -316,7 +316,7 @@ REFUSED = {
 }
 
 
-def test_save_that_fails_says_why(box, tmp_path):
+def test_failed_save_reports_the_reason(box, tmp_path):
     files = sorted(tmp_path.iterdir())
     for name, said in REFUSED.items():
         _save_as(box, "Save pose…", name)
@@ -325,7 +325,7 @@ def test_save_that_fails_says_why(box, tmp_path):
         assert sorted(tmp_path.iterdir()) == files
 
 
-def test_name_of_no_file_cannot_be_saved(box, tmp_path):
+def test_invalid_file_name_cannot_be_saved(box, tmp_path):
     files = sorted(tmp_path.iterdir())
     for name in ("", "   ", "/", ".", "..", "../"):
         _save_as(box, "Save pose…", name)
@@ -346,7 +346,7 @@ def test_export_writes_the_posed_mesh(box, tmp_path, suffix):
         assert (min(heights), max(heights)) == (2, 4)
 
 
-def test_what_is_open_is_never_written_over(drive_body, tmp_path):
+def test_open_files_are_never_overwritten(drive_body, tmp_path):
     from viewer.app.posing.pose_actions import save_export, save_pose
 
     hand = drive_body()
@@ -365,7 +365,7 @@ def test_what_is_open_is_never_written_over(drive_body, tmp_path):
     assert model.read_bytes() == b"precious"
 
 
-def test_shape_that_turns_out_unreadable_is_taken_back_with_a_message(drive, tmp_path):
+def test_unreadable_shape_is_reverted_with_a_message(drive, tmp_path):
     from formats.synthetic_smpl import model
 
     arrays = model("smpl")

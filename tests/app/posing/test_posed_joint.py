@@ -1,4 +1,4 @@
-"""A joint's place and axes in the scene, and what it is seen to turn about."""
+"""A joint's position and axes in the scene, and its observed rotation axis."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from viewer.rig.scene import Actor
 
 
 def turned_actor():
-    """An arm whose shoulder is turned a quarter about z, then the elbow about its z by -1/8."""
+    """An arm with the shoulder rotated by 90 degrees about z and the elbow by -45 about its z."""
     actor = Actor(arm_figure())
     actor.pose.dofs[2], actor.pose.dofs[3] = np.pi / 2, -np.pi / 4
     return actor
 
 
-def test_places_and_axes_by_hand() -> None:
+def test_positions_and_axes_match_hand_calculation() -> None:
     actor = turned_actor()
     elbow = posed_joint(actor, 1)
     assert_allclose(elbow.center, [0, 1, 0], atol=1e-12)
@@ -30,7 +30,7 @@ def test_places_and_axes_by_hand() -> None:
     assert_allclose(elbow.axes("local")[:, 0], np.array([1, 1, 0]) / np.sqrt(2), atol=1e-12)
 
 
-def test_figures_place_and_size_count() -> None:
+def test_placement_and_scale_of_the_figure_are_applied() -> None:
     actor = turned_actor()
     actor.placement[:3, 3] = 1, 2, 3
     actor.pose.figure_scale = 2.0
@@ -38,7 +38,7 @@ def test_figures_place_and_size_count() -> None:
     assert_allclose(posed_joint(actor, 1).axes("local")[:, 2], [0, 0, 1], atol=1e-12)
 
 
-def test_joint_that_is_not_there_is_none() -> None:
+def test_missing_joint_gives_none() -> None:
     actor = turned_actor()
     assert posed_joint(actor, -1) is None and posed_joint(actor, 3) is None
     actor.pose = None
@@ -55,7 +55,7 @@ PLACEMENTS = {
 
 @pytest.mark.parametrize("name", PLACEMENTS)
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0.6, 0, 0.8)])
-def test_turning_axis_is_what_points_are_seen_to_turn_about(name, axis) -> None:
+def test_rotation_axis_matches_observed_rotation(name, axis) -> None:
     actor = Actor(arm_figure())
     actor.placement[:3, :3] = PLACEMENTS[name]
     joint = posed_joint(actor, 0)
@@ -70,7 +70,7 @@ def test_turning_axis_is_what_points_are_seen_to_turn_about(name, axis) -> None:
         assert_allclose(joint.parent_axis(seen), axis, atol=1e-9)
 
 
-def test_world_holds_every_joint() -> None:
+def test_world_matrices_cover_every_joint() -> None:
     actor = turned_actor()
     joint = posed_joint(actor, 2)
     assert joint.world.shape == (3, 4, 4)

@@ -1,4 +1,4 @@
-"""Rings and what turning them does, with a camera that looks along -z at the joint."""
+"""Rotation rings and their effect, for a camera looking along -z at the joint."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def grabbed(actor, joint, view, place, orientation="local"):
 
 
 def spot(angle, radius=RADIUS):
-    """Return a place around the joint at the origin, against the clock from the right."""
+    """Return a position around the joint at the origin, counter-clockwise from the right."""
     return (300 + radius * np.cos(angle), 300 - radius * np.sin(angle))
 
 
@@ -45,7 +45,7 @@ def test_free_joint_has_three_rings_and_one_about_the_line_of_sight() -> None:
 @pytest.mark.parametrize(
     ("orientation", "x_axis"), [("world", [1, 0, 0]), ("parent", [0, 1, 0]), ("local", [-1, 0, 0])]
 )
-def test_orientation_chooses_the_axes(orientation, x_axis) -> None:
+def test_orientation_setting_determines_the_axes(orientation, x_axis) -> None:
     actor = Actor(arm_figure(orders=("xyz", "xyz", "xyz")))
     actor.pose.dofs[[2, 5]] = np.pi / 2  # shoulder and elbow a quarter about z each
     found = rings(posed_joint(actor, 1), actor.pose, orientation, frame())
@@ -53,7 +53,7 @@ def test_orientation_chooses_the_axes(orientation, x_axis) -> None:
 
 
 def test_joint_with_two_dofs_has_a_ring_for_each_about_its_own_axis() -> None:
-    # x is applied first: the axis of x is turned by what y does, y's is the parent's.
+    # x is applied first: the x axis is rotated by y, the y axis is the parent's.
     actor = Actor(arm_figure(orders=("xy", "z", "")))
     actor.pose.dofs[:2] = 0.7, np.pi / 2
     found = rings(posed_joint(actor, 0), actor.pose, "world", frame())
@@ -68,7 +68,7 @@ def test_locked_dof_has_no_ring() -> None:
     assert [ring.dof for ring in found] == [0, 2]
 
 
-def test_circle_is_round_and_across() -> None:
+def test_circle_is_round_and_perpendicular_to_its_axis() -> None:
     center, axis = np.array([1.0, 2, 3]), np.array([0.6, 0, 0.8])
     points = circle(center, axis, 2.5)
     assert_allclose(np.linalg.norm(points - center, axis=1), 2.5)
@@ -76,7 +76,7 @@ def test_circle_is_round_and_across() -> None:
     assert_allclose(points[0], points[-1], atol=1e-12)
 
 
-def test_pointer_takes_the_nearest_ring_and_none_far_away() -> None:
+def test_pointer_picks_the_nearest_ring_within_range() -> None:
     actor, view = Actor(arm_figure()), frame()
     posed = posed_joint(actor, 0)
     found = rings(posed, actor.pose, "local", view)
@@ -91,7 +91,7 @@ def test_pointer_takes_the_nearest_ring_and_none_far_away() -> None:
 
 @pytest.mark.parametrize("parallel", [True, False])
 @pytest.mark.parametrize("angle", [0.4, -1.2, 2.9])
-def test_ring_seen_from_above_turns_by_the_angle_of_the_pointer(angle, parallel) -> None:
+def test_face_on_ring_rotates_by_the_pointer_angle(angle, parallel) -> None:
     actor, view = Actor(arm_figure()), frame(parallel=parallel)
     handle = grabbed(actor, 0, view, spot(0.7))  # where no other ring crosses
     assert handle.ring.color == 2
@@ -99,10 +99,10 @@ def test_ring_seen_from_above_turns_by_the_angle_of_the_pointer(angle, parallel)
         outcome = handle.follow(view, spot(0.7 + share * angle, 200.0), False)
     assert_allclose(outcome.pose.dofs[:3], [0, 0, angle], atol=1e-6)
     assert outcome.angle == pytest.approx(angle) and outcome.limited == ()
-    assert not actor.pose.dofs.any()  # the pose at the start is left alone
+    assert not actor.pose.dofs.any()  # the initial pose is not modified
 
 
-def test_turning_around_and_around_goes_on() -> None:
+def test_rotation_accumulates_beyond_full_turns() -> None:
     actor, view = Actor(arm_figure(orders=("z", "z", ""))), frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
     for turn in np.linspace(0, 4.5 * np.pi, 40):
@@ -110,7 +110,7 @@ def test_turning_around_and_around_goes_on() -> None:
     assert outcome.pose.dofs[0] == pytest.approx(4.5 * np.pi)
 
 
-def test_ring_seen_at_a_slant_follows_where_its_plane_is_pointed_at() -> None:
+def test_slanted_ring_follows_the_pointer_in_its_plane() -> None:
     # From 50 degrees above the ring about y is an ellipse; a point of it is dragged to another.
     actor, view = Actor(arm_figure()), frame(inclination=50.0)
     unit = view.unit_length(np.zeros(3))
@@ -121,7 +121,7 @@ def test_ring_seen_at_a_slant_follows_where_its_plane_is_pointed_at() -> None:
     assert_allclose(outcome.pose.dofs[:3], [0, 0.7, 0], atol=1e-3)
 
 
-def test_ring_seen_from_its_edge_rolls_like_a_wheel() -> None:
+def test_edge_on_ring_rolls_like_a_wheel() -> None:
     # The front of the ring about y moves right by one radius: one radian.
     actor, view = Actor(arm_figure()), frame()
     handle = grabbed(actor, 0, view, (310.0, 300.0))
@@ -130,7 +130,7 @@ def test_ring_seen_from_its_edge_rolls_like_a_wheel() -> None:
     assert outcome.pose.dofs[1] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_snap_goes_by_fifteen_degrees() -> None:
+def test_snap_steps_by_fifteen_degrees() -> None:
     actor, view = Actor(arm_figure()), frame()
     handle = grabbed(actor, 0, view, spot(0.7))
     outcome = handle.follow(view, spot(0.7 + np.radians(40.0)), True)
@@ -139,7 +139,7 @@ def test_snap_goes_by_fifteen_degrees() -> None:
     assert outcome.text == "shoulder z +45.0\N{DEGREE SIGN}"
 
 
-def test_whole_joint_is_turned_exactly_about_the_axis() -> None:
+def test_ball_joint_rotates_exactly_about_the_axis() -> None:
     actor, view = Actor(arm_figure(orders=("zxy", "yzx", ""))), frame()
     actor.pose.dofs[:] = 0.3, -0.4, 0.5, 0.6, 0.2, -0.9
     posed = posed_joint(actor, 1)
@@ -157,7 +157,7 @@ def test_whole_joint_is_turned_exactly_about_the_axis() -> None:
                     joint_rotations(posed.skeleton, actor.pose)[0])  # fmt: skip
 
 
-def test_limit_stops_one_dof_and_is_named() -> None:
+def test_limit_stops_one_dof_and_is_reported() -> None:
     actor = Actor(arm_figure(orders=("z", "z", ""), limits={(0, "z"): (-0.2, 0.5)}))
     view = frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
@@ -170,12 +170,12 @@ def test_limit_stops_one_dof_and_is_named() -> None:
     assert limit_text(skeleton, ()) == ""
 
 
-def test_mirrored_figure_turns_the_way_the_pointer_goes() -> None:
+def test_mirrored_figure_rotates_with_the_pointer() -> None:
     actor, view = Actor(arm_figure(orders=("z", "z", ""))), frame()
     actor.placement[0, 0] = -1.0
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
     turn = 0.6
     outcome = handle.follow(view, (300 + 90 * np.cos(turn), 300 - 90 * np.sin(turn)), False)
     elbow = posed_joint(actor, 1, outcome.pose).center
-    # The elbow was at (-1, 0, 0) and has gone round against the clock.
+    # The elbow was at (-1, 0, 0) and has moved counter-clockwise.
     assert_allclose(elbow, [-np.cos(turn), -np.sin(turn), 0], atol=1e-6)

@@ -1,4 +1,4 @@
-"""The Shape panel: coefficients, random shapes, read-outs; sums by hand on a body that is a box."""
+"""The Shape panel: coefficients, random shapes, read-outs; hand calculation on a box body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.shape import rest_joints, shaped
 
 @pytest.fixture
 def shape(box):
-    """A hand on the Shape panel of the box."""
+    """A test driver on the Shape panel of the box."""
     box.show_panel("Shape")
     return box
 
@@ -57,14 +57,14 @@ def test_joints_follow_the_shape(shape):
 
 
 @pytest.mark.parametrize("text", ["7.5", "-12"])
-def test_typed_value_may_lie_beyond_five_standard_deviations(shape, text):
+def test_typed_value_may_exceed_five_standard_deviations(shape, text):
     shape.enter_value("coefficient 0", text)
     assert _weights(shape).tolist() == [float(text), 0]
     shape.step(3)
     assert _weights(shape).tolist() == [float(text), 0] and shape.undo_steps == 1
 
 
-def test_typed_nonsense_leaves_a_shape_that_draws(shape):
+def test_invalid_input_leaves_a_drawable_shape(shape):
     for text in ("nan", "inf", "-inf", "1e39", "1e7", "", "abc"):
         shape.enter_value("coefficient 0", text)
         assert np.isfinite(_weights(shape)).all() and np.abs(_weights(shape)).max() < 1e6
@@ -79,7 +79,7 @@ def test_double_click_resets_one_coefficient(shape):
     assert _weights(shape).tolist() == [0, 2]
 
 
-def test_drag_is_one_step_that_comes_back(shape):
+def test_drag_is_one_undo_step(shape):
     first = shape.scene_picture()
     _drag(shape, 0, 0.9)
     shape.step(2)
@@ -95,11 +95,11 @@ def test_drag_is_one_step_that_comes_back(shape):
     assert_array_equal(shape.scene_picture(), picture)
 
 
-def test_random_draws_the_shape_of_the_seed_that_is_shown(shape):
+def test_random_samples_the_shape_of_the_shown_seed(shape):
     shape.click("Random")
     assert shape.state.of(Posing).shape_seed == 1
     first = _weights(shape).copy()
-    # The numbers that a person gets who writes the seed down.
+    # The coefficients reproduced from a noted seed.
     assert_array_equal(first, np.random.default_rng(1).standard_normal(2))
     shape.click("Random")
     assert shape.state.of(Posing).shape_seed == 2 and (_weights(shape) != first).all()
@@ -114,7 +114,7 @@ def _type_seed(hand, text):
     hand.step(2)
 
 
-def test_typed_seed_draws_the_same_shape_again(shape):
+def test_same_seed_gives_the_same_shape(shape):
     for _ in range(3):
         shape.click("Random")
     _type_seed(shape, "1")
@@ -122,7 +122,7 @@ def test_typed_seed_draws_the_same_shape_again(shape):
     assert_array_equal(_weights(shape), np.random.default_rng(1).standard_normal(2))
 
 
-def test_odd_seeds_are_taken_as_the_nearest_that_can_be(shape):
+def test_invalid_seeds_are_clamped(shape):
     shape.click("Random")
     for text, seed in (("-7", 0), ("2147483647", 2**31 - 1), ("x", 2**31 - 1)):
         _type_seed(shape, text)
@@ -180,7 +180,7 @@ def _said(hand, texts):
     return {name: texts[texts.index(name) + 1] for name in ("Height", "Volume", "Mass")}
 
 
-def test_read_outs_are_those_of_the_box(shape, texts):
+def test_read_outs_show_the_box_dimensions(shape, texts):
     # 0.5 x 2 x 0.25 m are 250 litres, which weigh 246.25 kg.
     assert _said(shape, texts) == {
         "Height": "2.000 m",
@@ -198,7 +198,7 @@ def test_read_outs_are_those_of_the_box(shape, texts):
     assert (said["Height"], said["Volume"]) == ("2.200 m", "330.0 litres")
 
 
-def test_read_outs_are_of_the_rest_body(shape, texts):
+def test_read_outs_measure_the_rest_pose(shape, texts):
     before = _said(shape, texts)
     shape.state.actor.pose.dofs[:] = 0.7
     shape.state.actor.pose.figure_scale = 2.0
@@ -238,7 +238,7 @@ def test_hundreds_of_coefficients_draw_only_the_rows_in_sight(drive_body):
     assert np.flatnonzero(_weights(hand)).tolist() == [398]
 
 
-def test_names_that_files_give_are_shown_without_their_markup(drive, tmp_path):
+def test_names_from_files_are_shown_verbatim(drive, tmp_path):
     path = tmp_path / "named.npz"
     np.savez(path, **box_body.arrays(), shape_names=np.array(["tall##x", "100%s\n"]))
     hand = drive(path, size=(900, 1000), samples=1)
@@ -254,13 +254,13 @@ def _is_absent(title):
 
 
 @pytest.mark.parametrize("n_files", [0, 1, 2], ids=["fox", "skeleton", "rig"])
-def test_figures_of_one_shape_have_no_shape_panel(drive, rig, n_files):
+def test_figures_without_blend_shapes_have_no_shape_panel(drive, rig, n_files):
     hand = drive(*rig[:n_files])
     assert hand.state.actor.figure.blend_shapes is None
     assert _is_absent("Shape") and not _coefficients(hand)
 
 
-def test_shape_panel_goes_and_comes_with_the_figure(shape, rig):
+def test_shape_panel_appears_and_disappears_with_the_figure(shape, rig):
     assert not _is_absent("Shape")
     shape.open(*rig)
     assert _is_absent("Shape")
@@ -296,7 +296,7 @@ def test_morphs_have_sliders_from_0_to_1_by_their_names(morphed, texts):
     assert_allclose(height, [0, 1, 0], atol=1e-6)
 
 
-def test_typed_weight_of_a_morph_is_free_and_resets(morphed):
+def test_typed_morph_weight_is_unlimited_and_resets(morphed):
     before = morphed.scene_picture()
     morphed.enter_value("coefficient 1", "-1.5")
     assert _weights(morphed).tolist() == [0, -1.5]

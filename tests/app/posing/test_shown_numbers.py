@@ -1,4 +1,4 @@
-"""Numbers that the window shows: angles in the unit of the panel, and no minus before a zero."""
+"""Numbers shown in the window: angles in the panel's unit, and no negative zero."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.app.posing.move_tool import _shift_text
 
 @pytest.fixture
 def tooltips(monkeypatch):
-    """What tooltips said, the last one last."""
+    """Tooltip texts, latest last."""
     said = []
     show = imgui.set_tooltip
     monkeypatch.setattr(imgui, "set_tooltip", lambda text: (said.append(text), show(text))[1])
@@ -23,7 +23,7 @@ def tooltips(monkeypatch):
 
 @pytest.fixture
 def sliders(monkeypatch):
-    """What sliders showed, by their label."""
+    """Slider texts by label."""
     shown = {}
     draw = imgui.slider_float
 
@@ -87,11 +87,11 @@ def test_timeline_and_status_show_no_minus_before_a_zero(drive, rig, tmp_path, t
     assert hand.says("0.000 s") and not hand.says("-0.000")
 
 
-def test_shift_of_a_joint_has_no_negative_zero():
+def test_joint_translation_shows_no_negative_zero():
     assert _shift_text("root", np.array([-0.0, 0.25, -1.0])) == "root   +0 +0.25 -1"
 
 
-def test_own_numbers_have_no_negative_zero(box, texts):
+def test_raw_pose_values_have_no_negative_zero(box, texts):
     box.click("Rotation vectors")
     box.state.actor.pose.dofs[:] = -1e-9
     texts.clear()

@@ -1,4 +1,4 @@
-"""The tools in the view's corner: buttons, reasons, keys, clips, and poses between figures."""
+"""The toolbar: buttons, greyed reasons, shortcuts, clips, and poses between figures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def arm(drive):
 
 @pytest.fixture
 def moved(drive):
-    """A hand on an arm with a keyed clip, with the tool Rotate at its shoulder."""
+    """A test driver on an arm with a keyed clip, with the tool Rotate at its shoulder."""
     scene = arm_scene()
     scene.actors[0].clip = waving()
     hand = drive(scene=scene, size=SIZE, samples=1)
@@ -45,7 +45,7 @@ def turn(hand, held=""):
     drag_along(hand, around(joint_seen(hand, 0), 1.2 * RADIUS, 0.3, 1.1), held)
 
 
-def test_buttons_and_keys_take_tools_in_hand(arm):
+def test_buttons_and_keys_activate_tools(arm):
     seen = []
     for name in ("Rotate", "Move", "Select"):
         arm.click(f"tool {name}")
@@ -56,7 +56,7 @@ def test_buttons_and_keys_take_tools_in_hand(arm):
     assert seen == ["rotate", "move", "select"] * 2
 
 
-def test_only_a_tool_that_poses_brings_the_other_buttons(arm):
+def test_only_posing_tools_show_the_other_buttons(arm):
     assert "tool Mirror" not in arm.state.item_rects
     arm.key("e")
     arm.step(2)
@@ -67,7 +67,7 @@ def test_only_a_tool_that_poses_brings_the_other_buttons(arm):
     assert "Chain" in arm.state.item_rects
 
 
-def test_axes_by_key_and_by_list(arm):
+def test_axes_are_chosen_by_key_and_list(arm):
     arm.key("e")
     seen = []
     for _ in range(3):
@@ -79,7 +79,7 @@ def test_axes_by_key_and_by_list(arm):
     assert arm.state.of(Posing).orientation == "world"
 
 
-def test_chain_goes_from_one_to_the_depth(arm):
+def test_chain_length_ranges_from_one_to_the_depth(arm):
     arm.key("d")
     arm.state.selected_joint = 2
     arm.step(2)
@@ -89,7 +89,7 @@ def test_chain_goes_from_one_to_the_depth(arm):
     assert arm.state.of(Posing).chain_length == 2
 
 
-def test_reasons_of_what_is_greyed(arm):
+def test_greyed_buttons_show_their_reason(arm):
     state = arm.state
     assert no_keys(state) == "there is no clip: create one with Edit > New clip"
     assert no_chain(state) == "chains apply only to the Move tool (D)"
@@ -123,7 +123,7 @@ def test_figure_without_joints_has_no_tools(drive, rig):
     assert hand.says("Rotate: this figure has no joints to pose")
 
 
-def test_small_views_have_no_room_for_tools(drive):
+def test_small_views_hide_the_toolbar(drive):
     hand = drive(scene=arm_scene(), size=(520, 300), samples=1)
     assert "##tools" not in hand.state.item_rects
     hand.key("e")
@@ -143,7 +143,7 @@ def test_mirror_button_mirrors_and_is_undone(drive_body):
     assert hand.dof("joint_1.x") == pytest.approx(0.5)
 
 
-def test_edit_pauses_the_clip_and_says_why(moved):
+def test_edit_pauses_the_clip_with_a_note(moved):
     moved.state.clock.playing = True
     moved.step(3)
     time = moved.state.clock.time
@@ -170,7 +170,7 @@ def test_click_on_a_handle_does_not_pause(moved, shake):
     time = moved.state.clock.time
     moved.move((x + shake, y))
     moved.step(3)
-    # Time waits as long as the handle is held.
+    # Time stands still while the handle is held.
     assert moved.state.clock.playing and moved.state.clock.time == time
     moved.let_go()
     moved.step(3)
@@ -178,7 +178,7 @@ def test_click_on_a_handle_does_not_pause(moved, shake):
     assert not moved.says("Paused") and moved.undo_steps == 0
 
 
-def test_key_button_keeps_the_pose_in_the_clip_and_is_undone(moved):
+def test_key_button_adds_the_pose_to_the_clip_and_is_undone(moved):
     moved.state.clock.seek(1.0)
     moved.step(2)
     turn(moved, held="ctrl")
@@ -193,7 +193,7 @@ def test_key_button_keeps_the_pose_in_the_clip_and_is_undone(moved):
     moved.key("z", "ctrl")
     assert moved.state.actor.clip is old
     moved.key("z", "ctrl")
-    assert moved.dofs()[2] == pytest.approx(0.5)  # half way of the clip
+    assert moved.dofs()[2] == pytest.approx(0.5)  # halfway through the clip
 
 
 def test_slider_pauses_the_clip_too(moved):
@@ -206,7 +206,7 @@ def test_slider_pauses_the_clip_too(moved):
 
 @pytest.fixture
 def two(drive):
-    """A hand on two arms whose DOFs are in other orders; the second has no joint "hand"."""
+    """A driver showing two arms with differently ordered DOFs; the second has no joint "hand"."""
     first = arm_figure(orders=("xyz", "xyz", "xyz"), name="first")
     second = arm_figure(orders=("zyx", "yxz", ""), name="second")
     object.__setattr__(second.skeleton, "names", ("shoulder", "elbow", "claw"))
@@ -222,7 +222,7 @@ def rotations(hand):
     return joint_rotations(actor.figure.skeleton, actor.pose)
 
 
-def test_pose_goes_to_an_actor_with_other_dofs_as_rotations(two):
+def test_pose_is_pasted_as_rotations_if_dofs_differ(two):
     wanted = rotations(two)
     two.click("tool Copy")
     two.state.choose_actor(1)
@@ -236,7 +236,7 @@ def test_pose_goes_to_an_actor_with_other_dofs_as_rotations(two):
     assert not two.dofs().any()
 
 
-def test_text_from_elsewhere_is_still_taken_by_labels(two):
+def test_text_from_other_programs_is_matched_by_labels(two):
     two.key("c", "ctrl")
     imgui.set_clipboard_text('{"dofs": {"elbow.z": 0.25}}')
     two.state.choose_actor(1)

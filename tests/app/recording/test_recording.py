@@ -1,4 +1,4 @@
-"""Recording from the window: the dialog, what is written, progress, and cancelling."""
+"""Recording from the window: the dialog, output files, progress, and cancelling."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.motion.instances import pose_actors
 
 @pytest.fixture
 def moving(drive, rig):
-    """A hand on the tiny figure whose root moves right, 0.5 a second, for a second."""
+    """A test driver on the tiny figure whose root moves right, 0.5 a second, for a second."""
     hand = drive(*rig, size=(1000, 700), samples=1)
     channel = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
     hand.state.actor.clip = Clip("slide", (channel,), 0.0, 1.0)
@@ -78,7 +78,7 @@ def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
     assert np.diag(differences).max() < 2.0 < differences[0, 1]
 
 
-def test_what_explains_the_view_is_in_every_frame(moving, tmp_path):
+def test_annotations_and_legend_are_in_every_frame(moving, tmp_path):
     state = moving.state
     pin_vertex(state, 0, 4)
     state.selected_joint = 1
@@ -108,7 +108,7 @@ def test_what_explains_the_view_is_in_every_frame(moving, tmp_path):
     assert middles[0] < middles[1] < middles[2]
 
 
-def test_annotations_are_those_of_the_frames_pose(moving):
+def test_annotations_follow_the_pose_of_each_frame(moving):
     pin_vertex(moving.state, 0, 4)
     moving.step(4)
     marks = RecordedMarks(moving.state)
@@ -134,7 +134,7 @@ def test_dialog_offers_the_legend_where_there_is_one(moving):
     assert moving.state.options.legend
 
 
-def test_scene_is_left_as_it_was(moving, tmp_path):
+def test_recording_leaves_the_scene_unchanged(moving, tmp_path):
     moving.state.clock.seek(0.25)
     moving.step(2)
     before, steps = moving.dofs(), moving.undo_steps
@@ -145,7 +145,7 @@ def test_scene_is_left_as_it_was(moving, tmp_path):
     assert moving.undo_steps == steps
 
 
-def test_sheet_has_as_many_cells_as_asked(moving, tmp_path):
+def test_contact_sheet_has_the_requested_number_of_cells(moving, tmp_path):
     start(moving, tmp_path / "s.png", kind="sheet", n_cells=4, size="own", own_size=(400, 300))
     finish(moving)
     with Image.open(tmp_path / "s.png") as picture:
@@ -166,7 +166,7 @@ def test_video_has_every_frame(moving, tmp_path):
         assert sum(1 for _ in container.decode(stream)) == 11
 
 
-def test_cancelling_leaves_nothing(moving, tmp_path):
+def test_cancelling_leaves_no_files(moving, tmp_path):
     pytest.importorskip("av")
     (tmp_path / "out").mkdir()
     start(moving, tmp_path / "out" / "v.mp4", rate=500.0, size="own", own_size=(64, 64))
@@ -181,11 +181,11 @@ def test_cancelling_leaves_nothing(moving, tmp_path):
     assert moving.scene_picture().std() > 1.0  # the window still draws
 
 
-def test_window_answers_while_it_records(moving, tmp_path):
+def test_window_stays_responsive_while_recording(moving, tmp_path):
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=60.0)
     moving.step(3)
     azimuth = moving.state.camera.azimuth
-    x, y = moving.middle[0], moving.middle[1] + 80  # beside the progress bar
+    x, y = moving.middle[0], moving.middle[1] + 80  # next to the progress bar
     moving.pull((x, y), (x + 40, y))
     assert moving.state.camera.azimuth != azimuth
     finish(moving)
@@ -207,14 +207,14 @@ def test_still_scene_is_recorded_as_a_turntable(drive, rig, tmp_path):
     assert len(list((tmp_path / "t").iterdir())) == 4
 
 
-def test_names_that_would_all_be_the_same_are_refused(moving, tmp_path):
+def test_file_pattern_without_a_frame_number_is_refused(moving, tmp_path):
     start(moving, tmp_path / "same.png", kind="pictures")
     moving.step(2)
     assert moving.state.error.startswith(f"{tmp_path / 'same.png'}: expected a name with {{frame}}")
     assert moving.state.job is None
 
 
-def test_pictures_that_exist_are_not_replaced(moving, tmp_path):
+def test_existing_images_are_not_replaced(moving, tmp_path):
     (tmp_path / "f_2.png").write_bytes(b"precious")
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=4.0)
     moving.step(2)
@@ -222,8 +222,8 @@ def test_pictures_that_exist_are_not_replaced(moving, tmp_path):
     assert (tmp_path / "f_2.png").read_bytes() == b"precious"
 
 
-def test_picture_that_the_scene_was_read_from_is_not_replaced(moving, tmp_path):
-    """Nobody opened it: the figure's own file names it."""
+def test_input_images_are_not_replaced(moving, tmp_path):
+    """Not opened directly: the figure's own file names it."""
     texture = tmp_path / "cloth.png"
     texture.write_bytes(b"precious")
     moving.state.scene.files = (texture,)

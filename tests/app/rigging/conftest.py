@@ -1,4 +1,4 @@
-"""Fixtures of the Rig panel."""
+"""Fixtures for Rig panel tests."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.app.rigging.sources import current_template
 
 @pytest.fixture
 def rigging(drive):
-    """A hand on an app with the mesh and its template, which lies on it, the panel open."""
+    """A test driver showing the mesh with its aligned template, the Rig panel open."""
 
     def opened(placed=True, **settings):
         hand = drive(scene=rig_scene.scene(**settings), size=SIZE, samples=1)

@@ -1,4 +1,4 @@
-"""What the Rig panel lists."""
+"""Contents of the Rig panel."""
 
 from __future__ import annotations
 

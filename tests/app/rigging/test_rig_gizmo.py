@@ -1,4 +1,4 @@
-"""The template laid onto the target by hand: gizmo, numbers, landmarks."""
+"""Manual alignment of the template: gizmo, typed values, landmarks."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ pytestmark = pytest.mark.usefixtures("quick_fits")
 
 @pytest.fixture
 def hand(drive):
-    """A hand on an app with mesh and template, the panel open; the camera looks along -z."""
+    """A test driver on an app with mesh and template, the panel open; the camera looks along -z."""
     opened = drive(scene=rig_scene.scene(), size=(1000, 1000), samples=1)
     opened.menu("menu Window", "Rig")
     opened.step(2)
     opened.key("_1")
-    opened.key("_5")  # parallel: the same way on the screen is as long everywhere
+    opened.key("_5")  # orthographic: screen distances do not depend on depth
     opened.key("f")
     return opened
 
@@ -49,7 +49,7 @@ def similarity(hand):
 
 
 def middle(hand):
-    """Return where the gizmo is in the scene, and on the screen."""
+    """Return the position of the gizmo in the scene and on the screen."""
     template = current_template(hand.state)
     box = bounding_box(posed_template(hand.state.of(Rigging), template).positions)
     point = apply_transform(ghost_place(hand.state, template), box.mean(axis=0)[None])[0]
@@ -57,12 +57,12 @@ def middle(hand):
 
 
 def unit_way(hand, axis):
-    """Return how the screen shows a unit along an axis of the scene."""
+    """Return the screen vector of a unit along an axis of the scene."""
     frame, (point, place) = view_frame(hand.state), middle(hand)
     return np.array(frame.place(point + axis)) - place
 
 
-def test_template_begins_box_on_box(hand):
+def test_template_starts_with_aligned_bounding_boxes(hand):
     hand.click("rig tool move")
     start = similarity(hand)
     boxes = [
@@ -93,7 +93,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
     assert_allclose(after.rotation, before.rotation, atol=1e-6)
     assert after.scale == pytest.approx(before.scale, rel=1e-6)
     assert hand.state.camera.azimuth == camera
-    hand.finish_job()  # once it was let go of its error is measured
+    hand.finish_job()  # its error is measured after release
     alignment = hand.state.of(Rigging).placing.alignment
     assert alignment.how == "given" and alignment.error > 0.01
 
@@ -127,7 +127,7 @@ def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
     assert (similarity(hand).factors == 1.0).all()
 
 
-def test_drag_is_one_step_of_undoing_with_its_error(hand):
+def test_drag_is_one_undo_step_including_its_error(hand):
     hand.click("rig tool move")
     before, steps = similarity(hand), hand.undo_steps
     pull_along_x(hand, 2.5)
@@ -139,9 +139,7 @@ def test_drag_is_one_step_of_undoing_with_its_error(hand):
     hand.key("z", "ctrl")
     hand.step(2)
     assert_allclose(similarity(hand).matrix, first.matrix)
-    assert (
-        hand.state.of(Rigging).placing.alignment.error == error
-    )  # measured before, and known again
+    assert hand.state.of(Rigging).placing.alignment.error == error  # measured before and cached
     hand.key("z", "ctrl")
     hand.step(2)
     assert hand.state.of(Rigging).placing is None
@@ -152,7 +150,7 @@ def test_drag_is_one_step_of_undoing_with_its_error(hand):
     assert hand.state.job is None and hand.undo_steps == steps + 1
 
 
-def test_moved_template_keeps_its_fitted_pose_and_not_the_gap_it_left(hand):
+def test_moved_template_keeps_its_fitted_pose_but_not_its_residual(hand):
     hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2  # the target's tip is bent more
     hand.step(2)
     hand.click("Align")
@@ -216,7 +214,7 @@ def test_ring_scales_the_template_as_a_whole(hand):
     assert hand.state.camera.azimuth == camera
 
 
-def test_view_beside_the_gizmo_still_orbits(hand):
+def test_drag_outside_the_gizmo_still_orbits(hand):
     hand.click("rig tool move")
     azimuth = hand.state.camera.azimuth
     x, y, width, height = hand.state.view_rect
@@ -224,7 +222,7 @@ def test_view_beside_the_gizmo_still_orbits(hand):
     assert hand.state.camera.azimuth != azimuth
 
 
-def test_numbers_place_the_template(hand):
+def test_typed_values_place_the_template(hand):
     hand.click("rig tool move")
     x0, y0, x1, y1 = hand.state.item_rects["Translation"]
     hand.enter_value("Scale factor", "30")
@@ -241,7 +239,7 @@ def test_numbers_place_the_template(hand):
     assert x1 > x0
 
 
-def test_refining_finds_the_place_from_near_by(hand):
+def test_refining_converges_from_nearby(hand):
     near = TRUE.copy()
     near[:3, 3] += 1.0
     template = current_template(hand.state)
@@ -253,7 +251,7 @@ def test_refining_finds_the_place_from_near_by(hand):
     assert hand.state.of(Rigging).placing.alignment.how == "landmarks"
 
 
-def test_run_keeps_what_was_placed_by_hand(hand):
+def test_run_keeps_the_manual_alignment(hand):
     template = current_template(hand.state)
     move_by_hand(hand.state, template, as_similarity(TRUE))
     hand.step(2)
@@ -278,7 +276,7 @@ def click_pair(hand, triangle):
 
 
 def faces_eye(hand, mesh, matrix, triangle):
-    """Return whether a triangle is seen: it faces the eye, and nothing lies before it."""
+    """Return whether a triangle is visible: facing the eye and not occluded."""
     frame = view_frame(hand.state)
     corners = apply_transform(matrix, mesh.positions)[mesh.triangles]
     middle = corners[triangle].mean(axis=0)
@@ -330,7 +328,7 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
     assert state.of(Rigging).landmarks == []
 
 
-def test_clicks_beside_the_meshes_and_escape(hand):
+def test_clicks_outside_the_meshes_and_escape_add_no_landmark(hand):
     hand.click("rig tool landmarks")
     x, y, _, height = hand.state.view_rect
     hand.click((x + 5, y + height - 5))
@@ -349,7 +347,7 @@ def test_clicks_beside_the_meshes_and_escape(hand):
     assert hand.state.of(Rigging).tool == ""
 
 
-def test_matrices_become_similarities():
+def test_matrices_are_projected_to_similarities():
     turned = rig_scene.ROTATION
     matrix = translation_matrix(np.array([1.0, 2.0, 3.0]))
     matrix[:3, :3] = 2.0 * turned + 1e-5

@@ -27,7 +27,7 @@ def visible(hand):
     return [actor.name for actor in hand.state.scene.actors if actor.visible]
 
 
-def test_scene_without_a_bare_mesh_greys_all_but_adding_one(drive, texts):
+def test_without_a_target_mesh_only_adding_one_is_enabled(drive, texts):
     hand = drive(size=SIZE, samples=1)
     hand.menu("menu Window", "Rig")
     texts.clear()
@@ -65,9 +65,9 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
         ((1.0, 1.0, 1.0), (1.0, 0.8, 1.0), "stretched, pose kept"),
     ],
 )
-def test_words_beside_the_error_say_what_was_done(rigging, texts, factors, own, words):
+def test_text_next_to_the_error_describes_the_alignment(rigging, texts, factors, own, words):
     hand = rigging()
-    hand.finish_job()  # the gap where it was laid is being measured
+    hand.finish_job()  # the error of the alignment is being measured
     placing = placing_now(hand.state)
     where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
     found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")
@@ -78,7 +78,7 @@ def test_words_beside_the_error_say_what_was_done(rigging, texts, factors, own, 
 
 
 @pytest.mark.parametrize("fits", [True, False])
-def test_align_says_what_it_does(rigging, monkeypatch, fits):
+def test_align_button_describes_what_it_does(rigging, monkeypatch, fits):
     said, show = [], imgui.set_tooltip
     monkeypatch.setattr(imgui, "set_tooltip", lambda text: said.append(text) or show(text))
     hand = rigging()
@@ -127,7 +127,7 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
     assert state.options.shading == "auto"
 
 
-def test_match_counts_what_is_near_enough_and_faces_alike(rigging):
+def test_match_counts_close_vertices_with_similar_normals(rigging):
     hand = rigging()
     # The template a tenth of the target's size beside it: nothing is within 1 %.
     placing = hand.state.of(Rigging).placing.similarity
@@ -163,7 +163,7 @@ def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
     assert_allclose(placed.own_factors, stretch, atol=1e-9)
 
 
-def test_run_puts_the_rigged_mesh_in_the_targets_place_in_one_step(rigging):
+def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     hand = rigging()
     target = hand.state.scene.actors[0]
     wanted = target.figure.mesh.positions
@@ -211,7 +211,7 @@ def test_stats_count_the_rigged_mesh(rigging, texts):
     assert "scan rigged, arm, scan" in texts and "4" in texts  # joints: two of each rig
 
 
-def test_a_goes_between_the_mesh_and_its_rig_without_steps(rigging):
+def test_a_toggles_between_mesh_and_rig_without_undo_steps(rigging):
     hand = rigging()
     hand.key("a")
     assert hand.says("A/B: nothing is rigged yet, see Window > Rig")
@@ -283,7 +283,7 @@ def test_confidence_maps_are_buttons(rigging):
     assert hand.state.options.shading == "auto"
 
 
-def test_result_moves_as_the_template_where_the_target_stands(rigging):
+def test_result_plays_the_template_motion_at_the_target_position(rigging):
     hand = rigging(with_clip=True)
     # The clip's first frame is the rest pose; the target was posed otherwise.
     template = hand.state.scene.actors[1]
@@ -329,7 +329,7 @@ def test_cancelled_work_changes_nothing(rigging):
     assert running is None and names(hand) == before and hand.state.error == ""
 
 
-def test_result_of_a_mesh_that_is_gone_is_dropped(rigging):
+def test_result_for_a_removed_mesh_is_discarded(rigging):
     hand = rigging()
     hand.click("Run")
     job = hand.state.job
@@ -341,7 +341,7 @@ def test_result_of_a_mesh_that_is_gone_is_dropped(rigging):
     assert names(hand) == ["arm"]
 
 
-def test_new_scene_forgets_everything_but_the_choices(rigging, rig):
+def test_new_scene_keeps_only_the_settings(rigging, rig):
     hand = rigging()
     hand.pick("Method", 1)
     hand.click("Run")

@@ -1,4 +1,4 @@
-"""The Rig panel as it looks: a mesh with its template over it, and the result with its report."""
+"""Golden images of the Rig panel: a mesh with its template, and the result with its report."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def _result(hand):
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
-def test_rig_panel_looks_as_it_did(drive, name, prepare):
+def test_rig_panel_matches_golden_image(drive, name, prepare):
     hand = drive(scene=rig_scene.scene(), size=SIZE, samples=1)
-    hand.state.of(ShownPanels).closed.add("stats")  # times are others every time
+    hand.state.of(ShownPanels).closed.add("stats")  # times differ between runs
     hand.menu("menu Window", "Rig")
     hand.step(2)
     _compare(_shown(hand, prepare), name)

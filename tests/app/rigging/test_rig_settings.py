@@ -1,4 +1,4 @@
-"""Rig panel: settings, templates of files, messages, and results that are saved."""
+"""Rig panel: settings, templates from files, messages, and saved results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from viewer.rig.skinning import deform
 pytestmark = pytest.mark.usefixtures("quick_fits")
 
 
-def test_missing_scipy_is_a_message(rigging, monkeypatch):
+def test_missing_scipy_shows_a_message(rigging, monkeypatch):
     def missing(name):
         raise ModuleNotFoundError(name)
 
@@ -96,7 +96,7 @@ def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypat
     assert "Smoothing" in hand.state.item_rects
 
 
-def test_work_says_in_words_what_it_does_and_its_share(rigging, texts, monkeypatch):
+def test_progress_shows_step_and_fraction(rigging, texts, monkeypatch):
     gate = threading.Event()
 
     def placed(template, own, target, settings, fits, tell):
@@ -118,10 +118,10 @@ def test_work_says_in_words_what_it_does_and_its_share(rigging, texts, monkeypat
     hand.finish_job()
 
 
-def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
+def test_template_is_posed_to_fit_and_shown_in_that_pose(rigging, texts):
     hand = rigging(placed=False)
     actor = hand.state.scene.actors[1]
-    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is turned by half a radian more
+    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is rotated by another half radian
     hand.step(2)
     hand.click("Align")
     hand.finish_job()
@@ -136,14 +136,14 @@ def test_template_in_another_pose_is_turned_to_fit_and_shown_so(rigging, texts):
     wanted = target_mesh(state).positions
     gaps = [np.linalg.norm(points - wanted, axis=1).max() for points in (shown, own)]
     assert gaps[0] < 0.2 * gaps[1]
-    assert actor.pose.dofs[8] == 0.2  # the actor stands as before
+    assert actor.pose.dofs[8] == 0.2  # the actor is unchanged
     hand.click("Run")
     hand.finish_job()
     assert_allclose(seen(hand, 0), wanted, atol=1e-6)
     assert state.error == ""
 
 
-def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp_path):
+def test_mesh_is_added_by_dialog_and_the_body_is_loaded_on_demand(drive, tmp_path):
     figure, pose = rig_scene.bent()
     export(Actor(rig_scene.scan(figure, pose)), tmp_path / "scan.obj")
     hand = drive(size=SIZE, samples=1)
@@ -160,7 +160,7 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
     assert [*template_names(hand)][1:] == ["Bundled body", "Bundled fox"]
     hand.pick("Template", 2)
     assert hand.state.of(Rigging).template_key == "fox"
-    hand.click("rig tool move")  # the template has to be there to be moved
+    hand.click("rig tool move")  # the template must be loaded to be moved
     hand.finish_job()
     assert hand.state.of(Rigging).template.figure.name == "fox"
     hand.click("Pose it…")
@@ -168,7 +168,7 @@ def test_mesh_is_added_by_the_dialog_and_the_body_is_read_when_needed(drive, tmp
     assert names(hand) == ["fox", "scan", "fox-2"]
     chosen = hand.state.scene.actors[2]
     assert hand.state.of(Rigging).template_key == f"actor {id(chosen)}"
-    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # beside the others
+    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # in addition to the others
     hand.key("z", "ctrl")
     hand.step(2)
     assert names(hand) == ["fox", "scan"]
@@ -178,7 +178,7 @@ def template_names(hand):
     return template_texts(hand.state).values()
 
 
-def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
+def test_template_from_a_file_is_unchanged_by_fitting(drive, tmp_path):
     hand = drive(scene=rig_scene.scene(with_template=False), size=SIZE, samples=1)
     hand.menu("menu Window", "Rig")
     hand.step(2)
@@ -187,7 +187,7 @@ def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
     start_reading(hand.state, (tmp_path / "arm.npz",))
     hand.finish_job()
     template = hand.state.of(Rigging).template
-    hand.click("Run")  # aligns, and turns the joints of the template, which is at rest
+    hand.click("Run")  # aligns the resting template and rotates its joints
     hand.finish_job()
     assert hand.state.of(Rigging).template is template
     assert placing_now(hand.state).fitted is not None
@@ -197,7 +197,7 @@ def test_template_of_a_file_stays_itself_when_it_is_fitted(drive, tmp_path):
     assert names(hand) == ["scan rigged", "scan"] and hand.state.error == ""
 
 
-def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
+def test_unsuitable_files_show_a_message(rigging, tmp_path):
     hand = rigging()
     skel, skin = write_rig(tmp_path)
     hand.click("Template file…")
@@ -219,7 +219,7 @@ def test_files_that_do_not_fit_are_messages(rigging, tmp_path):
     assert hand.state.of(Rigging).template_key == "file"
 
 
-def test_rigged_mesh_without_a_bare_one_is_refused(drive, tmp_path):
+def test_target_that_is_already_rigged_is_refused(drive, tmp_path):
     hand = drive(size=SIZE, samples=1)
     body = viewer.load(*write_rig(tmp_path)).actors[0]
     save(body.figure, tmp_path / "whole.npz")
@@ -272,7 +272,7 @@ def test_report_is_copied(rigging, texts):
     assert set(lines) <= set(texts)
 
 
-def test_target_without_meeting_the_template_is_a_message(drive):
+def test_target_that_does_not_overlap_the_template_shows_a_message(drive):
     figure, pose = rig_scene.bent()
     mesh = rig_scene.scan(figure, pose).mesh
     flat = viewer.Mesh(np.zeros((3, 3)), np.tile([0.0, 1, 0], (3, 1)), np.array([[0, 1, 2]]))

@@ -14,7 +14,7 @@ from viewer.rig.scene import Actor
 
 @pytest.fixture
 def tall(drive, rig):
-    """A hand on a window that shows every widget without scrolling."""
+    """A test driver on a window that shows every widget without scrolling."""
     return drive(*rig, size=(900, 1000))
 
 
@@ -125,7 +125,7 @@ def test_camera_slider_sets_its_angle(tall, label, attribute, low, high):
         assert getattr(tall.state.camera, attribute) == pytest.approx(wanted, abs=0.03 * 360)
 
 
-def test_camera_changes_are_no_undo_steps(tall):
+def test_camera_changes_are_not_undo_steps(tall):
     tall.drag("Azimuth", 0.9, "Azimuth")
     tall.wheel(2, tall.middle)
     tall.click("Top")
@@ -142,7 +142,7 @@ def test_distance_slider_moves_the_eye(tall):
 
 
 @pytest.mark.parametrize("text", ["0", "-5", "nan", "inf", "1e39", "3e38", "1e-44", ""])
-def test_typed_camera_values_leave_a_camera_that_draws(tall, text):
+def test_typed_camera_values_leave_a_valid_camera(tall, text):
     for label in ("Distance", "Azimuth", "Inclination", "Field of view"):
         tall.enter_value(label, text)
     tall.wheel(2, tall.middle)
@@ -210,7 +210,7 @@ def test_light_colour_is_picked(tall):
     assert all(0 <= value <= 1 for value in tall.state.options.lights.key.color)
 
 
-def test_stats_follow_actors_that_come_go_and_change(tall, texts):
+def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     def vertices():
         texts.clear()
         tall.step()
@@ -224,7 +224,7 @@ def test_stats_follow_actors_that_come_go_and_change(tall, texts):
     assert vertices() == "12"
     tall.key("y", "ctrl")
     assert vertices() == "24"
-    # Another figure in the place of one.
+    # One figure replaced by another.
     bare = replace(tall.state.actor.figure, mesh=None, skin=None)
     tall.state.scene.actors[1] = Actor(bare)
     tall.step(2)

@@ -1,4 +1,4 @@
-"""Clicks in the view: they choose actors and joints, and aim the camera."""
+"""Clicks in the view: activating actors, selecting joints, aiming the camera."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.scene import actor_points
 
 @pytest.fixture
 def pair(drive, rig, tmp_path):
-    """A hand on two tiny figures side by side."""
+    """A test driver on two tiny figures side by side."""
     hand = drive(*rig, *rig, size=(1280, 800), samples=1)
     hand.step(3)
     return hand
@@ -39,7 +39,7 @@ def click(hand, place, times=1):
     hand.step(2)
 
 
-def test_click_chooses_the_actor_under_it(pair):
+def test_click_activates_the_actor_under_it(pair):
     assert pair.state.chosen_actor == 0
     click(pair, seen_at(pair, middle_of(pair, 1)))
     assert pair.state.chosen_actor == 1
@@ -47,7 +47,7 @@ def test_click_chooses_the_actor_under_it(pair):
     assert pair.state.chosen_actor == 0
 
 
-def test_click_on_nothing_changes_nothing(pair):
+def test_click_on_the_background_changes_nothing(pair):
     pair.state.choose_actor(1)
     x, y, width, _ = pair.state.view_rect
     click(pair, (x + width - 5, y + 5))
@@ -72,7 +72,7 @@ def test_click_on_a_joint_selects_it(pair):
     assert (pair.state.chosen_actor, pair.state.selected_joint) == (1, chosen)
 
 
-def test_drag_orbits_and_chooses_nothing(pair):
+def test_drag_orbits_and_selects_nothing(pair):
     azimuth = pair.state.camera.azimuth
     x, y = seen_at(pair, middle_of(pair, 1))
     pair.pull((x, y), (x + 60, y))

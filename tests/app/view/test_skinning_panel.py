@@ -1,4 +1,4 @@
-"""The Skinning panel: method, few influences, normalising."""
+"""The Skinning panel: method, influence limit, normalising."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def skinning(drive, rig):
-    """A hand on the Skinning panel of the tiny rig, which is bent and turned."""
+    """A test driver on the Skinning panel of the tiny rig, which is bent and rotated."""
     hand = drive(*rig, size=(900, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
@@ -20,7 +20,7 @@ def skinning(drive, rig):
 
 @pytest.fixture
 def wide(drive_body):
-    """A hand on the Skinning panel of a body with many influences a vertex, posed."""
+    """A test driver on the Skinning panel of a body with many influences a vertex, posed."""
     hand = drive_body("smpl", n_vertices=96)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 
@@ -48,7 +48,7 @@ def test_radio_buttons_choose_the_method(skinning):
     assert skinning.undo_steps >= 3
 
 
-def test_share_slider_mixes_from_either_method(skinning):
+def test_blend_slider_mixes_from_either_method(skinning):
     for label in ("LBS", "DQS"):
         skinning.click(label)
         skinning.drag("DQS fraction", 0.25, "DQS fraction")
@@ -56,7 +56,7 @@ def test_share_slider_mixes_from_either_method(skinning):
         assert _chosen(skinning).blend_factor == pytest.approx(0.25, abs=0.02)
 
 
-def test_share_drag_is_one_step(skinning):
+def test_blend_drag_is_one_undo_step(skinning):
     skinning.drag("DQS fraction", 0.75, "DQS fraction")
     assert skinning.undo_steps == 1
     skinning.key("z", "ctrl")
@@ -66,7 +66,7 @@ def test_share_drag_is_one_step(skinning):
     assert _chosen(skinning).blend_factor == pytest.approx(0.75, abs=0.02)
 
 
-def test_typed_share_stays_between_the_methods(skinning):
+def test_typed_blend_factor_is_clamped(skinning):
     for text in ("7", "-3", "nan", "1e39", ""):
         skinning.click("Mixed")
         skinning.enter_value("DQS fraction", text)
@@ -74,7 +74,7 @@ def test_typed_share_stays_between_the_methods(skinning):
     assert skinning.scene_picture().any()
 
 
-def test_engine_box_cuts_to_four_influences_and_back(wide):
+def test_engine_box_limits_to_four_influences_and_back(wide):
     wide.click("engine")
     assert _chosen(wide).max_influences == 4
     wide.click("engine")
@@ -82,7 +82,7 @@ def test_engine_box_cuts_to_four_influences_and_back(wide):
     assert wide.undo_steps == 2
 
 
-def test_influences_slider_counts_only_with_the_box(wide):
+def test_influences_slider_acts_only_with_the_box_checked(wide):
     wide.drag("Influences", 0.0, "Influences")
     assert _chosen(wide).max_influences == 0
     whole = wide.scene_picture()
@@ -95,7 +95,7 @@ def test_influences_slider_counts_only_with_the_box(wide):
     assert _chosen(wide).max_influences == 4  # no vertex of this model has more
 
 
-def test_normalise_box_is_one_step_and_rests_while_influences_are_cut(skinning):
+def test_normalise_box_is_one_undo_step_and_is_greyed_while_influences_are_limited(skinning):
     skinning.click("Normalise weights")
     assert _chosen(skinning).normalize and skinning.undo_steps == 1
     skinning.click("Normalise weights")
@@ -105,7 +105,7 @@ def test_normalise_box_is_one_step_and_rests_while_influences_are_cut(skinning):
     assert not _chosen(skinning).normalize
 
 
-def test_normalising_scales_the_weights_of_the_picture(drive, rig):
+def test_normalising_scales_the_drawn_weights(drive, rig):
     text = rig[1].read_text().replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.25")
     rig[1].write_text(text)
     hand = drive(*rig, size=(900, 1000), samples=1)

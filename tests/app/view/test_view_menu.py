@@ -11,7 +11,7 @@ KEYS = {"xray": ("b", ""), "joint_names": ("j", ""), "joint_axes": ("j", "shift"
 
 
 @pytest.mark.parametrize("name", JOINT_TOGGLES)
-def test_menu_and_key_switch_what_is_seen_of_joints(hand, name):
+def test_menu_and_key_toggle_joint_display(hand, name):
     text, _ = JOINT_TOGGLES[name]
     before = hand.scene_picture()
     hand.menu("menu View", text)
@@ -26,14 +26,14 @@ def test_menu_and_key_switch_what_is_seen_of_joints(hand, name):
     assert (hand.scene_picture() == before).all()
 
 
-def test_boxes_of_the_display_panel(drive, rig):
+def test_display_panel_check_boxes(drive, rig):
     hand = drive(*rig, size=(900, 1000), samples=1)
     for short, name in (("X-ray", "xray"), ("Names", "joint_names"), ("Axes", "joint_axes")):
         hand.click(f"{short}###{name}")
         assert getattr(hand.state.options, name)
 
 
-def test_menu_shows_weights_and_lets_go_of_them(hand):
+def test_menu_turns_the_heat_map_on_and_off(hand):
     hand.click(hand.place("joint arm", 0.5))
     hand.menu("menu View", "Weights of the selected joint")
     assert (hand.state.options.shading, hand.state.options.scalar) == ("scalar", "weight")

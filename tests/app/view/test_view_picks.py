@@ -1,4 +1,4 @@
-"""The mouse that rests on a surface, clicks on vertices, and joints that are seen through it."""
+"""Hovering over a surface, clicks on vertices, and joints visible through the skin."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from viewer.rig.skinning import deform, joint_matrices
 
 @pytest.fixture
 def column(drive, rig):
-    """A hand on the Weights panel of the tiny column."""
+    """A test driver on the Weights panel of the tiny column."""
     hand = drive(*rig, size=(1280, 800), samples=1)
     hand.show_panel("Weights")
     hand.step(3)
@@ -36,7 +36,7 @@ def vertices(hand, index=0):
 
 
 def near(hand, triangle, corner):
-    """Return the window place of a point of a triangle close to one of its corners."""
+    """Return the window position of a point of a triangle close to one of its corners."""
     corners = hand.state.actor.figure.mesh.triangles[triangle]
     places = vertices(hand)[corners]
     return seen_at(hand, 0.8 * places[corner] + 0.2 * places.mean(axis=0))
@@ -58,7 +58,7 @@ def rest(hand, place, frames=20):
 
 
 @pytest.mark.parametrize("corner", [0, 1, 2])
-def test_vertex_under_a_mouse_that_rests_is_described(column, texts, corner):
+def test_vertex_under_a_resting_mouse_is_described(column, texts, corner):
     triangle = facing(column)
     vertex = int(column.state.actor.figure.mesh.triangles[triangle, corner])
     rest(column, near(column, triangle, corner))
@@ -73,7 +73,7 @@ def test_vertex_under_a_mouse_that_rests_is_described(column, texts, corner):
     assert_allclose(column.state.of(Weights).hover.point, [x, y, z], atol=1e-12)
 
 
-def test_nothing_is_looked_for_while_the_mouse_moves(column, monkeypatch):
+def test_nothing_is_picked_while_the_mouse_moves(column, monkeypatch):
     looked = []
     picking = column.app.frame.renderer.pick
     monkeypatch.setattr(
@@ -89,7 +89,7 @@ def test_nothing_is_looked_for_while_the_mouse_moves(column, monkeypatch):
     assert len(looked) == 1  # once is enough
 
 
-def test_text_goes_when_the_mouse_moves_and_follows_a_changed_pose(column, texts):
+def test_text_hides_when_the_mouse_moves_and_follows_a_changed_pose(column, texts):
     place = near(column, facing(column), 0)
     rest(column, place)
     assert column.state.of(Weights).hover.lines
@@ -104,7 +104,7 @@ def test_text_goes_when_the_mouse_moves_and_follows_a_changed_pose(column, texts
     assert not any(text.startswith("vertex ") for text in texts)
 
 
-def test_nothing_is_said_without_the_panel_or_the_toggle(column):
+def test_no_text_is_shown_without_the_panel_or_the_toggle(column):
     column.show_panel("Display")
     place = near(column, facing(column), 0)
     rest(column, place)
@@ -115,7 +115,7 @@ def test_nothing_is_said_without_the_panel_or_the_toggle(column):
     assert column.state.of(Weights).hover.lines
 
 
-def test_nothing_is_said_beside_the_figure_or_over_a_panel(column):
+def test_no_text_is_shown_off_the_figure_or_over_a_panel(column):
     x, y, width, _ = column.state.view_rect
     rest(column, (x + width - 30, y + 300))
     assert column.state.of(Weights).hover.is_known and not column.state.of(Weights).hover.lines
@@ -123,7 +123,7 @@ def test_nothing_is_said_beside_the_figure_or_over_a_panel(column):
     assert not column.state.of(Weights).hover.is_known
 
 
-def test_binding_space_has_the_files_positions(column, texts):
+def test_bind_pose_shows_the_stored_positions(column, texts):
     column.state.options.show = "binding"
     column.key("f")
     column.step(2)
@@ -139,7 +139,7 @@ def test_binding_space_has_the_files_positions(column, texts):
     assert f"position {x:.4f}  {y:.4f}  {z:.4f}" in column.state.of(Weights).hover.lines
 
 
-def test_reduced_mesh_leads_to_the_figures_own_vertices(column):
+def test_reduced_mesh_maps_to_full_mesh_vertices(column):
     actor = column.state.actor
     triangle = facing(column)
     corners = actor.figure.mesh.triangles[triangle]
@@ -193,7 +193,7 @@ def test_click_on_the_skin_selects_the_joint_that_moves_it_most(column, row, nam
     assert column.state.of(Weights).pinned is None and column.undo_steps == 0
 
 
-def test_click_on_the_skin_reaches_the_tree(drive, rig):
+def test_click_on_the_skin_selects_in_the_tree(drive, rig):
     hand = drive(*rig, size=(1280, 800), samples=1)
     hand.step(3)
     joint_tree(hand.state).filter, joint_tree(hand.state).opened = "roo", set()
@@ -214,7 +214,7 @@ def test_drag_over_the_skin_selects_nothing(column):
 
 
 @pytest.mark.parametrize("tool", ["select", "rotate", "move"])
-def test_click_on_the_background_lets_go_of_the_joint(column, tool):
+def test_click_on_the_background_deselects_the_joint(column, tool):
     column.state.of(Posing).tool, column.state.selected_joint = tool, 1
     column.step(2)
     x, y, width, _ = column.state.view_rect
@@ -234,7 +234,7 @@ def test_click_on_a_figure_without_weights_keeps_the_joint(column):
     assert column.state.selected_joint == 1
 
 
-def test_hover_tells_what_a_click_would_choose(column):
+def test_hover_shows_what_a_click_would_select(column):
     triangle = facing(column, 8)
     corner = int(column.state.actor.figure.mesh.triangles[triangle].argmax())
     place = near(column, triangle, corner)
@@ -245,7 +245,7 @@ def test_hover_tells_what_a_click_would_choose(column):
     assert not any(line.startswith("click") for line in column.state.of(Weights).hover.lines)
 
 
-def test_hover_over_a_dot_tells_its_joint(column):
+def test_hover_over_a_dot_names_its_joint(column):
     column.key("b")  # x-ray: dots and bones lie over the skin
     actor = column.state.actor
     place = joint_matrices(actor.figure, actor.pose)[0][:3, 3]
@@ -260,7 +260,7 @@ def test_box_lets_plain_clicks_pin(column):
     assert column.state.of(Weights).pinned is not None
 
 
-def test_alt_click_on_nothing_keeps_what_is_pinned(column):
+def test_alt_click_on_the_background_keeps_the_pin(column):
     column.click(near(column, facing(column), 1), held="alt")
     pinned = column.state.of(Weights).pinned
     x, y, width, _ = column.state.view_rect
@@ -297,7 +297,7 @@ def test_tree_scrolls_to_a_joint_far_down(drive, tmp_path):
     assert joint_tree(hand.state).scrolls_to == -1 and hand.state.selected_joint == 50
 
 
-def test_filter_that_hides_a_joint_gives_way(drive, tmp_path):
+def test_filter_that_hides_a_selected_joint_is_cleared(drive, tmp_path):
     path = tmp_path / "long.skel"
     path.write_text(chain(60))
     hand = drive(path)

@@ -1,4 +1,4 @@
-"""The heat map begins with something to see: a joint or field that is not 0 everywhere."""
+"""The initial heat map shows a joint or field that is not 0 everywhere."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TIP = "balljoint arm {\n        balljoint tip { }"
 
 @pytest.fixture
 def tipped(drive, tmp_path):
-    """A hand on the tiny rig whose arm has a child that moves no vertex."""
+    """A test driver on the tiny rig whose arm has a child that moves no vertex."""
     skel, skin = tmp_path / "tipped.skel", tmp_path / "tipped.skin"
     skel.write_text(SKEL.replace("balljoint arm {", TIP))
     skin.write_text(skin_text(3).replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.75"))
@@ -26,7 +26,7 @@ def tipped(drive, tmp_path):
 
 
 def shown(hand):
-    """Return the lowest and highest number of the view that is drawn."""
+    """Return the lowest and highest value of the drawn view."""
     hand.step(3)
     return hand.state.stats.scalar_range
 
@@ -60,16 +60,16 @@ def test_selected_joint_with_influence_stays(tipped):
     assert tipped.state.selected_joint == 0 and shown(tipped) == (0.0, 1.0)
 
 
-def test_selected_joint_without_influence_gives_way_with_a_word(tipped):
+def test_selected_joint_without_influence_is_replaced_with_a_note(tipped):
     tipped.state.selected_joint = 2
     toggle_weights(tipped.state)
     assert tipped.state.selected_joint == 1 and shown(tipped) == (0.0, 1.0)
     assert tipped.says("tip has no influence")
-    tipped.state.selected_joint = 2  # chosen afterwards: that it moves nothing is what is asked
+    tipped.state.selected_joint = 2  # chosen explicitly afterwards, although it moves nothing
     assert shown(tipped) == (0.0, 0.0)
 
 
-def test_view_that_was_chosen_stays(tipped):
+def test_chosen_view_is_kept(tipped):
     tipped.state.options.scalar = "entropy"
     start_heat_map(tipped.state)
     assert tipped.state.options.scalar == "entropy" and tipped.state.selected_joint == -1

@@ -1,4 +1,4 @@
-"""Why is it here: a pinned vertex, its numbers, its lines in the view, and letting go of it."""
+"""The Vertex panel: a pinned vertex, its skinning terms, its lines in the view, and unpinning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 @pytest.fixture
 def pinned(drive, rig):
-    """A hand on a column whose vertex 4 is pinned: half of it follows the root, half the arm."""
+    """A driver on a column whose vertex 4 is pinned: half of it follows the root, half the arm."""
     hand = drive(*rig, size=(1280, 1000), samples=1)
     hand.state.actor.pose.dofs[hand.dof_index("arm.z")] = 0.9
     hand.state.history.start(hand.state.scene, hand.state.options)
@@ -54,7 +54,7 @@ def rows_of(numbers):
 
 
 def holds(listed, wanted):
-    """Return whether some texts follow one another."""
+    """Return whether some labels follow one another."""
     count = len(wanted)
     return any(listed[at : at + count] == wanted for at in range(len(listed) - count + 1))
 
@@ -101,7 +101,7 @@ def test_dual_quaternions_are_shown_where_they_are_used(pinned, texts, method):
     assert ("0.50 of the way from LBS to DQS" in listed) == (method == "mix")
 
 
-def test_place_of_the_figure_is_a_step(pinned, texts):
+def test_figure_placement_is_a_step(pinned, texts):
     pinned.state.actor.pose.figure_translation[:] = 1.0, 2.0, 3.0
     pinned.state.actor.pose.figure_scale = 2.0
     pinned.step()
@@ -125,7 +125,7 @@ def test_matrix_is_copied_with_all_digits(pinned, clipboard):
     assert_allclose(rows, palette(pinned)[explanation.joints[1]], atol=1e-15)
 
 
-def test_matrix_text_is_a_row_a_line():
+def test_matrix_text_has_one_row_per_line():
     assert matrix_text(np.array([[0.1, -2.0], [1e-17, 3.0]])) == "0.1 -2.0\n1e-17 3.0"
 
 
@@ -146,7 +146,7 @@ def test_lines_lead_to_the_rigid_images(pinned):
 
 
 def beside(hand, picture, weight_place):
-    """Return the pixels around a share of the way from the vertex to its first rigid image."""
+    """Return the pixels around a fraction of the way from the vertex to its first rigid image."""
     size = picture.shape[1], picture.shape[0]
     explanation = hand.state.of(Weights).explanation
     start, end = explanation.position, explanation.images[0]
@@ -175,7 +175,7 @@ def test_screenshot_has_the_lines_while_they_are_shown(pinned):
     assert (pinned.scene_picture() != without).any()
 
 
-def test_annotation_is_made_anew_only_when_something_changed(pinned):
+def test_annotation_is_rebuilt_only_after_a_change(pinned):
     before = pinned.state.of(Weights).annotations
     pinned.step(3)
     assert pinned.state.of(Weights).annotations is before
@@ -188,7 +188,7 @@ def test_annotation_is_made_anew_only_when_something_changed(pinned):
     assert pinned.app.frame.renderer.annotations == ()
 
 
-def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
+def test_every_influence_has_a_line_a_dot_and_a_label(pinned):
     explanation, actor = pinned.state.of(Weights).explanation, pinned.state.actor
     actor.placement[:3, 3] = 10.0, 0.0, 0.0
     found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
@@ -214,7 +214,7 @@ def test_every_influence_has_a_line_a_dot_and_a_word(pinned):
 
 
 @pytest.mark.parametrize("way", ["Esc", "Unpin", "menu", "panel"])
-def test_vertex_is_let_go_of(pinned, way):
+def test_vertex_can_be_unpinned(pinned, way):
     pinned.state.selected_joint = 1
     if way == "Esc":
         pinned.key("escape")
@@ -231,7 +231,7 @@ def test_vertex_is_let_go_of(pinned, way):
     assert "vertex" not in pinned.state.of(ShownPanels).opened
 
 
-def test_vertex_goes_with_its_figure(pinned, rig):
+def test_pin_is_removed_with_its_figure(pinned, rig):
     pinned.open(*rig)
     pinned.step(2)
     assert pinned.state.of(Weights).pinned is None and not pinned.state.error
@@ -261,7 +261,7 @@ def test_vertex_without_influence_says_so(drive, rig, texts):
     assert "No influence: the vertex stays at its bind position." in said(hand, texts)
 
 
-def test_pinning_is_no_undo_step(pinned):
+def test_pinning_is_not_an_undo_step(pinned):
     assert pinned.undo_steps == 0
 
 
@@ -277,7 +277,7 @@ def test_panel_needs_no_sideways_scrolling(drive, rig, texts, width, digits):
     assert listed[listed.index("sum w") + 1] == f"{1.0:.{digits}f}"
 
 
-def test_weight_has_a_line_of_its_own_where_the_name_is_long(drive, rig, texts):
+def test_weight_gets_its_own_line_after_a_long_name(drive, rig, texts):
     hand = drive(*rig, size=(1280, 800), samples=1)
     names = ("root", "a_name_that_is_as_long_as_some_are")
     object.__setattr__(hand.state.actor.figure.skeleton, "names", names)

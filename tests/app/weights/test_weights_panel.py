@@ -1,4 +1,4 @@
-"""The Weights panel: numbers as colours, their range and legend, and the tools for vertices."""
+"""The Weights panel: scalar colours, range and legend, and vertex tools."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def bent(drive, rig):
-    """A hand on the Weights panel of the tiny rig, which is bent and turned."""
+    """A test driver on the Weights panel of the tiny rig, which is bent and rotated."""
     hand = drive(*rig, size=(900, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
@@ -27,7 +27,7 @@ def bent(drive, rig):
 
 @pytest.fixture
 def wide(drive_body):
-    """A hand on the Weights panel of a body with many influences a vertex, posed."""
+    """A test driver on the Weights panel of a body with many influences a vertex, posed."""
     hand = drive_body("smpl", n_vertices=96)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 
@@ -48,7 +48,7 @@ def _chosen(hand) -> Skinning:
 
 
 def _legend_colours(hand):
-    """Return where the legend has its dark, middle and bright colour, None without a legend."""
+    """Return where the legend's dark, middle and bright colours are, or None."""
     x, y, width, _ = hand.state.view_rect
     screen, colours = hand.screen(), colormap(256)[:, :3].astype(int)
     for row in range(int(y), int(y) + 70):
@@ -85,7 +85,7 @@ def test_heat_map_is_undone(wide):
 
 
 @pytest.mark.parametrize("name", SCALARS)
-def test_scalar_range_is_that_of_the_vertices(wide, texts, name):
+def test_scalar_range_spans_the_vertices(wide, texts, name):
     _chosen(wide).max_influences = 2
     wide.click("Heat map")
     wide.state.options.scalar, wide.state.selected_joint = name, 0
@@ -120,7 +120,7 @@ def test_scalar_range_follows_the_pose(wide):
     assert wide.state.stats.scalar_range[1] == pytest.approx(0, abs=1e-12)
 
 
-def test_legend_says_where_there_is_nothing_to_see(bent, texts):
+def test_legend_says_if_all_values_are_zero(bent, texts):
     # The tiny rig has two influences a vertex: four are as good as all.
     bent.click("Heat map")
     bent.step(2)
@@ -130,7 +130,7 @@ def test_legend_says_where_there_is_nothing_to_see(bent, texts):
     assert bent.state.stats.scalar_range == (0.0, 0.0)
 
 
-def test_lengths_without_a_unit_are_shares_of_the_size(bent, texts):
+def test_lengths_without_a_unit_are_fractions_of_the_size(bent, texts):
     bent.state.options.scalar = "methods"
     bent.click("Heat map")
     bent.step(2)
@@ -183,7 +183,7 @@ def tooltips(monkeypatch):
     return said
 
 
-def test_legend_of_joints_lists_them(wide, texts):
+def test_joint_legend_lists_the_joints(wide, texts):
     wide.state.options.scalar = "dominant"
     wide.click("Heat map")
     wide.step(2)
@@ -197,7 +197,7 @@ def test_legend_of_joints_lists_them(wide, texts):
     assert hidden == 0 or f"and {hidden} more" in texts
 
 
-def test_weight_of_a_joint_is_that_of_the_selected_one(wide, texts):
+def test_joint_weight_view_shows_the_selected_joint(wide, texts):
     wide.state.options.scalar = "weight"
     wide.click("Heat map")
     for joint in (0, 1):
@@ -214,24 +214,24 @@ def test_weight_of_a_joint_is_that_of_the_selected_one(wide, texts):
     assert "Click the skin in the view, or a joint in the tree." in texts
 
 
-def test_list_keeps_the_joint_of_the_command_line(wide):
+def test_list_keeps_the_joint_from_the_command_line(wide):
     wide.state.options.scalar = "weight:#1"
     wide.click("Heat map")
     wide.step(2)
     assert wide.state.options.scalar == "weight:#1"
 
 
-def test_picture_with_its_own_legend_has_no_second_one(wide, texts):
+def test_image_with_a_legend_gets_no_second_one(wide, texts):
     wide.state.options.legend = True
     wide.click("Heat map")
     wide.step(2)
     texts.clear()
     wide.step()
     assert "Distance to few influences, mm" not in texts
-    assert _legend_colours(wide) is not None  # drawn into the picture
+    assert _legend_colours(wide) is not None  # drawn into the image
 
 
-def test_fixed_range_begins_as_the_automatic_one_and_keeps_its_order(bent):
+def test_fixed_range_starts_as_the_automatic_one_and_stays_ordered(bent):
     choose(bent, "stretch")
     # Strains are shown from -m to m, in percent; the numbers are percent already.
     most = max(map(abs, bent.state.stats.scalar_range))
@@ -261,21 +261,21 @@ def type_into(hand, label, text):
     hand.step(2)
 
 
-def test_another_view_lets_go_of_the_range(bent):
+def test_changing_the_view_clears_the_range(bent):
     choose(bent, "stretch")
     bent.click("Fixed")
     choose(bent, "methods")
     assert bent.state.options.scalar_range is None
 
 
-def test_range_and_isolines_are_grey_for_whole_numbers(wide):
+def test_range_and_isolines_are_greyed_for_integers(wide):
     choose(wide, "influences")
     for label in ("Fixed", "Isolines"):
         wide.click(label)
     assert wide.state.options.scalar_range is None and wide.state.options.isolines is None
 
 
-def test_isolines_box_shows_what_is_usual_and_keeps_what_is_not(bent):
+def test_isolines_box_shows_the_default_and_keeps_overrides(bent):
     bent.state.selected_joint = 1
     choose(bent, "weight")
     assert bent.state.stats.legend.lines  # usual for weights
@@ -298,7 +298,7 @@ def test_legend_box_draws_the_legend_into_pictures(bent):
     assert bent.state.options.legend and (bent.scene_picture() != before).any()
 
 
-def test_named_joint_gives_way_to_the_selected_one(bent, texts):
+def test_selection_overrides_the_named_joint(bent, texts):
     bent.state.options.scalar, bent.state.options.shading = "weight:root", "scalar"
     bent.state.selected_joint = 1
     bent.step(2)
@@ -309,7 +309,7 @@ def test_named_joint_gives_way_to_the_selected_one(bent, texts):
     assert bent.state.options.scalar == "weight" and "of arm" in texts
 
 
-def test_key_shows_weights_of_the_selected_joint_and_goes_back(bent):
+def test_shortcut_toggles_weights_of_the_selected_joint(bent):
     bent.key("v")
     assert bent.says("Weights of root")
     bent.click(bent.place("joint arm", 0.5))
@@ -319,13 +319,13 @@ def test_key_shows_weights_of_the_selected_joint_and_goes_back(bent):
     assert bent.state.options.shading == "auto"
 
 
-def test_key_on_a_figure_without_weights_says_so(drive, rig):
+def test_shortcut_on_a_figure_without_weights_says_so(drive, rig):
     hand = drive(rig[0])
     hand.key("v")
     assert hand.says("there is no mesh") and hand.state.options.shading == "auto"
 
 
-def test_several_fields_have_a_list(bent):
+def test_multiple_fields_are_listed(bent):
     actor = bent.state.actor
     count = actor.figure.mesh.n_vertices
     fields = (

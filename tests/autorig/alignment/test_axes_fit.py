@@ -1,4 +1,4 @@
-"""A scale along each axis: found exactly, with the rotation if that is asked."""
+"""A scale along each axis: found exactly, with the rotation if requested."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def sides(rotation):
     return Triangles(positions, triangles, 800), Triangles(moved, triangles, 800)
 
 
-def test_axes_are_scaled_on_their_own():
+def test_axes_are_scaled_independently():
     template, target = sides(np.eye(3))
     found = fit_axes(template, target, START, 20)
     assert_allclose(found.scale * found.factors, FACTORS, atol=1e-6)
@@ -30,7 +30,7 @@ def test_axes_are_scaled_on_their_own():
     assert (found.rotation == np.eye(3)).all()
 
 
-def test_rotation_that_leans_is_put_right():
+def test_tilted_rotation_is_corrected():
     rotation = turn([1, 2, -1], 0.12)
     template, target = sides(rotation)
     found = fit_axes(template, target, START, 40, rotations=True)
@@ -39,7 +39,7 @@ def test_rotation_that_leans_is_put_right():
     assert_allclose(found.shift, [0.01, 0.02, -0.01], atol=1e-6)
 
 
-def test_axes_may_be_the_templates_own():
+def test_axes_may_be_those_of_the_template():
     rotation = turn([1, 2, -1], 0.9)
     positions, triangles = tube()
     moved = positions * FACTORS @ rotation.T
@@ -53,6 +53,6 @@ def test_axes_may_be_the_templates_own():
     assert_allclose(found.undo(moved), positions, atol=1e-6)
 
 
-def test_rotation_stays_unless_it_is_asked_for():
+def test_rotation_is_kept_unless_requested():
     template, target = sides(turn([1, 2, -1], 0.12))
     assert (fit_axes(template, target, START, 10).rotation == np.eye(3)).all()

@@ -1,4 +1,4 @@
-"""The seed's alignment of boxes."""
+"""Bounding-box alignment."""
 
 import numpy as np
 import pytest
@@ -9,14 +9,14 @@ from viewer.errors import RigError
 from viewer.rig.geometry.transform import apply_transform
 
 
-def test_box_is_laid_onto_the_other_axis_by_axis():
+def test_boxes_are_aligned_axis_by_axis():
     points = np.array([[0.0, 0, 0], [1, 2, 4], [0.5, 1, 1]])
     onto = np.array([[10.0, 0, -1], [12, 2, 1], [11, 1, 0.9]])
     moved = apply_transform(align_boxes(points, onto), points)
     assert_allclose(moved, [[10.0, 0, -1], [12, 2, 1], [11, 1, -0.5]], atol=1e-12)
 
 
-def test_axis_in_which_both_are_flat_keeps_its_scale():
+def test_axis_along_which_both_are_flat_keeps_its_scale():
     flat = np.array([[0.0, 0, 5], [1, 1, 5]])
     matrix = align_boxes(flat, np.array([[0.0, 0, 7], [2, 3, 7]]))
     assert_allclose(np.diag(matrix)[:3], [2.0, 3.0, 1.0])

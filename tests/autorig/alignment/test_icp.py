@@ -1,4 +1,4 @@
-"""Closest points, iterated: alignments that are known are found again."""
+"""Iterated closest points recover known alignments."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_iterate_then_slide_find_the_alignment_exactly():
     assert_allclose(found.shift, [0.02, -0.03, 0.05], atol=1e-9)
 
 
-def test_iterate_alone_comes_closer_with_every_round():
+def test_iterate_alone_converges_monotonically():
     template, target = sides()
     errors = [
         trimmed_rms(
@@ -54,7 +54,7 @@ def test_kept_scale_is_kept():
     assert_allclose(found.rotation, ROTATION, atol=1e-9)
 
 
-def test_holes_do_not_pull():
+def test_holes_do_not_attract_points():
     positions, triangles = tube()
     heights = positions[triangles][:, :, 1].mean(axis=1)
     template, target = sides(triangles=triangles[heights < 1.3])
@@ -63,7 +63,7 @@ def test_holes_do_not_pull():
     assert_allclose(found.scale, 1.05, atol=1e-6)
 
 
-def test_border_edges_are_no_partners():
+def test_border_edges_are_not_correspondences():
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     side = Triangles(square, np.array([[0, 1, 2], [0, 2, 3]]), 10)
     found = side.find(np.array([[0.5, 0.2, 0.3], [0.5, -0.4, 0.0], [0.5, 0.5, 1.0]]))
@@ -72,11 +72,11 @@ def test_border_edges_are_no_partners():
     assert_allclose(found.positions[1], [0.5, 0.0, 0.0])
 
 
-def test_trimmed_rms_leaves_out_the_worst():
+def test_trimmed_rms_ignores_the_largest_distances():
     assert trimmed_rms(np.array([3.0, 4.0, *[0.0] * 7, 1000.0])) == pytest.approx(5 / 3)
 
 
-def test_gaps_of_an_even_shell_are_even():
+def test_uniform_shell_has_uniform_distances():
     plane = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0]])
     one = np.array([[0, 1, 2]])
     template, target = (

@@ -1,4 +1,4 @@
-"""Candidates for an orientation, and the one that fits."""
+"""Candidate orientations and the best fit."""
 
 import numpy as np
 import pytest
@@ -25,14 +25,14 @@ def cloud(positions, triangles):
     )
 
 
-def test_there_are_24_turns_of_a_cube_and_the_first_is_none():
+def test_cube_has_24_rotations_starting_with_the_identity():
     rotations = axis_rotations("y")
     assert len(rotations) == 24 == len({turn.tobytes() for turn in rotations})
     assert_allclose(rotations[0], np.eye(3))
     assert all(np.linalg.det(turn) == pytest.approx(1.0) for turn in rotations)
 
 
-def test_known_axes_leave_fewer_turns():
+def test_known_axes_leave_fewer_rotations():
     four = axis_rotations("y", up="z")
     assert len(four) == 4
     assert all((turn @ [0, 1, 0] == [0, 0, 1]).all() for turn in four)
@@ -65,7 +65,7 @@ def test_ratios_near_a_unit_are_that_unit(ratio, scale):
     assert unit_scale(ratio) == pytest.approx(scale)
 
 
-def test_mesh_in_another_unit_and_axis_lies_in_place():
+def test_mesh_with_another_unit_and_up_axis_is_aligned():
     positions, triangles = tube()
     quarter = turn([1, 0, 0], np.pi / 2)
     other = cloud(1000.0 * positions @ quarter.T, triangles)
@@ -74,7 +74,7 @@ def test_mesh_in_another_unit_and_axis_lies_in_place():
     assert_allclose(found.similarity.rotation, quarter, atol=1e-15)
 
 
-def test_mesh_that_fits_hardly_better_turned_is_not_turned():
+def test_mesh_is_not_rotated_for_a_marginally_better_fit():
     positions, triangles = tube()
     rotated = positions * [-1.0, 1.0, -1.0]
     between = 0.46 * positions + 0.54 * rotated  # from behind it is a little nearer
@@ -85,7 +85,7 @@ def test_mesh_that_fits_hardly_better_turned_is_not_turned():
     assert (found.similarity.rotation == np.diag([-1.0, 1.0, -1.0])).all()
 
 
-def test_search_finds_a_turned_scaled_and_moved_mesh():
+def test_search_finds_a_rotated_scaled_and_moved_mesh():
     positions, triangles = tube()
     rotation = turn([0.2, 1, 0.1], 2.2)
     other = cloud(7.0 * positions @ rotation.T + [3.0, 4.0, 5.0], triangles)

@@ -1,4 +1,4 @@
-"""A template that stands otherwise than the target: its joints find the target's pose."""
+"""Template joints fitted to the pose of the target."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_bent_joint_is_found():
     assert_allclose(np.degrees(np.linalg.norm(found.rotated[1])), 40.1, atol=3.0)
 
 
-def test_dofs_stay_within_limits_and_quaternions_take_the_rest():
+def test_dofs_stay_within_limits_and_quaternions_hold_the_remainder():
     figure = arm(limit=0.2)
     free = arm()
     found, gaps = fitted(free, bent(free), figure)
@@ -65,12 +65,12 @@ def test_longer_limb_is_found():
     longer = resized(figure, limbs_of(figure), np.array([1.0, 1.3]), np.ones(2))
     found, gaps = fitted(longer, bent(longer), figure)
     assert np.sqrt(np.mean(gaps**2)) < 2e-3
-    # How much the whole grew is for all limbs: only their ratio is known.
+    # Overall scale and limb scales are ambiguous: only their ratio is determined.
     along = found.grown[0]
     assert_allclose(along[1] - along[0], np.log(1.3), atol=0.08)
 
 
-def test_size_is_kept_if_it_is_known():
+def test_known_size_is_kept():
     figure = arm()
     found, _ = fitted(figure, bent(figure, 0.3), figure, scales=False)
     assert_allclose(found.similarity.scale, 20.0, rtol=1e-6)

@@ -1,4 +1,4 @@
-"""One linear round: what is known to have moved is found."""
+"""One linear step of the pose fit recovers known motions."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def solved(targets, scales=True, before=NONE):
     return solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, *before, scales)
 
 
-def test_turned_joint_is_found():
+def test_rotated_joint_is_found():
     turn = np.array([0.0, 0.0, 0.02])
     targets = X + LIMBS.fractions[:, 1:] * np.cross(turn, X - [0, 1, 0])
     step = solved(targets)
@@ -40,7 +40,7 @@ def test_turned_joint_is_found():
     assert_allclose(step.limb_growths, 0.0, atol=5e-4)
 
 
-def test_moved_and_grown_whole_is_found():
+def test_overall_translation_and_scale_are_found():
     step = solved(X * 1.03 + [0.1, -0.2, 0.3])
     assert_allclose(step.growth, 0.03, atol=1e-3)
     middle = np.tile(X, (3, 1)).mean(axis=0)
@@ -48,9 +48,9 @@ def test_moved_and_grown_whole_is_found():
     assert_allclose(step.rotation_vectors, 0.0, atol=1e-3)
 
 
-def test_longer_limb_is_told_from_a_larger_whole():
+def test_longer_limb_is_distinguished_from_overall_scale():
     fraction = LIMBS.fractions[:, 1]
-    # The base is 5 % longer: its own vertices stretch, and the tip goes along.
+    # The base is 5 % longer: its own vertices stretch, and the tip moves with it.
     up = 0.05 * ((1 - fraction) * X[:, 1] + fraction)
     step = solved(X + up[:, None] * [0.0, 1.0, 0.0])
     along, across = step.limb_growths + step.growth
@@ -58,7 +58,7 @@ def test_longer_limb_is_told_from_a_larger_whole():
     assert_allclose(across[0], 0.0, atol=5e-3)
 
 
-def test_nothing_grows_where_the_scale_is_known():
+def test_known_scale_is_not_changed():
     step = solved(X * 1.03, scales=False)
     assert abs(step.growth) < 1e-8 and np.abs(step.limb_growths).max() < 1e-8
 
@@ -71,11 +71,11 @@ def test_steps_are_bounded():
     assert step.growth == 0.2
 
 
-def test_turns_of_former_rounds_are_taken_back_where_the_surface_says_nothing():
-    # The tip's own axis is y: a turn about it moves a round section along itself only; here there
-    # are no pairs but one, which tells nothing of the tip.
+def test_unsupported_rotations_of_earlier_iterations_decay():
+    # The tip's own axis is y: a rotation about it slides a round section along itself; here there
+    # is only one pair, which does not constrain the tip.
     pairs = Pairs(np.array([0]), X[:1], np.array([[0.0, 0, 1.0]]), np.array([0]), X[:1])
     rotated = np.array([[0.0, 0, 0], [0, 0.1, 0]])
     step = solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, rotated, np.zeros((2, 2)), True)
-    # Price of all turns 3e-6 against 1e-5 for one round: 0.1 * 3 / 13 is taken back.
+    # Penalty 3e-6 on total rotation against 1e-5 on one step: 0.1 * 3 / 13 is reverted.
     assert step.rotation_vectors[1, 1] == pytest.approx(-0.1 * 3 / 13, rel=1e-6)

@@ -37,7 +37,7 @@ def aligned(figure, target, fits=True, report=silent, **settings):
 
 @pytest.fixture(scope="module")
 def standing():
-    """The bundled body with lowered arms and longer legs, turned to face -z."""
+    """The bundled body with lowered arms and longer legs, facing -z."""
     figure = load(bundled_body()).actors[0].figure
     pose = rest_pose(figure.skeleton)
     names = figure.skeleton.names
@@ -69,7 +69,7 @@ def test_person_with_lowered_arms_is_found_from_behind(standing):
     assert found.lines[0].key == "R003.pose"
 
 
-def test_person_whose_mesh_is_inside_out_is_found_alike(standing):
+def test_person_with_an_inside_out_mesh_is_found_too(standing):
     figure, target, joints = standing
     found, _ = aligned(figure, mesh_of(target.positions, target.triangles[:, ::-1]))
     assert found.alignment.how == "fit"
@@ -78,26 +78,26 @@ def test_person_whose_mesh_is_inside_out_is_found_alike(standing):
     assert np.linalg.norm(places - joints, axis=1).max() < 0.02 * size
 
 
-def test_facing_that_is_given_is_kept(standing):
+def test_given_front_is_kept(standing):
     figure, target, _ = standing
     found, _ = aligned(figure, target, facing="z")
     assert (found.alignment.similarity.rotation @ [0, 0, 1])[2] > 0.9
 
 
-def test_template_is_left_alone_where_that_is_asked(standing):
+def test_template_is_not_posed_if_disabled(standing):
     figure, target, _ = standing
     found, pose = aligned(figure, target, fits=False)
     assert found.pose is pose and found.figure is figure and found.lines == ()
 
 
-def test_template_that_fits_is_left_alone():
+def test_template_that_fits_is_not_posed():
     figure = arm()
     found, pose = aligned(figure, figure.mesh)
     assert found.pose is pose and found.figure is figure and found.lines == ()
     assert found.alignment.how == "in place"
 
 
-def test_shell_that_stands_off_evenly_is_not_fitted():
+def test_uniformly_offset_shell_is_not_fitted():
     figure = arm()
     shell = mesh_of(figure.mesh.positions + 0.03 * figure.mesh.normals, figure.mesh.triangles)
     found, pose = aligned(figure, shell)
@@ -105,7 +105,7 @@ def test_shell_that_stands_off_evenly_is_not_fitted():
     assert (found.alignment.similarity.matrix == np.eye(4)).all()
 
 
-def test_scales_of_axes_keep_the_pose():
+def test_axis_scales_keep_the_pose():
     figure = arm()
     pose = rest_pose(figure.skeleton)
     pose.dofs[6:] = 0.0, 0.0, 0.8
@@ -143,7 +143,7 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     assert found[2] == cure
 
 
-def test_scales_that_are_known_are_not_looked_for():
+def test_known_scales_are_not_searched_for():
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
     asked, _ = aligned(figure, target, fits=False, scale="axes")
@@ -161,7 +161,7 @@ def bent(angle):
 
 
 def fit_of(figure, pose, angle):
-    """Return what a fit comes to that turned the tip by an angle, and then stopped."""
+    """Return the result of a fit that stopped after rotating the tip by an angle."""
     rotated = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, angle]])
     similarity = Similarity(1.0, np.eye(3), np.zeros(3), np.ones(3))
     return Fitted(figure, pose, similarity, rotated, np.zeros((2, 2)))
@@ -184,7 +184,7 @@ def fit_of(figure, pose, angle):
                     "G % before",)),
     ],
 )  # fmt: skip
-def test_fit_that_leaves_a_gap_is_doubted_or_left(monkeypatch, target, reached, lines):
+def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):
     figure, _, mesh = bent(target)
     half = bent(reached)[1]
     monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_: fit_of(figure, half, reached))
@@ -193,7 +193,7 @@ def test_fit_that_leaves_a_gap_is_doubted_or_left(monkeypatch, target, reached, 
     assert (found.pose is own) == ("not fitted" in lines[0])
 
 
-def test_progress_rises_and_cancels():
+def test_progress_increases_and_cancels():
     figure, _, target = bent(1.5)
 
     class CancelledError(RuntimeError):

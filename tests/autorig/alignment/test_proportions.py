@@ -1,4 +1,4 @@
-"""Limbs longer and thicker: where vertices, joints and bind pose go."""
+"""Limb length and girth: effect on vertices, joints and bind pose."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from viewer.rig.skinning import deform
 ONES = np.ones(2)
 
 
-def test_limbs_lead_to_the_next_joint_or_the_middle_of_what_follows():
+def test_limbs_point_to_the_next_joint_or_the_centre_of_the_children():
     figure = arm()
     limbs = limbs_of(figure)
     fraction = np.clip((figure.mesh.positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
@@ -43,7 +43,7 @@ def test_factors_of_one_change_nothing():
     assert_allclose(same.skeleton.rest_translations, figure.skeleton.rest_translations, atol=1e-12)
 
 
-def test_longer_limb_carries_what_hangs_on_it():
+def test_longer_limb_moves_its_descendants():
     figure = arm()
     longer = resized(figure, limbs_of(figure), np.array([2.0, 1.0]), ONES)
     before, after = figure.mesh.positions, longer.mesh.positions
@@ -56,7 +56,7 @@ def test_longer_limb_carries_what_hangs_on_it():
     assert_allclose(deform(longer, rest_pose(longer.skeleton))[0], after, atol=1e-12)
 
 
-def test_girth_keeps_the_length():
+def test_girth_scale_keeps_the_length():
     figure = arm()
     thick = resized(figure, limbs_of(figure), ONES, np.array([3.0, 1.0]))
     low = figure.mesh.positions[:, 1] < 0.79
@@ -64,7 +64,7 @@ def test_girth_keeps_the_length():
     assert_allclose(thick.skeleton.rest_translations[1], [0, 1, 0], atol=1e-12)
 
 
-def test_offsets_are_those_of_a_turned_bind_pose():
+def test_offsets_follow_a_rotated_bind_pose():
     figure = arm()
     axes = turn([0, 0, 1], np.pi / 2)
     bind = np.linalg.inv(figure.skin.inverse_bind)
@@ -72,5 +72,5 @@ def test_offsets_are_those_of_a_turned_bind_pose():
     skin = replace(figure.skin, inverse_bind=np.linalg.inv(bind))
     rotated = replace(figure, skin=skin)
     longer = resized(rotated, limbs_of(rotated), np.array([2.0, 1.0]), ONES)
-    # One unit more along y is one along x in axes that are turned by a quarter about z.
+    # One more unit along y is one along x in axes rotated by 90 degrees about z.
     assert_allclose(longer.skeleton.rest_translations[1], [1, 1, 0], atol=1e-12)

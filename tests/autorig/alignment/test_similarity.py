@@ -1,4 +1,4 @@
-"""Similarities: fitted to pairs that one was made from, and to pairs worked out by hand."""
+"""Similarities: fitted to pairs generated from one, and to hand-calculated pairs."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def cloud(count=20):
     return np.random.default_rng(3).normal(size=(count, 3))
 
 
-def test_fit_finds_the_similarity_that_pairs_were_made_with():
+def test_fit_recovers_the_similarity():
     rotation, points = turn([1, 2, -1], 2.5), cloud()
     found = fit_similarity(points, 40.0 * points @ rotation.T + [1.0, -2.0, 3.0])
     assert_allclose(found.rotation, rotation, atol=EXACT)
@@ -23,13 +23,13 @@ def test_fit_finds_the_similarity_that_pairs_were_made_with():
     assert_allclose(found.shift, [1.0, -2.0, 3.0], atol=1e-10)
 
 
-def test_fit_never_mirrors():
+def test_fit_never_reflects():
     points = cloud()
     found = fit_similarity(points, points * [-1.0, 1.0, 1.0])
     assert_allclose(np.linalg.det(found.rotation), 1.0, atol=EXACT)
 
 
-def test_kept_scale_stays_and_the_rest_is_fitted():
+def test_fixed_scale_is_kept_and_the_rest_fitted():
     # Two lengths, 1 and 3, of which the fit may only move the middle.
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     found = fit_similarity(points, 3.0 * points, scale=1.0)
@@ -37,7 +37,7 @@ def test_kept_scale_stays_and_the_rest_is_fitted():
     assert_allclose(found.shift, [2 / 3, 2 / 3, 0.0], atol=EXACT)
 
 
-def test_matrix_scales_after_turning_and_undo_is_its_inverse():
+def test_matrix_scales_after_rotating_and_undo_is_its_inverse():
     similarity = Similarity(2.0, turn([0, 0, 1], np.pi / 2), np.array([1.0, 0, 0]), [1, 2, 0.5])
     assert_allclose(similarity.apply(np.array([1.0, 0, 1])), [1.0, 4.0, 1.0], atol=EXACT)
     assert_allclose(similarity.matrix @ [1, 0, 1, 1], [1.0, 4.0, 1.0, 1.0], atol=EXACT)
@@ -54,13 +54,13 @@ def test_matrix_scales_after_turning_and_undo_is_its_inverse():
         ),
     ],
 )
-def test_pairs_that_leave_a_free_turn_are_refused(points, message):
+def test_pairs_that_do_not_determine_the_rotation_are_refused(points, message):
     with pytest.raises(RigError) as problem:
         fit_similarity(points, points)
     assert str(problem.value) == message
 
 
-def test_scale_of_nothing_is_refused():
+def test_scale_of_coincident_points_is_refused():
     with pytest.raises(RigError) as problem:
         Similarity(0.0, np.eye(3), np.zeros(3), np.ones(3))
     assert str(problem.value) == "alignment: expected a scale above 0, found 0"

@@ -1,4 +1,4 @@
-"""Alignment as a whole: left alone, searched, by landmarks, given; and what is said of it."""
+"""Complete alignment: unchanged, searched, by landmarks or given; and its report."""
 
 import numpy as np
 import pytest
@@ -36,13 +36,13 @@ def aligned(positions, triangles=TRIANGLES, report=silent, up="y", **settings):
     return align(TEMPLATE, Posed(positions, triangles), up, AlignmentSettings(**settings), report)
 
 
-def test_target_in_place_is_left_alone():
+def test_aligned_target_is_left_alone():
     found = aligned(POSITIONS)
     assert found.how == "in place"
     assert (found.similarity.matrix == np.eye(4)).all() and found.error < 1e-12
 
 
-def test_part_in_place_is_left_alone_although_it_stands_off():
+def test_aligned_part_is_left_alone_despite_an_offset():
     # A shirt: the middle of the tube, 2 % of its size away from it.
     middle = (POSITIONS[TRIANGLES][:, :, 1] > 0.5).all(axis=1)
     middle &= (POSITIONS[TRIANGLES][:, :, 1] < 1.5).all(axis=1)
@@ -54,7 +54,7 @@ def test_part_in_place_is_left_alone_although_it_stands_off():
     assert found.away > 0.05 > found.error
 
 
-def test_shell_in_place_is_left_alone_although_a_larger_template_is_nearer():
+def test_aligned_shell_is_left_alone_although_a_larger_template_is_nearer():
     # Evenly 2 % of the size away all round: a larger tube would be nearer nearly everywhere.
     normals = vertex_normals(POSITIONS, TRIANGLES)
     found = aligned(POSITIONS + 0.05 * normals)
@@ -63,7 +63,7 @@ def test_shell_in_place_is_left_alone_although_a_larger_template_is_nearer():
     assert found.error > 0.015 and max(found.uneven) < 0.005
 
 
-def test_turned_scaled_and_moved_target_is_found_exactly():
+def test_rotated_scaled_and_moved_target_is_found_exactly():
     rotation = turn([0.3, 1, -0.2], 2.0)
     found = aligned(130.0 * POSITIONS @ rotation.T + [5.0, 6.0, 7.0])
     assert found.how == "search" and found.error < 1e-9
@@ -72,7 +72,7 @@ def test_turned_scaled_and_moved_target_is_found_exactly():
     assert_allclose(found.similarity.shift, [5.0, 6.0, 7.0], atol=1e-6)
 
 
-def test_small_turn_is_undone_although_the_boxes_nearly_agree():
+def test_small_rotation_is_found_although_the_boxes_nearly_agree():
     rotation = turn([0, 1, 0], 0.3)
     found = aligned(POSITIONS @ rotation.T)
     assert found.how == "search"
@@ -86,13 +86,13 @@ def test_template_keeps_its_size_if_asked():
     assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
-def test_axes_get_scales_of_their_own_if_asked():
+def test_axes_are_scaled_independently_if_asked():
     found = aligned(POSITIONS * [1.15, 1.0, 0.9] + [1.0, 0, 0], scale="axes")
     assert_allclose(found.similarity.scale * found.similarity.factors, [1.15, 1.0, 0.9], atol=0.02)
     assert (found.similarity.factors != 1.0).any()
 
 
-def test_landmarks_alone_decide_without_refinement():
+def test_only_landmarks_matter_without_refinement():
     rotation = turn([0, 0, 1], 1.1)
     points = POSITIONS[[3, 50, 200, 300]]
     pairs = np.stack([points, 2.0 * points @ rotation.T + [9.0, 0, 0]], axis=1)
@@ -111,7 +111,7 @@ def test_rough_landmarks_are_refined():
     assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
-def test_given_matrix_is_taken_as_it_is():
+def test_given_matrix_is_used_unchanged():
     matrix = np.eye(4)
     matrix[:3, :3] *= 3.0
     matrix[:3, 3] = 1.0
@@ -132,7 +132,7 @@ def test_cancelling_from_the_report_ends_the_search():
         aligned(POSITIONS @ turn([0, 1, 0], 0.3).T, report=cancel)
 
 
-def test_progress_rises():
+def test_progress_increases():
     fractions = []
     aligned(
         POSITIONS @ turn([0, 1, 0], 0.3).T, report=lambda fraction, what: fractions.append(fraction)
@@ -148,13 +148,13 @@ def test_progress_rises():
         ({"landmarks": np.zeros((3, 3))}, "landmarks: expected shape any x 2 x 3, found 3 x 3"),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(settings, message):
+def test_invalid_settings_are_refused(settings, message):
     with pytest.raises(RigError) as problem:
         AlignmentSettings(**settings)
     assert str(problem.value) == message
 
 
-def test_matrices_that_mirror_or_shear_are_refused():
+def test_matrices_that_reflect_or_shear_are_refused():
     with pytest.raises(RigError) as problem:
         similarity_of(np.diag([1.0, 1, -1, 1]))
     assert str(problem.value) == ("alignment: expected a matrix without reflection or singularity")
@@ -168,7 +168,7 @@ def test_matrices_that_mirror_or_shear_are_refused():
     )
 
 
-def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
+def test_matrices_that_stretch_along_axes_of_either_space_are_accepted():
     rotation = turn([1, 2, 3], 0.7)
     stretch, matrix = np.diag([1.2, 1.0, 0.7]), np.eye(4)
     matrix[:3, 3] = 4.0, 5.0, 6.0
@@ -200,13 +200,13 @@ def test_matrices_that_stretch_along_either_spaces_axes_are_taken():
         ),
     ],
 )
-def test_lines_of_a_shared_origin_say_whether_anything_was_done(scale, angle, words):
+def test_report_for_a_shared_origin_says_whether_anything_was_done(scale, angle, words):
     similarity = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
     lines = alignment_lines(Alignment(similarity, 0.0, 0.0, (0.0, 0.0), "in place"))
     assert str(lines[0]) == f"alignment: {words}, translation (0, 0, 0)"
 
 
-def test_lines_tell_everything_and_warn_of_a_bad_fit():
+def test_report_is_complete_and_warns_of_a_bad_fit():
     similarity = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
     lines = alignment_lines(Alignment(similarity, 0.05, 0.1, (0.05, 0.1), "search"))
     assert [line.labelled for line in lines] == [

@@ -1,4 +1,4 @@
-"""Parts wound the wrong way: closed ones and the most of a mesh are turned round, linings not."""
+"""Parts wound the wrong way: closed parts and the bulk of a mesh are flipped, linings are not."""
 
 import numpy as np
 import pytest
@@ -29,38 +29,38 @@ def found(positions, triangles, islands):
     return wound_backwards(weld(positions, triangles), np.array(islands)).tolist()
 
 
-def test_cube_of_these_tests_is_wound_outward():
+def test_sample_cube_is_wound_outward():
     assert volume(CUBE, OUTWARD) == pytest.approx(1.0)
 
 
-def test_closed_part_that_is_inside_out_is_wrong():
+def test_closed_inside_out_part_is_detected():
     positions, triangles = two(OUTWARD, OUTWARD[:, ::-1])
     assert found(positions, triangles, [1]) == [False] * 8 + [True] * 8
 
 
-def test_part_that_faces_away_but_is_wound_well_is_left():
+def test_correctly_wound_part_facing_away_is_kept():
     positions, triangles = two(OUTWARD, OUTWARD)
     assert not any(found(positions, triangles, [0, 1]))
 
 
-def test_part_nobody_asked_about_is_left():
+def test_unrequested_part_is_kept():
     positions, triangles = two(OUTWARD, OUTWARD[:, ::-1])
     assert not any(found(positions, triangles, []))
 
 
-def test_open_lining_is_left_and_an_open_whole_is_not():
-    inner = OUTWARD[2:, ::-1]  # a side of two triangles is missing
+def test_open_lining_is_kept_and_an_open_whole_is_flipped():
+    inner = OUTWARD[2:, ::-1]  # a face of two triangles is missing
     lining = two(OUTWARD, inner)
     assert not any(found(*lining, [1]))
     assert all(found(CUBE, inner.astype(np.int32), [0]))
 
 
-def test_vertices_of_no_triangle_belong_to_nothing():
+def test_vertices_without_triangles_belong_to_no_part():
     positions = np.concatenate([CUBE, [[9.0, 9.0, 9.0]]])
     assert found(positions, OUTWARD[:, ::-1].astype(np.int32), [0, 1]) == [True] * 8 + [False]
 
 
-def test_turning_round_keeps_materials_and_texture_with_their_corners():
+def test_flipping_keeps_materials_and_texture_with_their_corners():
     positions, triangles = tube()
     mesh = mesh_of(positions, triangles[:, ::-1])
     again = with_reversed_winding(mesh, np.ones(len(positions), dtype=bool))
@@ -69,7 +69,7 @@ def test_turning_round_keeps_materials_and_texture_with_their_corners():
     assert with_reversed_winding(mesh, np.zeros(len(positions), dtype=bool)) is mesh
 
 
-def test_texture_corners_turn_with_the_triangles():
+def test_texture_corners_flip_with_the_triangles():
     corners = np.arange(36, dtype=np.int32).reshape(-1, 3)
     mesh = replace(mesh_of(CUBE, OUTWARD), uvs=np.zeros((36, 2)), uv_triangles=corners)
     again = with_reversed_winding(mesh, np.ones(8, dtype=bool))

@@ -15,7 +15,7 @@ FLAT = Template(
 
 
 def triangle(height=0.0, tilt=0.0, flipped=False):
-    """Return a triangle about the z axis: raised, turned about x, facing +z if not flipped."""
+    """Return a triangle about the z axis: raised, rotated about x, facing +z if not flipped."""
     positions = 0.1 * np.array([[1.0, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
     turn = np.array(
         [[1, 0, 0], [0, math.cos(tilt), -math.sin(tilt)], [0, math.sin(tilt), math.cos(tilt)]]
@@ -39,21 +39,21 @@ def test_match_accepts_by_angle():
         np.testing.assert_allclose(np.degrees(found.angles), degrees, atol=1e-9)
 
 
-def test_match_accepts_wider_angles_where_the_surfaces_touch():
+def test_match_accepts_larger_angles_where_the_surfaces_touch():
     # All corners within 0.1, that is 0.5 % of 20.
     for degrees, expected in ((59.0, True), (61.0, False)):
         found = match(FLAT, triangle(0.0, math.radians(degrees)), 20.0, MatchSettings())
         assert found.matched.tolist() == [expected] * 3
 
 
-def test_match_turns_an_island_round_that_is_inside_out():
+def test_match_flips_an_inside_out_island():
     found = match(FLAT, triangle(0.3, flipped=True), 10.0, MatchSettings())
     assert found.matched.all()
     assert found.inside_out.tolist() == [0]
     np.testing.assert_allclose(found.angles, 0.0, atol=1e-7)
 
 
-def test_match_turns_no_island_round_whose_smaller_part_is_folded_over():
+def test_match_does_not_flip_an_island_that_is_partly_folded_over():
     positions = np.array([[0.0, 0, 0.3], [1, 0, 0.3], [1, 1, 0.3], [0, 1, 0.3], [0.5, 0.9, 0.3]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [2, 3, 4]])
     # The last triangle lies on the others; vertex 4 alone faces only down.
@@ -62,7 +62,7 @@ def test_match_turns_no_island_round_whose_smaller_part_is_folded_over():
     assert not found.matched[4] or found.angles[4] < math.radians(30)
 
 
-def test_match_lets_flipped_normals_count_if_asked():
+def test_match_accepts_flipped_normals_if_asked():
     # A strip of two triangles that face up and two that face down.
     positions = np.array([[x, 0.5 * (x % 2), 0.3] for x in range(6)]) * [0.2, 1, 1]
     mesh = weld(positions, np.array([[0, 2, 1], [1, 2, 3], [2, 3, 4], [3, 5, 4]]))
@@ -76,7 +76,7 @@ def test_match_lets_flipped_normals_count_if_asked():
     np.testing.assert_allclose(either.angles, 0.0, atol=1e-7)
 
 
-def test_match_judges_vertices_without_normal_by_distance_alone():
+def test_match_uses_distance_alone_for_vertices_without_normals():
     positions = np.array([[0.0, 0, 0.4], [3, 3, 0.6], [1, 0, 0], [2, 0, 0], [2, 1, 0]])
     found = match(FLAT, weld(positions, np.array([[2, 3, 4]])), 10.0, MatchSettings())
     assert found.matched.tolist() == [True, False, True, True, True]
@@ -107,7 +107,7 @@ def test_match_takes_the_side_of_a_thin_sheet_that_faces_the_same_way():
     assert far.matched.tolist() == [False] * 3 + [True] * 5
 
 
-def test_sheet_normals_of_two_sides_cancel_out():
+def test_normals_of_both_sides_of_a_sheet_cancel_out():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 2]])
     normals = sheet_normals(weld(positions, np.array([[0, 1, 2], [0, 2, 1]])))
     assert normals.tolist() == np.zeros((4, 3)).tolist()
@@ -124,7 +124,7 @@ def test_template_has_smooth_normals_across_seams():
 
 @pytest.mark.parametrize("name", ["max_distance", "max_angle", "near_distance", "near_angle"])
 @pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
-def test_match_settings_refuse_odd_numbers(name, value):
+def test_match_settings_refuse_invalid_values(name, value):
     with pytest.raises(RigError) as caught:
         MatchSettings(**{name: value})
     assert str(caught.value) == f"{name}: expected a number of at least 0, found {value}"

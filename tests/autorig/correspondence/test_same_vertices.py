@@ -14,7 +14,7 @@ COUNT = 9
 
 
 def grid(step=1.0, start=0.0):
-    """Return a square of two triangles a cell in the plane z = 0."""
+    """Return a grid in the plane z = 0, two triangles per cell."""
     line = start + step * np.arange(COUNT)
     x, y = np.meshgrid(line, line, indexing="ij")
     positions = np.stack([x.ravel(), y.ravel(), np.zeros(COUNT * COUNT)], axis=1)
@@ -30,7 +30,7 @@ def found(template, target):
     return same_vertices(one, other, distances)
 
 
-def test_moved_vertices_are_known_again_in_any_order():
+def test_moved_vertices_are_recognised_in_any_order():
     rng = np.random.default_rng(4)
     positions, triangles = grid()
     order = rng.permutation(len(positions))
@@ -39,7 +39,7 @@ def test_moved_vertices_are_known_again_in_any_order():
     assert (found((positions, triangles), (moved, rank[triangles].astype(np.int32))) == order).all()
 
 
-def test_shell_that_stands_off_still_has_the_same_vertices():
+def test_offset_shell_still_has_the_same_vertices():
     positions, triangles = grid()
     lifted = positions + np.array([0.0, 0.0, 3.0])
     assert (found((positions, triangles), (lifted, triangles)) == np.arange(81)).all()
@@ -51,15 +51,15 @@ def test_another_tessellation_has_other_vertices(step, start):
     assert (same >= 0).mean() < 0.05
 
 
-def test_turned_tessellation_has_other_vertices():
+def test_rotated_tessellation_has_other_vertices():
     positions, triangles = grid()
     cosine, sine = np.cos(0.5), np.sin(0.5)
     rotated = (positions - 4.0) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]) + 4.0
     same = found((positions, triangles), (rotated, triangles))
-    assert (same >= 0).mean() < 0.2  # those about the middle of the turn
+    assert (same >= 0).mean() < 0.2  # those near the centre of rotation
 
 
-def test_points_move_to_the_vertices_and_others_stay():
+def test_points_near_vertices_snap_and_others_stay():
     positions, triangles = grid()
     asked = np.array([[0.2, 0.1, 1.0], [3.4, 3.3, 0.0]])
     points = Surface(positions, triangles).closest(asked)
@@ -71,7 +71,7 @@ def test_points_move_to_the_vertices_and_others_stay():
     assert moved.triangles[1] == points.triangles[1]
 
 
-def test_vertex_of_no_triangle_is_no_place_on_the_surface():
+def test_vertex_without_triangles_is_not_on_the_surface():
     positions, triangles = grid()
     places = np.concatenate([positions, [[0.1, 0.1, 0.0]]])
     asked = np.array([[0.1, 0.1, 0.0]])

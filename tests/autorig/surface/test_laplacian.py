@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 def grid(count, rng=None):
-    """Return a flat grid of count x count vertices, the inner ones shaken."""
+    """Return a flat grid of count x count vertices, the inner ones jittered."""
     x, y = np.meshgrid(np.arange(count, dtype=float), np.arange(count, dtype=float))
     positions = np.stack([x.ravel(), y.ravel(), np.zeros(count * count)], axis=1)
     index = np.arange(count * count).reshape(count, count)
@@ -45,7 +45,7 @@ def test_cotangent_laplacian_of_a_linear_function_is_zero_inside_a_flat_mesh():
     np.testing.assert_allclose(found[inner], 0.0, atol=1e-11)
 
 
-def test_cotangent_laplacian_of_a_square_is_minus_its_calculus_twin_times_the_area():
+def test_cotangent_laplacian_of_a_quadratic_matches_the_continuous_one():
     positions, triangles, inner = grid(7)
     operator = cotangent_laplacian(positions, triangles)
     values = positions[:, 0] ** 2 + positions[:, 1] ** 2  # Laplacian 4
@@ -57,7 +57,7 @@ def test_cotangent_laplacian_stays_positive_with_slivers():
     rng = np.random.default_rng(2)
     positions, triangles, _ = grid(5, rng)
     positions[:, 1] *= rng.choice([1e-6, 1.0], len(positions))  # needles and caps
-    positions[7] = 0.5 * (positions[6] + positions[8])  # without area
+    positions[7] = 0.5 * (positions[6] + positions[8])  # zero area
     operator = cotangent_laplacian(positions, triangles).toarray()
     assert np.isfinite(operator).all()
     np.testing.assert_allclose(operator, operator.T, atol=ROUNDING)
@@ -66,7 +66,7 @@ def test_cotangent_laplacian_stays_positive_with_slivers():
     assert np.linalg.eigvalsh(operator).min() > -1e-10
 
 
-def test_cotangent_laplacian_takes_a_triangle_without_area_for_an_equilateral_one():
+def test_cotangent_laplacian_treats_zero_area_triangles_as_equilateral():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
     found = cotangent_laplacian(positions, np.array([[0, 1, 2]])).toarray()
     half = 0.5 / np.sqrt(3.0)
@@ -101,7 +101,7 @@ def test_voronoi_areas_add_up_to_the_area():
     assert found.sum() == pytest.approx(triangle_areas(positions, triangles).sum(), rel=1e-12)
 
 
-def test_laplacian_of_an_island_with_a_non_manifold_edge_is_that_of_its_graph():
+def test_non_manifold_island_gets_the_graph_laplacian():
     fan = np.array([[0.0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0.5, 0], [-1, -0.5, 0]])
     other = np.array([[9.0, 0, 0], [10, 0, 0], [9, 1, 0]])
     mesh = weld(
@@ -117,7 +117,7 @@ def test_laplacian_of_an_island_with_a_non_manifold_edge_is_that_of_its_graph():
     np.testing.assert_allclose(areas[5:], [0.25, 0.125, 0.125], atol=ROUNDING)
 
 
-def test_laplacian_gives_every_vertex_some_area():
+def test_laplacian_gives_every_vertex_a_positive_area():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]])
     _, areas = laplacian(weld(positions, np.array([[0, 1, 2]])))
     # 1e-9 of the mean of 1/4, 1/8 and 1/8.

@@ -1,4 +1,4 @@
-"""Samples of surfaces: on it, as many as the area asks for."""
+"""Surface samples: on the surface, in proportion to area."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ POSITIONS = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 1], [0, 0, 4], [
 TRIANGLES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
-def test_samples_are_shared_out_by_area_and_lie_on_their_triangle():
+def test_samples_are_distributed_by_area_and_lie_on_their_triangle():
     found = sample_surface(POSITIONS, TRIANGLES, 800)
     on_first = found.positions[:, 2] == 0.0
     assert on_first.sum() == 200
@@ -23,7 +23,7 @@ def test_samples_are_shared_out_by_area_and_lie_on_their_triangle():
     assert_allclose(found.normals[~on_first], np.tile([-1.0, 0, 0], (600, 1)))
 
 
-def test_samples_are_even_within_a_triangle():
+def test_samples_are_uniform_within_a_triangle():
     flat = sample_surface(POSITIONS, TRIANGLES[:1], 4000).positions
     # The middle of the samples is that of the triangle, and a quarter lies in each quarter.
     assert_allclose(flat.mean(axis=0), [2 / 3, 2 / 3, 0.0], atol=0.01)
@@ -46,7 +46,7 @@ def test_mesh_without_area_is_refused(triangles):
     assert str(problem.value) == "expected a mesh with an area to align, found none"
 
 
-def test_vertices_are_chosen_by_area_and_each_once():
+def test_vertices_are_sampled_by_area_without_repetition():
     # One large and one small triangle apart: three vertices of the large one at most.
     positions = np.concatenate([100.0 * POSITIONS[:3], POSITIONS[3:]])
     assert even_vertices(positions, TRIANGLES, 10).tolist() == [0]

@@ -18,12 +18,12 @@ def test_weld_joins_the_corners_of_a_seam():
     assert welded.islands.tolist() == [0, 0, 0, 0]
 
 
-def test_weld_takes_minus_zero_for_zero():
+def test_weld_treats_minus_zero_as_zero():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, 0, -0.0]])
     assert weld(positions, np.array([[0, 1, 2]])).vertices.tolist() == [0, 1, 2, 0]
 
 
-def test_weld_joins_what_rounding_put_apart():
+def test_weld_joins_vertices_that_differ_by_rounding():
     # The median edge is 1, so vertices within 1e-4 are one.
     positions = SQUARE[[0, 1, 2, 0, 2, 3]].copy()
     positions[3, 2] = 0.5e-4
@@ -40,26 +40,26 @@ def test_weld_joins_a_whole_cluster():
     assert welded.vertices.tolist() == [0, 1, 2, 3] + [0] * 40
 
 
-def test_weld_drops_triangles_that_become_edges_and_keeps_those_without_area():
+def test_weld_drops_collapsed_triangles_and_keeps_zero_area_ones():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 0]])
     welded = weld(positions, np.array([[0, 1, 3], [0, 4, 1], [0, 1, 2]]))
     assert welded.triangles.tolist() == [[0, 1, 3], [0, 1, 2]]
 
 
-def test_weld_counts_a_vertex_of_no_triangle_as_an_island():
+def test_weld_counts_an_unused_vertex_as_an_island():
     positions = np.concatenate([SQUARE + 5.0, SQUARE])
     welded = weld(positions, np.array([[4, 5, 6], [0, 1, 2]]))
     assert welded.islands.tolist() == [0, 0, 0, 1, 2, 2, 2, 3]
     assert welded.n_islands == 4
 
 
-def test_weld_of_nothing_is_nothing():
+def test_weld_of_an_empty_mesh_is_empty():
     welded = weld(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
     assert welded.n_islands == 0
     assert len(welded.positions) == 0
 
 
-def test_weld_of_points_at_one_place():
+def test_weld_of_coincident_points():
     welded = weld(np.ones((3, 3)), np.array([[0, 1, 2]]))
     assert welded.vertices.tolist() == [0, 0, 0]
     assert welded.triangles.shape == (0, 3)
@@ -80,6 +80,6 @@ def test_edges_are_listed_once():
     ]
 
 
-def test_non_manifold_edges_are_those_of_three_triangles():
+def test_edges_of_three_triangles_are_non_manifold():
     assert non_manifold_edges(np.array([[0, 1, 2], [1, 0, 3]])).tolist() == []
     assert non_manifold_edges(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])).tolist() == [[0, 1]]

@@ -1,4 +1,4 @@
-"""Winding numbers of a cube, whole and with a side missing."""
+"""Winding numbers of a cube, closed and with one face missing."""
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -12,19 +12,19 @@ CUBE = np.array([t for a, b, c, d in SIDES for t in ((a, b, c), (a, c, d))])
 MIDDLE, OUTSIDE = np.array([0.5, 0.5, 0.5]), np.array([3.0, 0.2, 0.1])
 
 
-def test_cube_winds_once_around_its_inside():
+def test_winding_number_inside_a_cube_is_one():
     found = winding_numbers(CORNERS, CUBE, np.array([MIDDLE, OUTSIDE, [0.01, 0.01, 0.99]]))
     assert_allclose(found, [1.0, 0.0, 1.0], atol=1e-12)
 
 
-def test_cube_inside_out_winds_backwards():
+def test_winding_number_of_an_inside_out_cube_is_minus_one():
     assert_allclose(winding_numbers(CORNERS, CUBE[:, ::-1], MIDDLE[None]), [-1.0], atol=1e-12)
 
 
-def test_missing_side_takes_its_solid_angle():
-    # Seen from the middle each of the six sides covers a sixth.
+def test_missing_face_subtracts_its_solid_angle():
+    # Seen from the centre each of the six faces covers a sixth.
     assert_allclose(winding_numbers(CORNERS, CUBE[2:], MIDDLE[None]), [5 / 6], atol=1e-12)
 
 
-def test_no_points_give_no_numbers():
+def test_no_points_give_no_winding_numbers():
     assert winding_numbers(CORNERS, CUBE, np.zeros((0, 3))).shape == (0,)

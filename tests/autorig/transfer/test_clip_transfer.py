@@ -1,4 +1,4 @@
-"""A template's clips for the figure that took over its rig."""
+"""Transfer of a template's clips to the rigged figure."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 
-SKELETON = arm().skeleton  # DOFs 0 to 2 move, the others turn
+SKELETON = arm().skeleton  # DOFs 0 to 2 translate, the others rotate
 
 
 def curve(target):
@@ -19,7 +19,7 @@ def curve(target):
     return Channel(target, np.array([0.0, 1.0]), np.array([1.0, 2.0]), tangents)
 
 
-def test_lengths_and_their_slopes_are_scaled_and_angles_are_not():
+def test_lengths_and_their_tangents_are_scaled_and_angles_are_not():
     clip = Clip("walk", (curve(1), curve(4)), 0.0, 1.0)
     found = transfer_clip(clip, SKELETON, 10.0, 2.0)
     moved, rotated = found.channels
@@ -29,7 +29,7 @@ def test_lengths_and_their_slopes_are_scaled_and_angles_are_not():
     assert (found.name, found.start, found.end) == ("walk", 0.0, 1.0)
 
 
-def test_frames_keep_their_turns_and_scale_their_paths():
+def test_frames_keep_rotations_and_scale_translations():
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (2, 2, 1))
     clip = SampledClip(
         "run",
@@ -49,7 +49,7 @@ def test_frames_keep_their_turns_and_scale_their_paths():
     assert found.shape_weights is None
 
 
-def test_path_goes_by_the_legs():
+def test_path_is_scaled_by_leg_length():
     clip = Clip("walk", (curve(1), curve(4)), 0.0, 1.0)
     found = transfer_clip(clip, SKELETON, 10.0, 2.0, path_scale=12.0)
     assert_allclose(found.channels[0].values, [24.0, 48.0])
@@ -65,7 +65,7 @@ def test_path_goes_by_the_legs():
     assert_allclose(found.figure_translations, 12.0)
 
 
-def test_frames_without_paths_stay_without():
+def test_frames_without_translations_keep_none():
     clip = SampledClip("turn", Timing(30.0, np.array([0])), np.ones((1, 2, 4)))
     found = transfer_clip(clip, SKELETON, 10.0)
     assert found.translations is None and found.figure_translations is None

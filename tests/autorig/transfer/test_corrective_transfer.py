@@ -1,4 +1,4 @@
-"""Pose correctives on another mesh."""
+"""Transfer of pose correctives to another mesh."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def strip(count):
     return positions, triangles
 
 
-def test_offsets_are_mixed_from_the_corners_and_scaled():
+def test_offsets_are_interpolated_from_the_corners_and_scaled():
     barycentric = np.array([[1.0, 0, 0], [0, 0, 1], [0.5, 0.25, 0.25], [0, 1, 0]])
     positions, triangles = strip(2)
     found = transfer_correctives(
@@ -43,7 +43,7 @@ def test_offsets_are_mixed_from_the_corners_and_scaled():
     assert_allclose(found.values(), expected, rtol=1e-14)
 
 
-def test_offsets_fade_out_where_the_target_leaves_the_template():
+def test_offsets_fade_out_away_from_the_template():
     positions, triangles = strip(40)
     matched = positions[:, 0] < 20
     barycentric = np.tile([1.0, 0, 0], (80, 1))
@@ -58,7 +58,7 @@ def test_offsets_fade_out_where_the_target_leaves_the_template():
     assert (np.diff(along) <= 1e-12).all() and 0.3 < along[19] < 1.0 and 0.0 < along[21] < 0.7
 
 
-def test_more_numbers_than_fit_are_left_out(monkeypatch):
+def test_offsets_beyond_the_memory_limit_are_left_out(monkeypatch):
     monkeypatch.setattr(corrective_transfer, "MOST_NUMBERS", 9 * 4 * 3 - 1)
     positions, triangles = strip(2)
     found = transfer_correctives(

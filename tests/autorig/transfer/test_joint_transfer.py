@@ -1,4 +1,4 @@
-"""Joints that go with the surface around them."""
+"""Joints transferred with the surrounding surface."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def table(regressor, n_vertices):
     return dense
 
 
-def test_boundary_is_where_a_joint_and_its_parent_both_hold():
+def test_boundary_is_where_a_joint_and_its_parent_both_have_weight():
     influences = [
         [(0, 1.0)],
         [(0, 0.25), (1, 0.75)],
@@ -60,7 +60,7 @@ def test_joints_move_by_the_weighted_mean_of_their_surface():
     assert found.measurable.tolist() == [False, True, True]
 
 
-def test_joint_without_its_surface_goes_with_its_parent():
+def test_joint_without_surface_follows_its_parent():
     found = transfer_joints(JOINTS, PARENTS, regressor(), SHIFTS, np.array([True, False, False]))
     # Half of joint 1's weights are left, which is enough; none of joint 2's.
     assert_allclose(found.positions, [[0, 0, 0], [1, 1, 0], [1, 2, 0]])
@@ -68,14 +68,14 @@ def test_joint_without_its_surface_goes_with_its_parent():
     assert found.measurable.tolist() == [False, True, True]
 
 
-def test_rows_that_cancel_out_say_nothing():
+def test_rows_that_cancel_out_are_ignored():
     rows = JointRegressor(3, [1, 1], [0, 1], [1.0, -0.9])
     found = transfer_joints(JOINTS, PARENTS, rows, SHIFTS, np.ones(3, bool))
     assert_array_equal(found.positions, JOINTS)
     assert not found.transferred.any()
 
 
-def test_shifts_are_those_to_the_surface_and_trusted_where_it_is_near_and_alike():
+def test_shifts_lead_to_the_surface_and_are_trusted_where_it_is_close_and_similar():
     square = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     points = np.array([[0.0, 0.1, 0], [0, 0.9, 0], [0.2, 0.1, 0.3], [0.5, -0.1, 0]])
@@ -85,7 +85,7 @@ def test_shifts_are_those_to_the_surface_and_trusted_where_it_is_near_and_alike(
     assert matched.tolist() == [True, False, False, True]
 
 
-def test_joints_in_the_mesh_and_out_of_it():
+def test_joints_inside_and_outside_the_mesh():
     positions, triangles = tube()
     joints = np.array([[0.0, 1.0, 0.05], [0.0, 3.0, 0.0], [0.9, 1.0, 0.0]])
     assert outside(positions, triangles, joints).tolist() == [False, True, True]

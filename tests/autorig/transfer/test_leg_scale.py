@@ -1,4 +1,4 @@
-"""The ratio of legs: by hand, for a stick figure of two legs."""
+"""Leg-length ratio, calculated by hand for a two-legged stick figure."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from viewer.rig.skeleton import ball_skeleton
 
 
 def stick(up="y", leg=1.0, arm=0.5):
-    """Return a root with two legs of two bones, and an arm that is held up."""
+    """Return a root with two legs of two bones, and a raised arm."""
     names = ("root", "knee_l", "foot_l", "knee_r", "foot_r", "hand")
     places = np.zeros((6, 3))
     places[:, 0] = 0.0, 0.1, 0.1, -0.1, -0.1, 0.0
@@ -20,12 +20,12 @@ def stick(up="y", leg=1.0, arm=0.5):
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
-def test_longer_legs_count_and_arms_and_places_do_not(up):
+def test_only_leg_length_affects_the_ratio(up):
     longer = stick(up, leg=1.4, arm=0.9)
     assert leg_scale(stick(up), longer, up, 7.0) == pytest.approx(1.4)
 
 
-def test_feet_are_those_of_the_first():
+def test_feet_are_taken_from_the_first_skeleton():
     tiptoe = stick()
     raised = tiptoe.rest_translations.copy()
     raised[4, 1] += 0.2  # one foot is 0.2 higher: on average 0.9 below the root
@@ -45,5 +45,5 @@ def test_skeleton_of_one_joint_has_no_ratio():
     assert leg_scale(one, one, "y", 2.5) == 2.5
 
 
-def test_feet_above_the_root_are_no_ratio():
+def test_feet_above_the_root_give_the_fallback():
     assert leg_scale(stick(), stick(leg=-1.0), "y", 2.0) == 2.0

@@ -1,4 +1,4 @@
-"""Rest skeletons fitted to posed joints: what was put in by forward kinematics comes back."""
+"""Rest skeletons fitted to posed joints: forward kinematics is inverted."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def placed_joints(figure, pose, similarity):
     )
 
 
-def test_same_proportions_give_the_scaled_skeleton_and_its_bindings():
+def test_same_proportions_give_the_scaled_skeleton_and_bind_matrices():
     figure = arm()
     pose = bent(figure)
     pose.figure_scale = 1.5
@@ -49,7 +49,7 @@ def test_same_proportions_give_the_scaled_skeleton_and_its_bindings():
     assert found.lines == () and found.pose.figure_scale == 1.0
 
 
-def test_pose_puts_the_joints_where_they_were_found_turned_as_aligned():
+def test_pose_places_joints_as_found_with_the_aligned_rotations():
     figure = arm()
     pose = bent(figure)
     joints = placed_joints(figure, pose, PLACED)
@@ -61,7 +61,7 @@ def test_pose_puts_the_joints_where_they_were_found_turned_as_aligned():
     assert_allclose(world[:, :3, :3], wanted, atol=EXACT)
 
 
-def test_bind_matrices_keep_their_turn_and_take_the_new_lengths():
+def test_bind_matrices_keep_rotations_and_take_the_new_lengths():
     figure = arm()
     bind = np.linalg.inv(figure.skin.inverse_bind)
     bind[0, :3, :3] = turn([0, 0, 1], np.pi / 2)
@@ -81,7 +81,7 @@ def test_bind_matrices_keep_their_turn_and_take_the_new_lengths():
     assert_allclose(places[:, :3, :3], bind[:, :3, :3], atol=EXACT)
 
 
-def test_limits_of_the_root_make_room_and_lengths_are_scaled():
+def test_root_limits_are_widened_and_lengths_scaled():
     figure = arm(limit=0.8)
     pose = bent(figure)
     joints = placed_joints(figure, pose, PLACED)
@@ -94,7 +94,7 @@ def test_limits_of_the_root_make_room_and_lengths_are_scaled():
     assert told(found.lines) == [("R008.limits-widened", {"joint": "base"})]
 
 
-def test_root_without_ball_joint_turns_by_its_quaternion():
+def test_root_without_a_ball_joint_rotates_by_its_quaternion():
     figure = arm()
     kept = [0, 1, 2, 3, 6, 7, 8]  # the root turns about x alone
     skeleton = figure.skeleton
@@ -131,7 +131,7 @@ def spread() -> Figure:
     ("transferred", "left", "right"),
     [
         ([True] * 4, 1.25, 1.25),  # both were measured: their mean
-        ([True, True, False, True], 1.4, 1.4),  # one was: it counts for both
+        ([True, True, False, True], 1.4, 1.4),  # one was measured: used for both
         ([True, False, False, True], 1.25, 1.25),
     ],
 )
@@ -144,11 +144,11 @@ def test_symmetric_skeletons_stay_symmetric(transferred, left, right):
     found = fit_rest_skeleton(figure, pose, straight, joints, np.array(transferred))
     offsets = found.skeleton.rest_translations
     assert_allclose(offsets[1:3], [[left, 0, 0], [-right, 0, 0]], atol=EXACT)
-    # The middle joint is its own partner: it comes back to the middle.
+    # The middle joint is its own mirror counterpart: it returns to the middle.
     assert_allclose(offsets[3], [0, 1, 0], atol=EXACT)
 
 
-def test_bound_joints_agree_with_the_rest_pose():
+def test_bind_pose_agrees_with_the_rest_pose():
     figure = arm()
     found = fit_rest_skeleton(
         figure, bent(figure), PLACED, placed_joints(figure, bent(figure), PLACED), None
@@ -160,8 +160,8 @@ def test_bound_joints_agree_with_the_rest_pose():
     assert_allclose(bind_positions(replace(figure.skin, inverse_bind=found.inverse_bind))[1, 1], 5)
 
 
-def test_root_takes_the_angles_that_its_limits_allow():
-    # Turned by 120 degrees about y: as angles (180, 60, 180) or (0, 120, 0).
+def test_root_uses_angles_within_its_limits():
+    # Rotated by 120 degrees about y: as angles (180, 60, 180) or (0, 120, 0).
     figure = arm(limit=2.2)
     pose = rest_pose(figure.skeleton)
     similarity = Similarity(1.0, turn([0, 1, 0], np.radians(120)), np.zeros(3), np.ones(3))

@@ -35,7 +35,7 @@ def problem(rng):
     weights[:, [0, 2, 3]] = rng.dirichlet([1, 1, 1], count)
     unknown = np.zeros(count, dtype=bool)
     unknown[30:52] = True
-    weights[unknown] = 99.0  # must not be looked at
+    weights[unknown] = 99.0  # must not be read
     return operator, areas, weights, unknown
 
 
@@ -60,7 +60,7 @@ def run(operator, areas, weights, unknown, report=silent):
     return inpaint(operator, areas, sparse.csr_array(weights), ~unknown, unknown, report)
 
 
-def test_fill_minimises_the_energy():
+def test_inpainting_minimises_the_energy():
     operator, areas, weights, unknown = problem(np.random.default_rng(1))
     found, method = run(operator, areas, weights, unknown)
     assert method == "direct"
@@ -72,7 +72,7 @@ def test_fill_minimises_the_energy():
     assert set(found.indices) == {0, 2, 3}
 
 
-def test_fill_of_one_joint_gives_that_joint():
+def test_inpainting_with_one_joint_gives_that_joint():
     operator, areas, weights, unknown = problem(np.random.default_rng(2))
     weights[:] = [0, 1, 0, 0, 0]
     found, _ = run(operator, areas, weights, unknown)
@@ -80,13 +80,13 @@ def test_fill_of_one_joint_gives_that_joint():
     assert found.nnz == unknown.sum()
 
 
-def test_fill_without_unknown_vertices_gives_no_rows():
+def test_inpainting_without_unknown_vertices_gives_no_rows():
     operator, areas, weights, unknown = problem(np.random.default_rng(2))
     found, _ = run(operator, areas, weights, np.zeros_like(unknown))
     assert found.shape == (0, 5)
 
 
-def test_fill_leaves_out_vertices_that_are_neither_known_nor_wanted():
+def test_inpainting_skips_vertices_that_are_neither_known_nor_wanted():
     operator, areas, weights, unknown = problem(np.random.default_rng(3))
     far = sparse.csr_array(sparse.block_diag([operator, sparse.csr_array((2, 2))]))
     weights = np.concatenate([weights, np.full((2, 5), 7.0)])
@@ -100,7 +100,7 @@ def test_fill_leaves_out_vertices_that_are_neither_known_nor_wanted():
 
 
 def failing(times):
-    """Return a factorisation that fails so many times before it works."""
+    """Return a factorisation that fails a given number of times before succeeding."""
     real, calls = linear.splu, []
 
     def splu(*arguments, **options):
@@ -113,7 +113,7 @@ def failing(times):
 
 
 @pytest.mark.parametrize(("times", "method"), [(1, "shifted"), (2, "conjugate gradients")])
-def test_fill_has_other_ways_when_the_factorisation_fails(monkeypatch, times, method):
+def test_inpainting_falls_back_when_the_factorisation_fails(monkeypatch, times, method):
     monkeypatch.setattr("scipy.sparse.linalg.splu", failing(times))
     operator, areas, weights, unknown = problem(np.random.default_rng(4))
     found, used = run(operator, areas, weights, unknown)
@@ -125,7 +125,7 @@ def test_fill_has_other_ways_when_the_factorisation_fails(monkeypatch, times, me
 @pytest.mark.parametrize(
     ("times", "method"), [(2, "harmonic"), (9, "harmonic, conjugate gradients")]
 )
-def test_fill_ends_with_harmonic_weights(monkeypatch, times, method):
+def test_inpainting_falls_back_to_harmonic_weights(monkeypatch, times, method):
     monkeypatch.setattr("scipy.sparse.linalg.splu", failing(times))
     operator, areas, weights, unknown = problem(np.random.default_rng(5))
     areas = areas.copy()
@@ -137,9 +137,9 @@ def test_fill_ends_with_harmonic_weights(monkeypatch, times, method):
     np.testing.assert_allclose(found.toarray(), expected, atol=3e-6)
 
 
-def test_fill_says_when_nothing_helps(monkeypatch):
+def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
     operator, areas, weights, unknown = problem(np.random.default_rng(6))
-    # Cut off from everything that is known.
+    # Disconnected from all known vertices.
     inside, outside = np.nonzero(unknown)[0], np.nonzero(~unknown)[0]
     dense = operator.toarray()
     dense[np.ix_(inside, outside)] = 0.0
@@ -151,7 +151,7 @@ def test_fill_says_when_nothing_helps(monkeypatch):
     )
 
 
-def test_fill_can_be_cancelled():
+def test_inpainting_can_be_cancelled():
     operator, areas, weights, unknown = problem(np.random.default_rng(7))
 
     class StoppedError(Exception):
@@ -164,7 +164,7 @@ def test_fill_can_be_cancelled():
         run(operator, areas, weights, unknown, stop)
 
 
-def test_fill_solves_in_blocks_of_joints(monkeypatch):
+def test_inpainting_solves_in_blocks_of_joints(monkeypatch):
     operator, areas, weights, unknown = problem(np.random.default_rng(8))
     whole, _ = run(operator, areas, weights, unknown)
     monkeypatch.setattr("viewer.autorig.weights.inpainting._BLOCK", 1)

@@ -20,14 +20,14 @@ def matches(matched, inside_out=()):
     return Matches(points, np.array(matched), np.zeros(count), np.array(inside_out, dtype=np.int32))
 
 
-def test_match_lines_count():
+def test_match_report_counts_vertices():
     found = matches([True, True, True, False])
     assert told(match_lines(found, ~found.matched, "direct")) == [
         ("R005.matched", {"n": 3, "all": 4, "ratio": 0.75, "inpainted": 1})
     ]
 
 
-def test_match_lines_say_what_is_out_of_the_ordinary():
+def test_match_report_mentions_exceptions():
     found = matches([True, False, False, False], [0, 2])
     lines = match_lines(found, ~found.matched, "harmonic")
     assert told(lines) == [
@@ -43,7 +43,7 @@ def test_match_lines_say_what_is_out_of_the_ordinary():
     )
 
 
-def test_match_lines_speak_of_one_part_alone():
+def test_match_report_uses_the_singular_for_one_part():
     found = matches([True, True], [0])
     (line,) = match_lines(found, ~found.matched, "direct")[1:]
     assert str(line) == (
@@ -56,7 +56,7 @@ def islands(counts):
     return RigidIslands(10 * number, np.array(counts), number, np.zeros(len(counts)))
 
 
-def test_rigid_lines_name_the_largest_first():
+def test_rigid_part_report_names_the_largest_first():
     assert told(rigid_lines(islands([1, 30]))) == [
         ("R007.part", {"n": 30, "vertex": 10, "joint": 1}),
         ("R007.part", {"n": 1, "vertex": 0, "joint": 0}),
@@ -64,14 +64,14 @@ def test_rigid_lines_name_the_largest_first():
     assert rigid_lines(islands([])) == ()
 
 
-def test_rigid_lines_count_what_they_do_not_name():
+def test_rigid_part_report_counts_unnamed_parts():
     lines = rigid_lines(islands([9, 8, 7, 6, 5, 4, 3]))
     assert len(lines) == 6
     assert told(lines[-1:]) == [("R007.more-parts", {"n": 2})]
     assert told(rigid_lines(islands([9, 8, 7, 6, 5, 4])))[-1] == ("R007.more-parts", {"n": 1})
 
 
-def test_nothing_matched_says_how_far_it_is():
+def test_no_match_reports_the_distance():
     assert nothing_matched(np.array([1.0, 3.0, 9.0]), 10.0) == (
         "no vertex of the target meets the template: expected a target aligned with it, found "
         "it at a median distance of 30.0% of the target's size"

@@ -18,12 +18,12 @@ def test_weight_matrix_adds_up_and_scales():
     assert matrix.nnz == 4
 
 
-def test_weight_matrix_takes_negative_weights_for_none():
+def test_weight_matrix_ignores_negative_weights():
     skin = skin_from_lists([[(0, 1.0), (1, -0.25)], [(1, 1.0)], [(1, 1.0)]], BIND)
     assert weight_matrix(skin, ALL).toarray()[0].tolist() == [1.0, 0.0, 0.0]
 
 
-def test_weight_matrix_needs_weights_only_where_there_are_triangles():
+def test_weight_matrix_needs_weights_only_for_used_vertices():
     skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], []], BIND)
     assert weight_matrix(skin, ALL).toarray()[3].tolist() == [0.0, 0.0, 0.0]
 
@@ -58,7 +58,7 @@ def test_skin_of_keeps_the_strongest_if_asked():
     assert skin.weights.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_scaled_rows_empties_rows_of_factor_zero():
+def test_scaled_rows_empties_rows_with_factor_zero():
     found = scaled_rows(sparse.csr_array(np.array([[1.0, 2.0], [3.0, 4.0]])), np.array([0.0, 2.0]))
     assert found.toarray().tolist() == [[0.0, 0.0], [6.0, 8.0]]
     assert found.nnz == 2

@@ -87,7 +87,7 @@ def test_transfer_mixes_weights_between_vertices():
     np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
 
 
-def test_transfer_leaves_no_residue_of_corners_that_a_point_is_not_on():
+def test_transfer_ignores_corners_with_zero_barycentric_weight():
     # Rings between the template's sides: closest points lie on edges, but for a rounding.
     positions, triangles = tube()
     x = positions[:, 0].copy()
@@ -102,7 +102,7 @@ def test_transfer_leaves_no_residue_of_corners_that_a_point_is_not_on():
     np.testing.assert_allclose(dense(result).sum(axis=1), 1.0, atol=1e-12)
 
 
-def test_transfer_fills_in_what_stands_off_the_template():
+def test_transfer_inpaints_vertices_away_from_the_template():
     positions, triangles = tube(rings=25)
     x = positions[:, 0]
     bump = np.abs(x - 0.75) < 0.2
@@ -113,7 +113,7 @@ def test_transfer_fills_in_what_stands_off_the_template():
     assert (result.matched | result.inpainted).all()
     found = dense(result)
     np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
-    # The third joint does not reach this far; the others change places across the bump.
+    # The third joint does not reach this far; the others swap across the bump.
     assert found[bump, 2].max() < 0.05
     order = [found[np.isclose(x, value), 0].mean() for value in np.unique(x[bump])]
     assert order == sorted(order, reverse=True)
@@ -139,7 +139,7 @@ def button(x):
     return corners + np.array([x, 1.5, 0.0]), np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
 
 
-def test_transfer_hangs_parts_without_match_on_the_closest_point_of_their_middle():
+def test_transfer_binds_unmatched_parts_to_the_point_closest_to_their_centre():
     positions, triangles = tube()
     corners, faces = button(1.2)
     result = transfer(
@@ -155,7 +155,7 @@ def test_transfer_hangs_parts_without_match_on_the_closest_point_of_their_middle
     assert told(result.lines)[1] == ("R007.part", {"n": 4, "vertex": 208, "joint": 1})
 
 
-def test_transfer_does_not_depend_on_unit_and_place():
+def test_transfer_does_not_depend_on_unit_or_position():
     positions, triangles = tube(rings=25)
     bump = np.abs(positions[:, 0] - 0.75) < 0.2
     positions[bump, 1:] *= 2.5
@@ -175,7 +175,7 @@ def test_transfer_does_not_depend_on_unit_and_place():
     np.testing.assert_allclose(dense(there), dense(here), atol=1e-7)
 
 
-def test_transfer_can_smooth_and_cut():
+def test_transfer_can_smooth_and_prune():
     positions, triangles = tube(rings=25)
     bump = np.abs(positions[:, 0] - 0.75) < 0.2
     positions[bump, 1:] *= 2.5
@@ -209,7 +209,7 @@ def test_transfer_reports_its_progress_and_can_be_cancelled():
         transfer(positions, triangles, report=stop)
 
 
-def test_transfer_refuses_a_target_elsewhere():
+def test_transfer_refuses_a_distant_target():
     positions, triangles = tube()
     with pytest.raises(RigError) as caught:
         transfer(positions + np.array([0.0, 100.0, 0.0]), triangles)
@@ -228,7 +228,7 @@ def test_transfer_refuses_a_target_without_size():
     )
 
 
-def test_transfer_takes_points_without_triangles():
+def test_transfer_accepts_points_without_triangles():
     result = transfer(
         np.array([[0.0, 0.5, 0], [3, 0.5, 0], [1.5, 0, 0.5]]), np.zeros((0, 3), dtype=np.int32)
     )
@@ -236,7 +236,7 @@ def test_transfer_takes_points_without_triangles():
     np.testing.assert_allclose(dense(result), [[1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-12)
 
 
-def test_transfer_says_that_the_template_has_negative_weights():
+def test_transfer_reports_negative_template_weights():
     positions, triangles = tube()
     rows = along(positions[:, 0])
     rows[0] = 1.0, -0.5, 0.0
@@ -268,7 +268,7 @@ def test_nearest_weights_copies_rows():
     assert result.points is None
 
 
-def test_settings_refuse_odd_numbers():
+def test_settings_refuse_invalid_values():
     with pytest.raises(RigError) as caught:
         WeightSettings(smoothing_rounds=-1)
     assert str(caught.value) == "smoothing: expected at least 0 iterations, found -1"

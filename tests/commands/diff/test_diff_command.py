@@ -1,4 +1,4 @@
-"""``viewer diff``: differences put in by hand, exit codes, the table and JSON."""
+"""``viewer diff``: known differences, exit codes, the table and JSON."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def picture(path):
         return np.asarray(image).astype(int)
 
 
-def test_folder_is_within_any_tolerance_of_itself(tmp_path, capsys):
+def test_folder_equals_itself_at_any_tolerance(tmp_path, capsys):
     folder = write(tmp_path / "a")
     code, lines, _ = said(capsys, folder, folder, "--tolerance", "0")
     assert code == 0
@@ -76,7 +76,7 @@ def test_folder_is_within_any_tolerance_of_itself(tmp_path, capsys):
     ]
 
 
-def test_worst_joint_vertex_and_weight_are_named_and_the_exit_code_says_so(tmp_path, capsys):
+def test_worst_joint_vertex_and_weight_are_named_and_exit_code_is_set(tmp_path, capsys):
     first = write(tmp_path / "a")
     second = write(tmp_path / "b", height="4.5", weights=("0.25", "0.75"))
     arguments = (first, second, "--poses", "0")
@@ -89,7 +89,9 @@ def test_worst_joint_vertex_and_weight_are_named_and_the_exit_code_says_so(tmp_p
     assert said(capsys, *arguments)[0] == 0  # nothing was asked
 
 
-def test_many_are_a_table_and_one_that_cannot_be_read_does_not_stop_the_others(tmp_path, capsys):
+def test_many_comparisons_form_a_table_and_an_unreadable_one_does_not_stop_the_others(
+    tmp_path, capsys
+):
     reference = write(tmp_path / "ref")
     good, other = write(tmp_path / "good"), write(tmp_path / "other", tip="3.5")
     broken = write(tmp_path / "broken")
@@ -109,7 +111,7 @@ def test_a_stray_skeleton_is_named_and_the_figure_of_the_same_name_is_compared(t
     # It comes before a.skel, and is the reference's very skeleton.
     (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
     code, lines, _ = said(capsys, reference, other, "--poses", "0", "--tolerance", "1")
-    assert code == 1  # something is there that was not asked for
+    assert code == 1  # there is one data set without a tolerance
     assert lines[:3] == [
         f"{other}:",
         f"  only in {other}: 0 (a skeleton)",
@@ -125,12 +127,12 @@ def test_a_stray_skeleton_is_named_and_the_figure_of_the_same_name_is_compared(t
     assert lines[1] == "  only in the reference: 0 (a skeleton)"
 
 
-def test_a_partner_of_another_name_is_told(tmp_path, capsys):
+def test_pairing_by_different_names_is_reported(tmp_path, capsys):
     reference, other = write(tmp_path / "ref"), write(tmp_path / "other")
     (tmp_path / "other" / "a.skel").rename(tmp_path / "other" / "b.skel")
     (tmp_path / "other" / "a.skin").rename(tmp_path / "other" / "b.skin")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
-    assert not any("held against" in line for line in lines)  # there is nothing else
+    assert not any("held against" in line for line in lines)  # there is no other figure
     (tmp_path / "other" / "c.skel").write_text(SKEL % "3")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
     assert lines[1:4] == [
@@ -152,7 +154,7 @@ def test_json_holds_mismatches_as_text_and_as_data(tmp_path, capsys):
     assert found["values"]["actor"] == {"text": "0 (a skeleton)", "values": {"name": "0"}}
 
 
-def test_json_holds_every_joint_and_the_place_of_the_worst(tmp_path, capsys):
+def test_json_holds_every_joint_and_the_position_of_the_worst(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", tip="3.5")
     assert run(["diff", first, second, "--json", "--poses", "0", "--tolerance", "1"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -166,7 +168,7 @@ def test_json_holds_every_joint_and_the_place_of_the_worst(tmp_path, capsys):
     assert places["relative"] == pytest.approx(0.1) and places["mean"] == pytest.approx(0.25)
 
 
-def test_clips_are_compared_on_a_skeleton_that_both_are_given(tmp_path, capsys):
+def test_clips_are_compared_on_a_shared_skeleton(tmp_path, capsys):
     write(tmp_path / "a")
     for name, height in (("one", "0"), ("two", "0.25")):
         # Root translation x, y, z, then the angles of base and tip: y moves.
@@ -200,12 +202,12 @@ def test_heat_map_shows_where_the_difference_is(tmp_path, capsys):
     assert code == 5 and "exists already (--force replaces it)" in error
 
 
-def test_heat_maps_of_several_are_one_sheet(tmp_path, capsys):
+def test_heat_maps_of_several_pairs_form_one_sheet(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", height="5")
     output = tmp_path / "heat.png"
     _, lines, _ = said(capsys, first, second, first, "--poses", "0", "-o", str(output))
     assert lines[-1] == f"{output}: 2 heat maps with a common scale"
-    # Nothing differs on the second: it is dark, beside the bright corner of the first.
+    # Nothing differs on the second: it is dark, next to the bright corner of the first.
     sheet = picture(output)
     bright = (sheet[:, :, 0] > 220) & (sheet[:, :, 2] < 160)
     height = sheet.shape[0] // 2
@@ -237,7 +239,7 @@ def test_folder_without_a_rig_is_refused(tmp_path, capsys):
         (("--frames", "1:9:2"), "--frames: expected A:B without a step, found 1:9:2"),
     ],
 )
-def test_numbers_that_mean_nothing_are_refused(tmp_path, capsys, arguments, message):
+def test_invalid_tolerances_are_refused(tmp_path, capsys, arguments, message):
     folder = write(tmp_path / "a")
     code, _, error = said(capsys, folder, folder, *arguments)
     assert code == 2 and error == f"viewer: {message}\n"

@@ -1,4 +1,4 @@
-"""Who ``viewer diff`` holds against whom."""
+"""Pairing of figures by ``viewer diff``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.skin import skin_from_lists
 
 
 def bones() -> Skeleton:
-    """Return one joint with the six DOFs of a course rig."""
+    """Return one joint with the six DOFs of a .skel-style rig."""
     return Skeleton(
         names=("root",),
         parents=np.array([-1], dtype=np.int32),
@@ -62,28 +62,28 @@ def motion(name: str) -> Clip:
 
 
 def paired(first: list[Actor], second: list[Actor]) -> list[tuple[int, int]]:
-    """Return the numbers of those that are paired, by their figures."""
+    """Return the indices of the paired actors."""
     figures = [[actor.figure for actor in actors] for actors in (first, second)]
     pairs = pair_actors(first, second).pairs
     return [(figures[0].index(a.figure), figures[1].index(b.figure)) for a, b in pairs]
 
 
-def test_names_count_before_order() -> None:
+def test_names_take_precedence_over_order() -> None:
     assert paired([rig("a"), rig("b")], [rig("b"), rig("c"), rig("a")]) == [(0, 2), (1, 0)]
 
 
-def test_of_one_name_the_one_of_the_same_kind_counts() -> None:
+def test_same_name_prefers_the_same_format() -> None:
     assert paired([rig("a")], [skeleton("a"), surface("a"), rig("a")]) == [(0, 2)]
     assert paired([surface("a")], [rig("a"), skeleton("a")]) == [(0, 0)]
 
 
-def test_without_a_common_name_the_kind_counts_then_the_order() -> None:
+def test_without_a_common_name_format_then_order_decides() -> None:
     assert paired([rig("a"), skeleton("b")], [skeleton("x"), rig("y")]) == [(0, 1), (1, 0)]
     assert paired([rig("a"), rig("b")], [rig("x"), rig("y")]) == [(0, 0), (1, 1)]
     assert paired([rig("a")], [surface("x")]) == [(0, 0)]
 
 
-def test_a_name_is_not_taken_by_one_that_comes_first() -> None:
+def test_an_exact_name_match_is_not_taken_by_an_earlier_figure() -> None:
     assert paired([rig("x"), rig("a")], [rig("a"), rig("b")]) == [(0, 1), (1, 0)]
 
 
@@ -96,7 +96,7 @@ def test_people_are_paired_by_their_number() -> None:
     assert found.second == (Phrase("lone-points", name=second[1].name),)
 
 
-def test_what_is_left_is_named_on_the_side_that_has_it() -> None:
+def test_unpaired_figures_are_named_with_their_side() -> None:
     found = pair_actors([rig("a")], [skeleton("other"), surface("skin"), rig("a"), rig("b")])
     assert found.first == ()
     assert found.second == (
@@ -108,7 +108,7 @@ def test_what_is_left_is_named_on_the_side_that_has_it() -> None:
     assert found.first == (Phrase("lone-figure", name="a"),) and found.second == ()
 
 
-def test_a_clip_that_a_stray_skeleton_was_given_is_the_partners() -> None:
+def test_a_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
     walk, mine = motion("walk"), motion("walk")
     first, second = [rig("a", walk)], [skeleton("stray", mine), rig("a")]
     for turned in (False, True):
@@ -122,7 +122,7 @@ def test_a_clip_that_a_stray_skeleton_was_given_is_the_partners() -> None:
     assert second[0].clip is mine and second[1].clip is None  # both are left as they are
 
 
-def test_clips_are_paired_by_name_then_as_they_are() -> None:
+def test_clips_are_paired_by_name_then_by_order() -> None:
     run, walk = motion("run"), motion("walk")
     first = [rig("a", motion("walk")), rig("b", motion("run"))]
     pairs = pair_actors(first, [rig("a", run), rig("b", walk)]).pairs
@@ -131,7 +131,7 @@ def test_clips_are_paired_by_name_then_as_they_are() -> None:
     assert pairs[0][1].clip is run
 
 
-def test_a_clip_of_another_name_is_taken_only_where_one_is_wanted() -> None:
+def test_a_clip_of_another_name_is_used_only_if_needed() -> None:
     run = motion("run")
     found = pair_actors([rig("a", motion("walk"))], [skeleton("s", run), rig("a")])
     assert found.pairs[0][1].clip is run

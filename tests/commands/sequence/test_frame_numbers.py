@@ -1,4 +1,4 @@
-"""Numbers of frames on the command line: the same in render, convert and info, and their ends."""
+"""Frame numbers on the command line: consistent in render, convert and info, and their limits."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ def test_ranges_are_read():
 # Numbers
 
 
-def test_captures_count_as_their_files_do():
+def test_capture_frames_are_numbered_as_in_their_files():
     assert numbering_of([capture(30, 100, 25.0)]) == Numbering(100, 30, 0.0, 29 / 25, 25.0, False)
 
 
-def test_longest_capture_counts_for_all():
+def test_longest_capture_determines_the_frame_count():
     actors = [capture(2, 7), capture(11, 100, start=1.0), keyed(0.5, 1.0)]
     assert numbering_of(actors) == Numbering(100, 41, 0.0, 1.0 + 1.0 / 3.0, 30.0, True)
 
 
-def test_other_rates_and_clips_of_keys_count_from_0():
+def test_other_rates_and_keyed_clips_count_from_0():
     assert numbering_of([capture(30, 100)], 60.0) == Numbering(0, 59, 0.0, 29 / 30, 60.0, False)
     assert numbering_of([keyed(1.0, 2.0)]) == Numbering(0, 31, 1.0, 2.0, 30.0, True)
     assert numbering_of([keyed(1.0, 2.0)], 10.0) == Numbering(0, 11, 1.0, 2.0, 10.0, True)
@@ -84,7 +84,7 @@ def test_span_counts_from_the_first_frame(text, span):
 
 
 @pytest.mark.parametrize("text", ["0:10", "100:131", "130:", "130:140", ":50", "90:110"])
-def test_span_outside_of_a_capture_is_refused_with_its_ends(text):
+def test_span_outside_a_capture_is_refused_with_its_range(text):
     with pytest.raises(ViewerError) as caught:
         HUNDRED.span(parse_range(text))
     assert str(caught.value) == (
@@ -92,7 +92,7 @@ def test_span_outside_of_a_capture_is_refused_with_its_ends(text):
     )
 
 
-def test_clips_of_keys_run_on():
+def test_keyed_clips_extrapolate():
     clip = Numbering(0, 31, 0.0, 1.0, 30.0, True)
     assert clip.span(Range(29, 60)) == (29, 60) and clip.span(Range(50, 60)) == (50, 60)
     assert clip.time_of(300) == 10.0 and clip.checked_time(-7.0) == -7.0
@@ -106,7 +106,7 @@ def test_clips_of_keys_run_on():
     assert str(caught.value) == "--frame: expected 0 or more, found -1"
 
 
-def test_times_of_a_capture_are_those_of_its_frames():
+def test_capture_times_match_its_frames():
     assert HUNDRED.time_of(100) == 0.0 and HUNDRED.time_of(115) == 0.5
     # What is printed can be typed: 0.966667 is a little more than 29 / 30.
     assert HUNDRED.checked_time(0.966667) == 29 / 30 and HUNDRED.checked_time(0.4) == 0.4
@@ -121,7 +121,7 @@ def test_times_of_a_capture_are_those_of_its_frames():
 
 @pytest.fixture
 def hundred(tmp_path):
-    """A model and frames 100 to 104 of one person, who goes 1 along y a frame."""
+    """A model and frames 100 to 104 of one person, who moves by 1 along y per frame."""
     np.savez(tmp_path / "SMPL.npz", **model("smpl", 32))
     straight = {"Rh": [[0.0, 0.0, 0.0]], "poses": [[0.0] * 72], "shapes": [[0.0] * 10]}
     frames = {100 + n: [body(0, Th=[[0.0, float(n), 0.0]], **straight)] for n in range(5)}
@@ -136,7 +136,7 @@ def root_height(folder, *arguments) -> float:
         return float(arrays["joints"][0, 1])
 
 
-def test_frame_is_that_of_the_files(hundred, tmp_path):
+def test_frame_number_matches_the_files(hundred, tmp_path):
     first = root_height(tmp_path, *hundred, "--frame", "100")
     for frame in (101, 104):
         height = root_height(tmp_path, *hundred, "--frame", frame)
@@ -175,7 +175,7 @@ def test_render_and_convert_give_frames_the_same_numbers(hundred, tmp_path):
     ],
 )
 @pytest.mark.parametrize("command", ["info", "render", "convert"])
-def test_behind_the_end_of_a_capture_is_nothing(
+def test_nothing_lies_beyond_the_end_of_a_capture(
     hundred, tmp_path, capsys, command, options, message
 ):
     out = {"info": [], "render": ["-o", str(tmp_path / "x.png")], "convert": ["-o", "x.obj"]}
@@ -184,7 +184,7 @@ def test_behind_the_end_of_a_capture_is_nothing(
 
 
 @pytest.mark.parametrize("command", ["render", "convert"])
-def test_range_that_leaves_a_capture_says_what_was_asked_for(hundred, tmp_path, capsys, command):
+def test_range_beyond_a_capture_quotes_the_request(hundred, tmp_path, capsys, command):
     name = {"render": "{frame}.png", "convert": "w.bvh"}[command]
     assert run([command, *hundred, "--frames", "103:160", "-o", str(tmp_path / name)]) == 2
     assert capsys.readouterr().err == (
@@ -192,7 +192,7 @@ def test_range_that_leaves_a_capture_says_what_was_asked_for(hundred, tmp_path, 
     )
 
 
-def test_range_behind_a_clip_says_what_was_asked_for(tmp_path, capsys):
+def test_range_beyond_a_clip_quotes_the_request(tmp_path, capsys):
     skel, skin = write_rig(tmp_path)
     (tmp_path / "move.anim").write_text(clip_text())  # of two seconds
     files = [str(path) for path in (skel, skin, tmp_path / "move.anim")]
@@ -213,7 +213,7 @@ def test_rates_have_limits(tmp_path, capsys, text):
     )
 
 
-def test_fastest_rate_is_taken(tmp_path, capsys):
+def test_highest_rate_is_used(tmp_path, capsys):
     files = write_twist(tmp_path)
     (tmp_path / "move.anim").write_text(clip_text())
     options = ["--fps", "1e5", "--frame", "50000", "--json"]

@@ -1,4 +1,4 @@
-"""``viewer render`` of motions: numbered pictures, videos, contact sheets; never half a file."""
+"""``viewer render`` of motions: numbered images, videos and contact sheets; never partial files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOTHING_MOVES = "nothing moves: no file has a motion (--turntable rotates the ca
 
 
 def single(files, seconds, camera, box, size=(64, 48), **options) -> np.ndarray:
-    """Return the picture of one time, drawn without this command's code."""
+    """Return the image at one time, rendered without the code of the command."""
     from viewer.rendering.offscreen import Offscreen
 
     scene = viewer.load(*files)
@@ -36,7 +36,7 @@ def single(files, seconds, camera, box, size=(64, 48), **options) -> np.ndarray:
 # Numbered pictures
 
 
-def test_numbered_pictures_are_the_frames(draw, walk, tmp_path):
+def test_numbered_images_match_the_frames(draw, walk, tmp_path):
     said = draw(walk, "f_{frame:03}.png", "--frames", "0:31:15", "--no-grid", "--follow", "root")
     assert said.out.startswith(f"{tmp_path / 'f_000.png'} to f_030.png: 3 frames, 0.1 s, 64 x 48")
     assert said.err == "" and names(tmp_path, ".png") == ["f_000.png", "f_015.png", "f_030.png"]
@@ -49,7 +49,7 @@ def test_numbered_pictures_are_the_frames(draw, walk, tmp_path):
 def test_sequence_shows_the_same_as_single_frames(draw, walk, tmp_path):
     """At a given distance only the target is fitted: that of the middle of all frames."""
     options = ("--distance", "30", "--no-grid", "--background", "transparent")
-    axis = ("--front", "+z")  # as cameras have it that know nothing of figures
+    axis = ("--front", "+z")  # as for cameras independent of figures
     draw(walk, "{frame}.png", "--frames", "0:31", *axis, *options)
     assert len(names(tmp_path, ".png")) == 31
     scene = viewer.load(*walk)
@@ -65,7 +65,7 @@ def test_sequence_shows_the_same_as_single_frames(draw, walk, tmp_path):
         assert (picture(tmp_path / f"{frame}.png") == wanted).all(), frame
 
 
-def test_whole_motion_is_in_the_picture(draw, walk, tmp_path):
+def test_whole_motion_is_in_frame(draw, walk, tmp_path):
     draw(walk, "{frame}.png", "--no-grid", "--background", "transparent", size="128x72")
     assert len(names(tmp_path, ".png")) == 31
     drawn = sum(picture(tmp_path / f"{frame}.png")[..., 3] for frame in range(31)) > 0
@@ -88,18 +88,18 @@ def test_whole_motion_is_in_the_picture(draw, walk, tmp_path):
         (["--turntable", "90deg", "--frames", "4:6"], [4, 5]),
     ],
 )
-def test_frames_are_counted_from_0_as_fps_counts(draw, walk, tmp_path, options, wanted):
+def test_frames_are_counted_from_0_at_the_given_fps(draw, walk, tmp_path, options, wanted):
     draw(walk, "{frame}.png", *options, size="16x16")
     assert names(tmp_path, ".png") == sorted(f"{frame}.png" for frame in wanted)
 
 
-def test_frames_behind_the_end_are_drawn_and_said(draw, walk, tmp_path):
+def test_frames_beyond_the_end_are_drawn_with_a_note(draw, walk, tmp_path):
     said = draw(walk, "{frame}.png", "--frames", "29:33", size="16x16")
     assert said.err == "warning: --frames: frames 31 to 32 are beyond the motion's end\n"
     assert len(names(tmp_path, ".png")) == 4
 
 
-def test_braces_twice_are_braces(draw, walk, tmp_path):
+def test_doubled_braces_are_literal_braces(draw, walk, tmp_path):
     draw(walk, "{{x}}_{frame:02d}.png", "--frames", "0:2", size="16x16")
     assert names(tmp_path, ".png") == ["{x}_00.png", "{x}_01.png"]
 
@@ -118,7 +118,7 @@ def test_braces_twice_are_braces(draw, walk, tmp_path):
         "x_{frame:05.png",
     ],
 )
-def test_bad_names_are_refused_before_any_work(draw, tmp_path, name):
+def test_invalid_names_are_refused_before_any_work(draw, tmp_path, name):
     said = draw(["missing.skel"], name, "--frames", "0:2", code=2)
     assert said.err == (
         "viewer: --output: expected {frame} or {frame:05} in the name of numbered pictures, as in "
@@ -127,14 +127,14 @@ def test_bad_names_are_refused_before_any_work(draw, tmp_path, name):
 
 
 @pytest.mark.parametrize("text", ["5", "5:2", "5:5", "-1:3", "a:b", "0:5:0", "1:2:3:4", "", "٣:٤"])
-def test_bad_ranges_are_one_line(draw, walk, text):
+def test_invalid_ranges_are_one_line(draw, walk, text):
     said = draw(walk, "{frame}.png", f"--frames={text}", code=2)
     assert said.err == (
         f'viewer: --frames: expected A:B or A:B:STEP with A below B, as in 0:100, found "{text}"\n'
     )
 
 
-def test_range_that_begins_behind_the_end_says_how_many_there_are(draw, walk):
+def test_range_starting_beyond_the_end_reports_the_frame_count(draw, walk):
     said = draw(walk, "{frame}.png", "--frames", "31:", code=2)
     assert said.err == (
         "viewer: --frames: expected a range within 0:31 (frames 0 to 30), found 31:\n"
@@ -147,7 +147,7 @@ def test_turntables_are_read():
 
 
 @pytest.mark.parametrize("text", ["0", "-3", "0deg", "nan", "fox.skel", "1e9", "99999deg"])
-def test_bad_turntables_are_one_line(draw, walk, text):
+def test_invalid_turntables_are_one_line(draw, walk, text):
     said = draw(walk, "x.mp4", f"--turntable={text}", code=2)
     assert said.err == (
         "viewer: --turntable: expected seconds such as 6, or degrees such as 90deg, "
@@ -155,7 +155,7 @@ def test_bad_turntables_are_one_line(draw, walk, text):
     )
 
 
-def test_options_that_a_motion_overrides_are_said(draw, walk):
+def test_options_overridden_by_a_motion_are_reported(draw, walk):
     said = draw(walk, "x.mp4", "--dof", "arm.x=1", "--mirror", size="32x32")
     assert said.err.splitlines() == [
         "warning: --dof: applies only to figures without a motion",
@@ -172,7 +172,7 @@ def pair(tmp_path) -> list[str]:
     return [str(folder), "--model", str(tmp_path / "SMPL.npz"), "--up", "y"]
 
 
-def test_follow_says_whom_where_two_have_the_joint(draw, pair):
+def test_follow_reports_whom_if_two_have_the_joint(draw, pair):
     size = "16x16"
     said = draw(pair, "a.mp4", "--follow", "pelvis", size=size)
     assert said.err == (
@@ -187,12 +187,12 @@ def test_follow_says_whom_where_two_have_the_joint(draw, pair):
     )
 
 
-def test_follow_of_figures_without_numbers_says_that_it_is_the_first(draw, walk):
+def test_follow_of_unnumbered_figures_reports_the_first(draw, walk):
     said = draw([*walk, *walk[:2]], "x.mp4", "--follow", "arm", size="16x16")
     assert said.err == ("warning: --follow arm: 2 match; the first one, tiny, is followed\n")
 
 
-def test_shapes_that_a_capture_overrides_are_said(draw, pair):
+def test_shapes_overridden_by_a_capture_are_reported(draw, pair):
     said = draw(pair, "x.mp4", "--shape", "1", size="16x16")
     assert said.err == "warning: --shape: applies only to figures without a motion\n"
 
@@ -245,7 +245,7 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
     assert ": 8 frames of " in said.out
 
 
-# What does not go together
+# Incompatible options
 
 
 @pytest.mark.parametrize(
@@ -324,7 +324,7 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         ),
     ],
 )
-def test_options_without_sense_are_one_line(draw, walk, tmp_path, name, options, words):
+def test_contradictory_options_are_one_line(draw, walk, tmp_path, name, options, words):
     said = draw(walk[:2], name, *options.split(), code=2)
     assert said.err == f"viewer: {words}\n"
     assert names(tmp_path, ".png", ".mp4", ".gif") == []
@@ -333,7 +333,7 @@ def test_options_without_sense_are_one_line(draw, walk, tmp_path, name, options,
 # Files
 
 
-def test_existing_files_are_checked_before_anything_is_drawn(draw, walk, tmp_path):
+def test_existing_files_are_checked_before_rendering(draw, walk, tmp_path):
     (tmp_path / "f_2.png").write_bytes(b"precious")
     said = draw(walk, "f_{frame}.png", "--frames", "0:3", size="16x16", code=5)
     assert said.err == (f"viewer: {tmp_path / 'f_2.png'}: exists already (--force replaces it)\n")
@@ -344,7 +344,7 @@ def test_existing_files_are_checked_before_anything_is_drawn(draw, walk, tmp_pat
 
 def test_inputs_are_never_replaced(draw, tmp_path):
     skel, skin = write_rig(tmp_path)
-    clip = tmp_path / "walk_1.png"  # a clip under the name of a picture
+    clip = tmp_path / "walk_1.png"  # a clip with an image suffix
     clip.write_text(anim_text(1.0, 9, {}))
     kept = clip.read_bytes()
     said = draw([str(skel), str(skin), str(clip)], "walk_{frame}.png", "--force", code=5)
@@ -353,7 +353,7 @@ def test_inputs_are_never_replaced(draw, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["no/{frame}.png", "no/x.mp4", "no/x.gif"])
-def test_missing_folder_is_said_before_anything_is_drawn(draw, walk, tmp_path, name):
+def test_missing_folder_is_reported_before_rendering(draw, walk, tmp_path, name):
     said = draw(walk, name, code=5)
     wanted = str(tmp_path / name).replace("{frame}", "0")
     assert said.err == f"viewer: {wanted}: the folder {tmp_path / 'no'} does not exist\n"
@@ -368,14 +368,14 @@ def test_wasp_walks(draw, shared, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm"])
-def test_numbered_files_are_pictures(tmp_path, monkeypatch, capsys, suffix):
+def test_numbered_files_are_images(tmp_path, monkeypatch, capsys, suffix):
     monkeypatch.chdir(tmp_path)
     assert run(["render", "missing.skel", "-o", f"f_{{frame}}{suffix}", "--frames", "0:2"]) == 2
     error = capsys.readouterr().err
     assert ".png" in error and f"found {suffix}" in error and "missing" not in error
 
 
-def test_cells_that_cannot_be_drawn_come_with_the_size_of_the_sheet(walk, monkeypatch, capsys):
+def test_cells_that_are_too_large_are_refused_with_the_sheet_size(walk, monkeypatch, capsys):
     monkeypatch.chdir(Path(walk[0]).parent)
     arguments = ["-o", "s.png", "--contact-sheet", "4", "--size", "300000x300000"]
     assert run(["render", *map(str, walk), *arguments]) == 2

@@ -56,7 +56,7 @@ INSTALL = "(on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri)"
 
 
 @LINUX
-def test_no_egl_device_names_the_cures(tmp_path):
+def test_missing_egl_device_names_the_remedies(tmp_path):
     result = viewer_render(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent")
     check_refusal(
         *result,
@@ -99,7 +99,7 @@ def test_an_old_opengl_is_named_with_its_version_and_renderer(tmp_path):
         ("MESA_GL_VERSION_OVERRIDE", "2.1", ("OpenGL 3.3 is needed", "offers 2.1")),
     ],
 )
-def test_an_old_shading_language_is_told_apart_from_an_old_opengl(tmp_path, name, value, words):
+def test_an_old_shading_language_is_distinguished_from_an_old_opengl(tmp_path, name, value, words):
     result, output = viewer_render(tmp_path, **{name: value})
     assert result.returncode == 4 and result.stderr.count("\n") == 1, result.stderr
     for word in (*words, "renderer ", f"{name}={value}"):
@@ -123,7 +123,7 @@ def test_an_old_shading_language_is_told_apart_from_an_old_opengl(tmp_path, name
         ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
     ],
 )
-def test_doctor_says_the_same(environment, code, words):
+def test_doctor_reports_the_same(environment, code, words):
     variables = {**os.environ, "WAYLAND_DISPLAY": "", **environment}
     done = subprocess.run(
         [sys.executable, "-m", "viewer", "doctor"],
@@ -148,7 +148,7 @@ def test_a_missing_libgl_names_its_package(tmp_path):
 
 
 @LINUX
-def test_a_device_that_is_not_there_gives_the_number_of_devices(tmp_path):
+def test_a_missing_device_reports_the_number_of_devices(tmp_path):
     count = device_count()
     known = "0, the only one," if count == 1 else f"0 to {count - 1},"
     for number in ("99", "-1"):
@@ -160,13 +160,13 @@ def test_a_device_that_is_not_there_gives_the_number_of_devices(tmp_path):
 
 
 @LINUX
-def test_a_device_that_is_not_there_is_said_before_anything_is_read(tmp_path, capsys):
+def test_a_missing_device_is_reported_before_anything_is_read(tmp_path, capsys):
     assert run(["render", "missing.skel", "-o", str(tmp_path / "x.png"), "--gpu", "-1"]) == 2
     assert "found -1" in capsys.readouterr().err
 
 
 @LINUX
-def test_no_device_at_all_is_no_usage_error_but_a_negative_number_is(tmp_path):
+def test_only_a_negative_device_number_is_a_usage_error(tmp_path):
     for number, code, word in (("0", 4, "EGL found 0 devices"), ("-1", 2, "expected 0 or more")):
         result, _ = viewer_render(
             tmp_path, "--gpu", number, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent"
@@ -175,7 +175,7 @@ def test_no_device_at_all_is_no_usage_error_but_a_negative_number_is(tmp_path):
 
 
 @LINUX
-def test_the_first_device_can_be_asked_for(tmp_path):
+def test_the_first_device_can_be_requested(tmp_path):
     result, output = viewer_render(tmp_path, "--gpu", "0")
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
@@ -192,7 +192,7 @@ def test_a_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
     assert not output.exists()
 
 
-def test_too_many_samples_are_drawn_with_what_there_is(tmp_path):
+def test_too_many_samples_fall_back_to_the_maximum(tmp_path):
     result, output = viewer_render(tmp_path, "--samples", "4096")
     assert result.returncode == 0
     assert result.stderr.startswith("warning: 4096 samples per pixel requested, ")
@@ -201,7 +201,7 @@ def test_too_many_samples_are_drawn_with_what_there_is(tmp_path):
 
 
 @LINUX
-def test_another_rasteriser_draws_without_complaint(tmp_path):
+def test_another_rasteriser_draws_without_warnings(tmp_path):
     result, output = viewer_render(tmp_path, "--samples", "1", GALLIUM_DRIVER="softpipe")
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
@@ -244,21 +244,21 @@ def test_library_messages_are_explained(text, start):
 
 
 @LINUX
-def test_an_impossible_device_is_an_error_in_process_too():
+def test_an_invalid_device_is_an_error_in_process_too():
     for number in (99, -1):
         with pytest.raises(ViewerError, match=f"found {number} ") as caught:
             headless_context(number)
         assert caught.value.exit_code == 2
 
 
-def test_errors_of_opengl_are_raised_with_what_was_done(ctx):
+def test_opengl_errors_are_raised_with_the_operation(ctx):
     check_errors(ctx, "nothing")
     ctx.enable_direct(0xFFFF)  # no such capability
     with pytest.raises(RenderError, match=r"^a mistake: GL_INVALID_ENUM on "):
         check_errors(ctx, "a mistake")
 
 
-def test_an_upload_without_room_says_how_much_was_asked(ctx, monkeypatch):
+def test_an_upload_without_memory_reports_the_requested_size(ctx, monkeypatch):
     """moderngl raises nothing; only the context's error tells."""
     monkeypatch.setattr(moderngl.Context, "error", property(lambda self: "GL_OUT_OF_MEMORY"))
     with pytest.raises(
@@ -269,7 +269,7 @@ def test_an_upload_without_room_says_how_much_was_asked(ctx, monkeypatch):
     monkeypatch.undo()
 
 
-def test_two_contexts_live_side_by_side():
+def test_two_contexts_coexist():
     first, second = headless_context(), headless_context()
     with first:
         ours = first.buffer(b"ours")
@@ -285,7 +285,7 @@ def test_two_contexts_live_side_by_side():
     first.release()
 
 
-def test_graphics_card_that_may_not_be_opened_is_a_note(monkeypatch):
+def test_inaccessible_graphics_card_is_a_note(monkeypatch):
     monkeypatch.setattr("viewer.rendering.offscreen.is_software", lambda context: True)
     nodes = ["/dev/dri/renderD128"]
     monkeypatch.setattr("viewer.rendering.offscreen.unreadable_devices", lambda: nodes)
@@ -296,7 +296,7 @@ def test_graphics_card_that_may_not_be_opened_is_a_note(monkeypatch):
         ]
 
 
-def test_display_without_opengl_3_says_what_is_needed():
+def test_display_without_opengl_3_reports_the_requirement():
     assert explain("GLX: Failed to create context: GLXBadFBConfig") == (
         "OpenGL 3.3 is needed and this display's driver does not offer it "
         "[GLX: Failed to create context: GLXBadFBConfig]"

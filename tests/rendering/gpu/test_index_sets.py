@@ -28,7 +28,7 @@ def drawn(ctx, triangles, materials, positions):
     return made, indices
 
 
-def test_shuffled_triangles_are_put_side_by_side(ctx):
+def test_shuffled_triangles_are_sorted_spatially(ctx):
     ball = sphere(24)
     shuffled = np.random.default_rng(0).permutation(ball.triangles)
     made, indices = drawn(ctx, shuffled, np.full(len(shuffled), -1), ball.positions)
@@ -40,7 +40,7 @@ def test_shuffled_triangles_are_put_side_by_side(ctx):
     assert shaded(indices) < 0.9 * len(shuffled)
 
 
-def test_runs_of_a_material_stay_where_they_are(ctx):
+def test_material_runs_keep_their_order(ctx):
     ball = sphere(8)
     materials = np.zeros(len(ball.triangles), dtype=np.int32)
     materials[20:50] = 1
@@ -64,7 +64,7 @@ def test_without_positions_the_order_stays(ctx):
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_few_triangles_are_no_exception(ctx, count):
+def test_few_triangles_are_sorted_too(ctx, count):
     points = np.zeros((3, 3))
     triangles = np.array([[0, 1, 2]], dtype=np.int32)[:count]
     made, _ = index_set(ctx, triangles, np.zeros(count), [PLAIN], points), None

@@ -163,7 +163,7 @@ def test_instances_grow_shrink_and_change_their_method(ctx):
     instances.release()
 
 
-def test_place_and_scale_of_each_actor_count(ctx):
+def test_placement_and_scale_of_each_actor_are_applied(ctx):
     figure = random_figure(np.random.default_rng(5), 8)
     instances, actors = Instances(ctx, figure), cast(figure, 4)
     for number, actor in enumerate(actors):
@@ -247,7 +247,7 @@ def test_views_of_single_vertices_draw_actors_one_by_one(changes):
     assert instance_groups(rows_of_arms(FEWEST).actors, DisplayOptions(**changes)) == []
 
 
-def test_meshes_that_follow_no_skeleton_are_no_instances():
+def test_meshes_without_a_skin_are_not_instanced():
     figure = replace(arm(3), skin=None)
     assert instance_groups([Actor(figure) for _ in range(FEWEST)], DisplayOptions()) == []
 
@@ -266,7 +266,7 @@ def test_absent_and_hidden_actors_are_not_drawn(offscreen):
     assert not offscreen.render(scene, size, camera, options, box)[..., 3].any()
 
 
-def test_instances_of_a_figure_that_left_are_freed(offscreen):
+def test_instances_of_a_removed_figure_are_freed(offscreen):
     scene = rows_of_arms(FEWEST)
     camera, box = default_camera(scene, (50, 50)), scene_box(scene)
     offscreen.render(scene, (50, 50), camera, DisplayOptions(), box)
@@ -291,7 +291,7 @@ def test_a_refused_upload_is_tried_again(ctx, monkeypatch):
     instances.release()
 
 
-def test_skeletons_of_many_actors_are_those_of_each(offscreen):
+def test_instanced_skeletons_match_single_ones(offscreen):
     scene = rows_of_arms(5)
     scene.actors[3].pose.scales[:] = 1.5
     options = DisplayOptions(show="both")
@@ -306,7 +306,7 @@ def test_skeletons_of_many_actors_are_those_of_each(offscreen):
             assert np.allclose(rows[..., 3] + boxes.center, wanted[..., 3], atol=1e-6)
 
 
-def test_figures_of_points_alone_go_through_every_view(offscreen):
+def test_point_figures_work_in_every_view(offscreen):
     layout = PointLayout("one", ("a", "b"), [[0, 1]], [0, 0])
     actors = [Actor(Figure("points", points=layout)) for _ in range(FEWEST)]
     for number, actor in enumerate(actors[1:]):

@@ -33,7 +33,7 @@ def test_sides_are_halved_rounding_down_to_one_pixel(size, wanted):
     ]
 
 
-def test_one_colour_stays_itself():
+def test_uniform_colour_is_unchanged():
     for value in range(256):
         pixels = np.full((4, 4, 4), value, dtype=np.uint8)
         for picture in halved_pictures(pixels):

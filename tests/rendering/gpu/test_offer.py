@@ -27,7 +27,7 @@ MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
         ("", "", {}, "OpenGL 3.3", "offers 0.0"),
     ],
 )
-def test_what_is_needed_and_what_there_is(version, language, environment, needed, offered):
+def test_required_and_available_versions(version, language, environment, needed, offered):
     text = offer_text(Offer(version, language, MESA), environment)
     before, after = text.split("; ")
     assert needed in before and offered in after and f"renderer {MESA}" in after

@@ -32,7 +32,7 @@ def test_owner_frees_the_last_first_and_only_once():
     assert log == ["c", "b", "a"]
 
 
-def test_guard_frees_when_the_rest_fails():
+def test_guard_frees_on_failure():
     log, owner = [], Owner()
     with pytest.raises(RenderError), owner.guard():
         owner.keep(Item(log, "a"))

@@ -1,4 +1,4 @@
-"""Shader programs: what does not compile names our file and line, whatever the driver says."""
+"""Shader programs: compile errors name our file and line with every driver."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_a_shader_that_does_not_compile_names_file_and_line(ctx, shaders, name):
         ("0:90035(2): error: elsewhere", "0:90035(2): error: elsewhere"),
     ],
 )
-def test_messages_of_other_drivers_are_understood(ctx, line, shown):
+def test_messages_of_other_drivers_are_parsed(ctx, line, shown):
     programs = Programs(ctx)
     text = programs._explain(f"GLSL Compiler failed\n\n{line}\n", ["mesh.vert", "mesh.frag"])
     assert shown in text

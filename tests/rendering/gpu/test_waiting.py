@@ -63,7 +63,7 @@ def test_other_threads_run_while_the_driver_is_waited_for(ctx):
     assert waiter.is_free and inside >= 5
 
 
-def test_contexts_that_hide_their_functions_are_waited_for_all_the_same():
+def test_contexts_without_exposed_functions_are_waited_for_too():
     calls = []
     context = SimpleNamespace(mglo=object(), finish=lambda: calls.append("finish"))
     waiter = Waiter(context)
@@ -72,7 +72,7 @@ def test_contexts_that_hide_their_functions_are_waited_for_all_the_same():
     assert not waiter.is_free and calls == ["finish"]
 
 
-def test_loader_that_knows_no_such_function_counts_as_none():
+def test_loader_without_the_function_counts_as_none():
     loader = SimpleNamespace(load_opengl_function=lambda name: 0)
     context = SimpleNamespace(mglo=SimpleNamespace(_context=loader), finish=lambda: None)
     assert not Waiter(context).is_free

@@ -1,4 +1,4 @@
-"""Words beside points: which are drawn where there is no room for all, and how large."""
+"""Labels next to points: priority where not all fit, and size."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ def placed(lettering, points, ranks, words=None):
     return place_labels([labels], view_of(camera, SIZE, BOX), SIZE, lettering)
 
 
-def test_letters_grow_with_the_picture():
+def test_letters_grow_with_the_image():
     # 13 pixels at 720; 800 wide counts as 600 high.
     assert letters_for((1280, 720)) == 13 and letters_for((2560, 1440)) == 26
     assert letters_for(SIZE) == 11
 
 
-def test_low_ranks_come_first_and_then_the_nearer(lettering):
+def test_lower_rank_comes_first_then_the_nearer(lettering):
     same_place = [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0], [0, 0, 0.5]]
     assert placed(lettering, same_place, [1, 1, 0, 1]).texts == ("c", "b", "d", "a")
     assert placed(lettering, same_place, [1, 1, 1, 1]).texts == ("b", "d", "a", "c")
     assert placed(lettering, same_place, [0, 1, 2, 3]).texts == ("a", "b", "c", "d")
 
 
-def test_colours_go_with_their_words(lettering):
+def test_colours_match_their_labels(lettering):
     found = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [9, 0, -1.0]], [2, 1, 0])
     assert found.texts == ("b", "a")
     assert_allclose(found.colors, [[0.03, 0.04, 0.05], [0.0, 0.01, 0.02]])
     assert (found.n_seen, found.n_left_out) == ((2,), (0,))
 
 
-def test_no_words_are_none(lettering):
+def test_no_labels_give_no_text(lettering):
     found = placed(lettering, np.zeros((0, 3)), np.zeros(0, int), ())
     assert found.texts == () and found.corners.shape == (0, 2) and found.n_left_out == (0,)
 
 
-def test_words_of_several_are_placed_together(lettering):
+def test_labels_of_several_annotations_are_placed_together(lettering):
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     view, place, white = view_of(camera, SIZE, BOX), np.zeros((1, 3)), np.ones((1, 3))
     many = Labels(("a",) * 6, np.repeat(place, 6, axis=0), np.full(6, 7), np.ones((6, 3)))
@@ -70,7 +70,7 @@ def test_words_of_several_are_placed_together(lettering):
     assert cover.max() == 1
 
 
-def test_lines_lead_from_beside_the_point_to_its_word(lettering):
+def test_lines_lead_from_next_to_the_point_to_its_label(lettering):
     found = placed(lettering, np.zeros((3, 3)), [0, 1, 2])
     assert found.has_line.tolist() == [False, False, True]
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)

@@ -1,4 +1,4 @@
-"""Pictures of joints: bones through the skin, names, axes, and what is picked there."""
+"""Rendered joints: bones through the skin, names, axes, and picking."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def boned() -> Scene:
     return Scene([Actor(Figure("square", figure.mesh)), Actor(joints)])
 
 
-def test_bones_are_seen_through_a_translucent_skin(offscreen):
+def test_bones_are_visible_through_a_translucent_skin(offscreen):
     plain = front_view(offscreen, boned())
     xray = front_view(offscreen, boned(), xray=True)
     assert pixel(plain, 0.0, -1.0)[3] == 255
@@ -38,7 +38,7 @@ def test_bones_are_seen_through_a_translucent_skin(offscreen):
     assert pixel(xray, 1.0, 0.5)[3] > 200
 
 
-def test_translucent_skins_are_one_layer_in_any_order(offscreen):
+def test_translucent_skins_form_one_layer_in_any_order(offscreen):
     once = front_view(offscreen, boned(), xray=True)
     for place in (0, 1):
         scene = boned()
@@ -48,7 +48,7 @@ def test_translucent_skins_are_one_layer_in_any_order(offscreen):
         np.testing.assert_array_equal(front_view(offscreen, scene, xray=True), once)
 
 
-def test_colours_that_stand_for_numbers_stay_as_they_are(offscreen):
+def test_scalar_colours_are_unchanged(offscreen):
     shown = {"shading": "scalar", "scalar": "influences"}
     plain = front_view(offscreen, alone(grid_figure()), **shown)
     xray = front_view(offscreen, alone(grid_figure()), xray=True, **shown)
@@ -64,7 +64,7 @@ def test_overlapping_actors_are_translucent_too(offscreen):
     assert 80 < pixel(picture, -1.2, -1.2)[3] < 130
 
 
-def test_bones_of_the_binding_space_are_not_drawn(offscreen):
+def test_bones_are_not_drawn_in_bind_pose(offscreen):
     plain = front_view(offscreen, alone(grid_figure()), show="binding")
     names = front_view(offscreen, alone(grid_figure()), show="binding", joint_names=True)
     np.testing.assert_array_equal(plain, names)
@@ -99,7 +99,7 @@ def test_new_names_are_added_to_those_drawn_before(offscreen):
     np.testing.assert_array_equal(front_view(offscreen, first, joint_names=True), once)
 
 
-def test_picking_finds_bones_that_are_seen_through_the_skin(offscreen):
+def test_picking_finds_bones_visible_through_the_skin(offscreen):
     scene = boned()
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
 
@@ -119,6 +119,6 @@ def test_picking_finds_bones_that_are_seen_through_the_skin(offscreen):
     assert picked(0.0, -1.0, xray=True) == (0, -1)
 
 
-def test_pictures_without_marks_are_as_before(offscreen):
+def test_images_without_marks_are_unchanged(offscreen):
     assert drawn(front_view(offscreen, boned())).any()
     assert not DisplayOptions().xray

@@ -1,4 +1,4 @@
-"""Joints over the picture: bones, axes, dots, and which of them is at a pixel."""
+"""Joint overlays: bones, axes, dots, and picking them at a pixel."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_selected_joint_has_a_larger_dot():
     assert chosen[-1].widths[0] > chosen[1].widths[0]
 
 
-def test_axes_are_those_of_the_joint_and_reach_some_of_the_way():
+def test_axes_follow_the_joint_and_are_shorter_than_the_bone():
     actor = chain()
     actor.pose.dofs[2] = np.pi / 2
     (marks,) = marks_of([actor])
@@ -114,18 +114,18 @@ def test_joint_is_found_by_its_dot(view):
     assert at(view, 1.0, 0.05, with_bones=False) is None  # ten pixels away
 
 
-def test_bone_belongs_to_the_joint_that_turns_it(view):
+def test_bone_belongs_to_the_joint_that_rotates_it(view):
     assert at(view, 0.5, 0.0) == (0, 0) and at(view, 1.0, 0.5) == (0, 1)
     assert at(view, 0.5, 0.0, with_bones=False) is None
     assert at(view, 0.5, 0.1) is None and at(view, -1.0, -1.0) is None
 
 
-def test_dot_counts_before_bones(view):
+def test_dot_takes_precedence_over_bones(view):
     # On the bone of joint 1, five pixels below the dot of joint 2.
     assert at(view, 1.0, 0.975) == (0, 2)
 
 
-def test_nearer_actor_counts_where_two_coincide(view):
+def test_nearer_actor_wins_where_two_coincide(view):
     far, near = chain(), chain()
     near.placement[2, 3] = 0.5
     assert at(view, 1.0, 0.0, actors=[far, near]) == (1, 1)
@@ -135,5 +135,5 @@ def test_nearer_actor_counts_where_two_coincide(view):
     assert_allclose(found[2], [1.0, 0.0, 0.5], atol=1e-12)
 
 
-def test_nobody_has_no_joint(view):
+def test_empty_scene_has_no_joint(view):
     assert at(view, 0.0, 0.0, actors=[]) is None

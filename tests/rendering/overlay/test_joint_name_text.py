@@ -1,4 +1,4 @@
-"""Names beside joints: the selected one first, then the nearer, and how many are left out."""
+"""Joint names: the selected one first, then the nearer, and the omitted count."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def placed(lettering, offsets, selected=(0, -1)):
     return place_labels([name_labels(marks, selected)], view, SIZE, lettering)
 
 
-def test_joints_apart_have_all_their_names(lettering):
+def test_well_separated_joints_are_all_named(lettering):
     names = placed(lettering, [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
     assert sorted(names.texts) == ["j0", "j1", "j2"]
     assert (names.n_seen, names.n_left_out) == ((3,), (0,))
@@ -43,7 +43,7 @@ def test_joints_apart_have_all_their_names(lettering):
     assert 222 < left < 230 and 345 < top < 360
 
 
-def test_nearest_joints_have_names_where_there_is_no_room_for_all(lettering):
+def test_nearest_joints_are_named_if_not_all_fit(lettering):
     names = placed(lettering, [[0, 0, z] for z in (0.0, 1.0, -1.0, 0.5, -0.5)])
     # Right and left of the place, above and below it.
     assert names.texts == ("j1", "j3", "j0", "j4")
@@ -59,12 +59,12 @@ def test_selected_joint_comes_first_in_its_own_colour(lettering):
     assert other.texts == ("j1", "j0", "j2")
 
 
-def test_joints_beside_the_picture_do_not_count(lettering):
+def test_joints_outside_the_image_do_not_count(lettering):
     names = placed(lettering, [[0, 0, 0], [9, 0, 0], [0, -9, 0]])
     assert names.texts == ("j0",) and names.n_seen == (1,)
 
 
-def test_nobody_has_no_names(lettering):
+def test_empty_scene_has_no_names(lettering):
     camera = Camera()
     view = view_of(camera, SIZE, BOX)
     names = place_labels([name_labels([], (0, -1))], view, SIZE, lettering)

@@ -1,4 +1,4 @@
-"""Places of labels: what is said of all at once is what one finds point by point."""
+"""Label candidates: batched results match point-by-point checks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.rendering.overlay.label_cells import Cells, Dots
 PICTURE, GAP = (300, 200), 8.0
 
 
-def test_label_in_the_middle_has_eight_places_in_three_distances():
+def test_label_in_the_middle_has_eight_positions_at_three_distances():
     places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert places.ranks.tolist() == list(range(24))
     assert places.has_line.tolist() == [False] * 8 + [True] * 16
@@ -30,14 +30,14 @@ def test_label_in_the_middle_has_eight_places_in_three_distances():
     np.testing.assert_array_equal(places.own[rows], [8.0] * 4 + [24.0] * 4)
 
 
-def test_places_outside_of_the_picture_are_none():
+def test_positions_outside_the_image_are_excluded():
     places = places_of(np.array([(4.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert (places.low[:, 0] >= 0).all() and 1 not in places.ranks
     # Above it is room, as the label may be shifted along.
     assert places.low[places.ranks == 6].tolist() == [[0, 82]]
 
 
-def test_line_runs_from_half_a_gap_to_a_pixel_before_its_label():
+def test_leader_line_starts_half_a_margin_off_and_ends_a_pixel_before_the_label():
     places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     pixels, are_part = line_pixels(places, GAP)
     assert not are_part[:8].any()
@@ -78,7 +78,7 @@ def by_hand(points, places):
     return clear, beside
 
 
-def test_places_are_clear_of_other_points_and_the_best_come_first(scene, room):
+def test_positions_are_clear_of_other_points_best_first(scene, room):
     points, places, dots = scene
     clear, beside = room
     least = 1.5 * np.where(places.has_line, GAP, places.own)
@@ -92,7 +92,7 @@ def test_places_are_clear_of_other_points_and_the_best_come_first(scene, room):
     assert len(wanted) > 0 or len(points) > 1000
 
 
-def test_what_is_found_crowded_is_so_and_most_of_it_is_found(scene, room):
+def test_crowding_test_has_no_false_positives_and_few_misses(scene, room):
     points, places, dots = scene
     clear, beside = room
     found = crowded(places, points, dots, GAP)
@@ -105,7 +105,7 @@ def test_what_is_found_crowded_is_so_and_most_of_it_is_found(scene, room):
         assert found.mean() > 0.9 and lines[places.has_line].mean() > 0.9
 
 
-def test_cells_larger_than_the_room_beside_a_line_say_nothing(scene):
+def test_cells_larger_than_the_space_next_to_a_line_are_inconclusive(scene):
     points, places, _ = scene
     pixels, are_part = line_pixels(places, GAP)
     dots = Dots(Cells(PICTURE, 5), points)

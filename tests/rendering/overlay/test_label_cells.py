@@ -1,4 +1,4 @@
-"""A picture in cells: what lies in rectangles, compared with looking at every dot."""
+"""Label cells: contents of rectangles, compared with brute force."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from viewer.rendering.overlay.label_cells import Cells, Dots, spread, summed, sums_within
 
 
-def test_cells_count_from_one_and_what_lies_outside_has_its_own():
+def test_cells_count_from_one_with_a_border_for_outside_points():
     cells = Cells((10, 7), 4)  # 3 columns, 2 rows
     assert cells.shape == (4, 5)
     points = np.array([(0.0, 0.0), (3.9, 4.0), (9.0, 6.9), (-0.1, 99.0), (12.0, 3.0)])
@@ -30,13 +30,13 @@ def test_rectangle_smaller_than_a_cell_has_none_within():
     assert first[0, 0] == after[0, 0]
 
 
-def test_sums_of_rectangles_are_those_of_their_numbers():
+def test_rectangle_sums_match_direct_sums():
     table = np.random.default_rng(0).integers(0, 9, (5, 7)).astype(np.int32)
     found = sums_within(summed(table), np.array([[1, 2], [0, 0]]), np.array([[4, 4], [7, 5]]))
     assert found.tolist() == [table[2:4, 1:4].sum(), table.sum()]
 
 
-def test_ranges_are_spread_one_after_the_other():
+def test_ranges_are_concatenated():
     owners, numbers = spread(np.array([5, 0, 9]), np.array([2, 0, 3]))
     assert owners.tolist() == [0, 0, 2, 2, 2] and numbers.tolist() == [5, 6, 9, 10, 11]
 
@@ -66,7 +66,7 @@ def test_counts_within_rectangles_are_bounded(scene):
     assert is_inside.any() and (most <= wider)[is_inside].all()
 
 
-def test_every_dot_in_a_rectangle_is_given_once_in_one_of_the_layers(scene):
+def test_every_dot_in_a_rectangle_is_listed_once(scene):
     points, low, high = scene
     dots = Dots(Cells((100, 90), 4), points)
     assert dots.n_layers == (3 if len(points) > 1000 else 1)
@@ -86,7 +86,7 @@ def test_dots_within_a_quarter_of_a_pixel_count_once():
     assert dots.count_at(np.array([[10, 10], [20, 10]])).tolist() == [2, 0]
 
 
-def test_no_dots_are_nowhere():
+def test_no_dots_give_empty_cells():
     dots = Dots(Cells((40, 40), 4), np.zeros((0, 2)))
     low, high = np.zeros((1, 2)), np.full((1, 2), 40.0)
     assert dots.fewest_within(low, high) == dots.most_within(low, high) == 0

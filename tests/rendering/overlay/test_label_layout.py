@@ -1,4 +1,4 @@
-"""Labels beside their own points, where room is; never over each other, nor nearer to others."""
+"""Label layout: next to their own points, without overlap or ambiguity."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def test_labels_of_one_point_lie_right_left_and_with_lines_above_and_below():
     assert layout.ends.tolist() == [[54.0, 30.0], [46.0, 30.0], [50.0, 18.0], [50.0, 42.0]]
 
 
-def test_first_in_order_comes_first():
+def test_first_label_has_priority():
     same = [(50.0, 30.0)] * 3
     assert placed(same, [(30, 10)] * 3, order=[2, 0, 1]) == {2: (54, 25), 0: (16, 25), 1: (35, 8)}
 
 
-def test_half_a_gap_stays_free_beside_a_label():
+def test_half_a_margin_stays_free_next_to_a_label():
     # The first ends at column 64. There is no room right of the second point.
     assert placed([(40.0, 30.0), (90.0, 30.0)], [(20, 10)] * 2) == {0: (44, 25), 1: (66, 25)}
     # One column less: up and to the left, 4 sqrt(1/2) both ways.
@@ -57,7 +57,7 @@ def test_label_does_not_lie_on_another_point():
     assert placed([(50.0, 30.0), (60.0, 30.0)], [(30, 10)] * 2) == {0: (16, 25), 1: (64, 25)}
 
 
-def test_free_place_is_better_than_one_near_another_point():
+def test_free_position_is_preferred_to_one_near_another_point():
     # The right place ends 7 before the other point: less than three gaps of 4.
     assert placed([(50.0, 30.0), (91.0, 30.0)], [(30, 10)] * 2)[0] == (16, 25)
     assert placed([(50.0, 30.0), (97.0, 30.0)], [(30, 10)] * 2)[0] == (54, 25)
@@ -65,7 +65,7 @@ def test_free_place_is_better_than_one_near_another_point():
     assert placed([(20.0, 30.0), (61.0, 30.0)], [(30, 10)] * 2)[0] == (5, 16)
 
 
-def test_point_between_others_gets_a_line_to_its_label():
+def test_crowded_point_gets_a_leader_line():
     row = np.array([(38.0, 30.0), (50.0, 30.0), (62.0, 30.0)])
     layout = lay_out(row, np.array([1, 0, 2]), np.full((3, 2), [30, 10]), PICTURE, 4.0)
     # All places 4 away are nearer than 6 to one of the others.
@@ -96,20 +96,20 @@ LONELY = np.array([(1000.0, 200.0), (1000.0, 500.0), (1400.0, 300.0), (1500.0, 8
 
 
 @pytest.mark.parametrize(("n_across", "step"), [(16, 4.0), (50, 4.0), (50, 1.0), (50, 0.1)])
-def test_points_far_from_others_have_names_however_many_came_before(n_across, step):
+def test_isolated_points_are_labelled_regardless_of_order(n_across, step):
     near = instances(n_across, step)
     found = drawn(np.concatenate([near, LONELY]))
     assert set(range(len(near), len(near) + 5)) <= set(found.tolist())
 
 
-def test_labels_at_one_place_leave_room_for_one_aside():
+def test_labels_at_one_point_leave_room_for_a_neighbour():
     # 2,000 labels at one place have room for four.
     anchors = np.concatenate([np.full((2000, 2), 300.0), LONELY[:1]])
     found = drawn(anchors)
     assert len(found) == 5 and found[-1] == 2000
 
 
-def test_all_points_with_room_around_them_have_names():
+def test_all_points_with_space_around_them_are_labelled():
     # 96 x 54 cells of 20 x 20 pixels with a word of 6 x 6 each: there is always room to the right.
     grid = np.stack(np.meshgrid(np.arange(96), np.arange(54)), axis=-1).reshape(-1, 2)
     assert len(drawn(grid * 20.0 + 5.0, (6, 6), 3.0)) == 96 * 54
@@ -126,7 +126,7 @@ def test_label_wider_than_the_picture_is_left_out():
         max_size=30,
     )
 )
-def test_no_two_labels_overlap_and_none_seems_that_of_another_point(rows):
+def test_labels_do_not_overlap_and_are_unambiguous(rows):
     # Those within a quarter of a pixel are one.
     anchors = np.array([row[:2] for row in rows], dtype=float).reshape(-1, 2) / 4.0
     sizes = np.array([row[2:] for row in rows], dtype=np.int32).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Legends as data: round numbers, units, things by area, notes."""
+"""Legends as data: round numbers, units, entries by area, notes."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def legend(name, *numbers, figure=None, **options):
         (7.0, 7.4, ["7.0", "7.1", "7.2", "7.3", "7.4"]),
     ],
 )
-def test_ticks_are_round_numbers_where_they_belong(low, high, texts):
+def test_ticks_are_round_numbers_at_their_positions(low, high, texts):
     ticks = round_ticks(low, high)
     assert [tick.text for tick in ticks] == texts
     for tick in ticks:
@@ -84,7 +84,7 @@ def test_lengths_are_in_millimetres():
     assert found.entries == found.lines == ()
 
 
-def test_weights_have_lines_and_a_swatch_for_none():
+def test_weight_legend_has_isolines_and_a_zero_swatch():
     found = legend("weight:j1", [0, 0.5, 0.25, 0, 0, 0])
     assert found.heading == "Weight of j1"
     assert found.entries == (Entry(NOTHING, "no weight"),)
@@ -95,7 +95,7 @@ def test_weights_have_lines_and_a_swatch_for_none():
     assert len(legend("entropy", [0.5] * 6, isolines=True).lines) == 9
 
 
-def test_differences_reach_as_far_to_both_sides():
+def test_difference_range_is_symmetric():
     found = legend("stretch", [-10, 0, 30, 0, 0, 0])
     assert found.unit == "%"
     assert [tick.text for tick in found.ticks] == ["-20", "0", "+20"]
@@ -103,13 +103,13 @@ def test_differences_reach_as_far_to_both_sides():
     assert found.note == "from -10 to +30"
 
 
-def test_fixed_range_is_that_of_the_bar_and_the_note_says_what_there_is():
+def test_fixed_range_sets_the_bar_and_a_note_gives_the_actual_range():
     found = legend("pruning", [0, 0.1, 0, 0, 0, 0], scalar_range=(5.0, 10.0))
     assert [tick.text for tick in found.ticks] == ["5", "6", "7", "8", "9", "10"]
     assert found.note == "from 0 to 100"
 
 
-def test_typical_range_tells_the_extremes_too():
+def test_typical_range_reports_the_extremes_too():
     numbers = np.array([-10.0, 0, 30, 0, 0, 480])
     figure, shown_options = strip(), DisplayOptions(scalar="stretch")
     for ends, note in (
@@ -121,12 +121,12 @@ def test_typical_range_tells_the_extremes_too():
         assert found.note == note
 
 
-def test_nothing_to_see_is_said():
+def test_all_zero_values_are_reported():
     found = legend("methods", [0] * 6)
     assert found.ticks == () and found.note == "0 everywhere"
 
 
-def test_counts_are_blocks_with_numbers():
+def test_counts_are_labelled_blocks():
     found = legend("influences", [1, 2, 4, 1, 1, 1])
     assert [tick.text for tick in found.ticks] == ["1", "2", "3", "4"]
     assert [tick.place for tick in found.ticks] == [0.125, 0.375, 0.625, 0.875]
@@ -136,14 +136,14 @@ def test_counts_are_blocks_with_numbers():
     assert tuple(with_none.colors[0, :3]) == NOTHING
 
 
-def test_many_counts_have_fewer_numbers_than_blocks():
+def test_many_counts_label_only_some_blocks():
     found = legend("influences", [1, 24, 4, 1, 1, 1])
     assert len(found.colors) == 24
     assert [tick.text for tick in found.ticks] == ["3", "6", "9", "12", "15", "18", "21", "24"]
     assert found.ticks[0].place == pytest.approx(2.5 / 24)
 
 
-def test_count_that_is_the_same_everywhere_has_one_block():
+def test_uniform_count_has_one_block():
     found = legend("influences", [2] * 6)
     assert [(tick.text, tick.place) for tick in found.ticks] == [("2", 0.5)]
 
@@ -158,7 +158,7 @@ def test_joints_are_listed_by_area():
     assert len(found.colors) == 0 and found.note == ""
 
 
-def test_joints_of_figures_that_look_alike_are_listed_once():
+def test_joints_of_identical_figures_are_listed_once():
     found = legend("dominant", [0] * 6, [1, 0, 0, 0, 0, 0])
     assert [entry.text for entry in found.entries] == ["j0", "j1"]
 
@@ -171,7 +171,7 @@ def test_parts_have_their_names():
 
 
 @pytest.mark.parametrize("name", SCALARS)
-def test_figure_without_what_is_needed_is_told(name):
+def test_missing_data_is_reported(name):
     bare = replace(strip(), skin=None)
     nothing = [-1.0 if SCALARS[name].kind == "categorical" else 0.0] * 6
     found = legend(name, nothing, figure=bare)
@@ -180,7 +180,7 @@ def test_figure_without_what_is_needed_is_told(name):
     assert found.ticks == found.entries == () and len(found.colors) == 0
 
 
-def test_unknown_joint_and_no_joint_are_told():
+def test_unknown_and_missing_joints_are_reported():
     assert legend("weight", [0] * 6).note == "no joint is selected"
     assert legend("weight:toe", [0] * 6).note == 'no figure has a joint "toe"'
 
@@ -196,7 +196,7 @@ def test_number_of_influences_is_named(kept, title):
     )
 
 
-def test_title_is_kept_while_the_figure_that_has_the_field_is_hidden():
+def test_title_is_kept_while_the_figure_with_the_field_is_hidden():
     having = strip(fields=(VertexField("near", "How near", np.zeros(6)),))
     found = legend_of("field:near", [], Skinning(), [strip(), having])
     assert (found.title, found.note) == ("How near", "not available for the visible figures")

@@ -1,4 +1,4 @@
-"""Columns of a legend: as few as their lines allow, and what has no room is counted."""
+"""Legend columns: as few as possible, with overflow counted."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ import pytest
 from viewer.rendering.overlay.legend_columns import LegendColumns, legend_columns
 
 
-def test_nothing_needs_no_column():
+def test_empty_list_needs_no_column():
     assert legend_columns([], 3, 100.0) == LegendColumns((), ())
     assert legend_columns([], 3, 100.0).rows == 0
 
 
-def test_one_column_as_long_as_its_lines_suffice():
+def test_one_column_is_used_if_its_lines_fit():
     assert legend_columns([4.0, 7.0, 5.0], 3, 100.0) == LegendColumns((3,), (7.0,))
 
 
-def test_columns_are_about_even_and_each_as_wide_as_it_must_be():
+def test_columns_are_balanced_and_as_wide_as_needed():
     found = legend_columns([4.0, 7.0, 5.0, 3.0, 2.0], 4, 100.0)
     assert found == LegendColumns((3, 2), (7.0, 3.0))
     assert found.rows == 3
 
 
-def test_full_columns_are_taken_where_even_ones_are_too_wide():
+def test_full_columns_are_used_where_balanced_ones_are_too_wide():
     # Even columns of 2 + 2 need 9 + 9; full ones of 3 + 1 need 9 + 2.
     assert legend_columns([1.0, 9.0, 9.0, 2.0], 3, 12.0) == LegendColumns((3, 1), (9.0, 2.0))
 
 
-def test_what_has_no_room_is_counted_in_a_line_of_its_own():
+def test_overflow_is_counted_on_a_separate_line():
     found = legend_columns([5.0] * 10, 3, 11.0)
     assert found == LegendColumns((3, 2), (5.0, 5.0), 5)
     assert found.rows == 3
 
 
 @pytest.mark.parametrize(("rows", "counts", "left_out"), [(2, (1,), 3), (1, (0,), 4)])
-def test_first_column_is_there_however_wide(rows, counts, left_out):
+def test_first_column_is_kept_however_wide(rows, counts, left_out):
     found = legend_columns([50.0] * 4, rows, 11.0)
     assert found == LegendColumns(counts, (50.0,), left_out)
     assert found.rows == rows

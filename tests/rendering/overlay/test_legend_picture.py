@@ -1,4 +1,4 @@
-"""Legends in pictures: where they are, what of them is seen, and what they leave alone."""
+"""Rendered legends: position, visibility and undisturbed surroundings."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_every_joint_of_a_body_or_creature_has_its_swatch(size, count):
     assert pixels.shape[0] <= 0.9 * size[1] and pixels.shape[1] <= 0.45 * size[0]
 
 
-def test_many_joints_stand_in_even_columns_beside_each_other():
+def test_many_joints_are_listed_in_balanced_columns():
     _, lefts = joints(40, (1280, 720))
     columns = [lefts.count(left) for left in sorted(set(lefts))]
     assert columns == [20, 20]
@@ -94,7 +94,7 @@ def test_letters_shrink_before_columns_reach_the_figure():
     assert None not in many[1] and many[0].shape[1] <= 0.45 * 1280
 
 
-def test_what_is_too_much_is_counted():
+def test_overflow_is_counted():
     pixels, lefts = joints(2000, (1280, 720))
     shown = lefts.index(None)
     assert shown > 100 and all(left is None for left in lefts[shown:])
@@ -104,7 +104,7 @@ def test_what_is_too_much_is_counted():
     assert (shown + 1) % per_column == 0
 
 
-def test_low_and_narrow_picture_has_fewer_swatches():
+def test_low_and_narrow_image_has_fewer_swatches():
     pixels, lefts = joints(37, (300, 120))
     assert pixels.shape[0] <= 0.9 * 120
     seen = [left is not None for left in lefts]
@@ -117,7 +117,7 @@ def test_legend_that_does_not_fit_is_left_out(size, fits):
     assert (legend_pixels(legend("pruning", [0, 0, 0, 0, 0, 0.04]), size) is not None) == fits
 
 
-def test_letters_grow_with_the_picture():
+def test_letters_grow_with_the_image():
     found = legend("pruning", [0, 0, 0, 0, 0, 0.04])
     heights = [legend_pixels(found, size).shape[0] for size in (SIZE, (1280, 720), (3840, 2160))]
     assert heights[0] < heights[1] < heights[2]
@@ -173,7 +173,7 @@ def test_other_shadings_have_no_legend(offscreen):
     np.testing.assert_array_equal(plain, draw(offscreen, shading="phong", legend=True))
 
 
-def test_picture_without_room_says_so(offscreen):
+def test_image_that_is_too_small_for_a_legend_says_so(offscreen):
     plain = draw(offscreen, size=(40, 40))
     np.testing.assert_array_equal(plain, draw(offscreen, size=(40, 40), legend=True))
     assert offscreen.renderer.notes == ["a picture of 40 x 40 pixels has no room for a legend"]

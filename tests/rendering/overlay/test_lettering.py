@@ -1,4 +1,4 @@
-"""Words as pixels: their size, their rim, and shelves of them."""
+"""Text as pixels: size, outline, and packing on shelves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from viewer.rendering.overlay.lettering import Lettering, shelves
 
 
-def test_sizes_are_those_of_the_pixels():
+def test_text_sizes_match_the_pixels():
     letters = Lettering(13)
     words = ["hip", "left_shoulder", "", "Ärmel"]
     for word, (width, height) in zip(words, letters.sizes(words).tolist(), strict=True):
@@ -33,12 +33,12 @@ def test_larger_letters_are_larger():
     assert (large > 2 * small).all()
 
 
-def test_shelves_go_on_below_when_a_row_is_full():
+def test_shelves_continue_below_when_a_row_is_full():
     sizes = np.array([[40, 10], [50, 10], [20, 10], [100, 10], [1, 10]])
     assert shelves(sizes, 100, 60).tolist() == [[0, 0], [40, 0], [0, 10], [0, 20], [0, 30]]
 
 
-def test_shelves_leave_out_what_has_no_room():
+def test_shelves_leave_out_what_does_not_fit():
     sizes = np.array([[60, 10]] * 5)
     assert shelves(sizes, 100, 30).tolist() == [[0, 0], [0, 10], [0, 20]]
     assert shelves(sizes[:0], 100, 30).shape == (0, 2)

@@ -1,4 +1,4 @@
-"""Marks in the picture: where, how large, over what, and nothing of what lies behind the eye."""
+"""Rendered marks: position, size, depth, and clipping behind the eye."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_line_goes_from_end_to_end(offscreen):
     assert columns.max() == pytest.approx(60 + 2.5, abs=1)
 
 
-def test_what_is_hidden_is_faint_and_what_lies_on_a_surface_is_not(offscreen):
+def test_hidden_marks_are_faint_and_marks_on_a_surface_are_not(offscreen):
     scene = Scene([Actor(Figure("square", square()))])
     alone = marked(offscreen, None, scene)
     on_it = marked(offscreen, points((0.0, 0.0, 0.0)), scene)
@@ -69,7 +69,7 @@ def test_what_is_hidden_is_faint_and_what_lies_on_a_surface_is_not(offscreen):
     assert pixel(behind, 0.0, 0.0)[:3] == pytest.approx(mixed, abs=2)
 
 
-def test_no_marks_are_no_pixels(offscreen):
+def test_no_marks_draw_no_pixels(offscreen):
     assert not drawn(marked(offscreen, Marks())).any()
     assert not drawn(marked(offscreen, None)).any()
 
@@ -83,18 +83,18 @@ def perspective(offscreen, marks):
     return offscreen.render(NOTHING, (PIXELS, PIXELS), camera, options, box)
 
 
-def test_points_are_as_large_however_far(offscreen):
+def test_point_size_does_not_depend_on_distance(offscreen):
     sizes = [drawn(perspective(offscreen, points((0, 0, z)))).sum() for z in (1.0, 0.0, -2.0)]
     assert max(sizes) - min(sizes) <= 2
 
 
-def test_what_lies_behind_the_eye_is_not_drawn(offscreen):
+def test_marks_behind_the_eye_are_not_drawn(offscreen):
     assert not drawn(perspective(offscreen, points((0.1, 0.1, 5.0)))).any()
     both_behind = Marks(lines=np.array([[[-1.0, 0.0, 3.0], [1.0, 0.0, 4.0]]]))
     assert not drawn(perspective(offscreen, both_behind)).any()
 
 
-def test_a_line_that_passes_the_eye_is_cut_there(offscreen):
+def test_a_line_that_passes_the_eye_is_clipped(offscreen):
     # From the picture's middle to behind the eye, to the right: only the right half shows it.
     line = Marks(lines=np.array([[[0.0, 0.0, 0.0], [3.0, 0.0, 6.0]]]))
     mask = drawn(perspective(offscreen, line))
@@ -102,7 +102,7 @@ def test_a_line_that_passes_the_eye_is_cut_there(offscreen):
     assert not mask[:, : PIXELS // 2 - 5].any()
 
 
-def test_points_lie_over_lines(offscreen):
+def test_points_are_drawn_over_lines(offscreen):
     line = np.array([[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
     both = Marks(np.zeros((1, 3)), np.array([6.0]), line)
     found = mark_annotation(both).segments
@@ -113,7 +113,7 @@ def test_points_lie_over_lines(offscreen):
     assert pixel(marked(offscreen, both), 0.0, 3 / 20) == [*COLOR, 255]
 
 
-def test_marks_far_from_the_origin_do_not_shake(offscreen):
+def test_marks_far_from_the_origin_do_not_jitter(offscreen):
     far = 1e7
     camera = Camera(np.array([far, 0.0, 0.0]), 2.0, 0.0, 0.0, 90.0, orthographic=True)
     options = DisplayOptions(background="transparent", grid=False, samples=1)

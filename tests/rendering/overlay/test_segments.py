@@ -1,4 +1,4 @@
-"""Segments and dots on the screen: how wide, how round, in front or behind."""
+"""Segments and dots on the screen: width, roundness and depth."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def line(start, end, width=4.0, color=RED):
     return Segments(np.array([start]), np.array([end]), np.array([color]), np.array([width]))
 
 
-def test_line_is_as_wide_and_long_as_asked(picture):
+def test_line_has_the_requested_width_and_length(picture):
     opacity = picture(line((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))[..., 3]
     # From column 20 to 60, four pixels wide; round ends reach two pixels further.
     assert_allclose(opacity[:, 40].sum(), 4.0, atol=0.02)
@@ -72,7 +72,7 @@ def test_slanted_line_covers_the_same(picture):
     assert_allclose(opacity.sum(), 4.0 * 40.0 + np.pi * 4.0, rtol=0.02)
 
 
-def test_segment_of_no_length_is_a_round_dot(picture):
+def test_segment_of_zero_length_is_a_round_dot(picture):
     opacity = picture(dots(np.zeros((1, 3)), np.array(RED), 20.0))[..., 3]
     assert_allclose(opacity.sum(), np.pi * 100.0, rtol=0.01)
     assert_array_equal(opacity, opacity.T)
@@ -84,7 +84,7 @@ def test_colours_are_multiplied_by_opacity(picture):
     assert_allclose(found, [0.1, 0.2, 0.4, 0.5], atol=1e-6)
 
 
-def test_later_ones_lie_over_earlier_ones(picture):
+def test_later_segments_are_drawn_over_earlier_ones(picture):
     both = joined(
         [dots(np.zeros((1, 3)), np.array(RED), 20.0),
          dots(np.zeros((1, 3)), np.array([0.0, 1.0, 0.0, 1.0]), 8.0)]
@@ -94,7 +94,7 @@ def test_later_ones_lie_over_earlier_ones(picture):
     assert_allclose(found[40, 47], [1, 0, 0, 1], atol=1e-6)
 
 
-def test_what_is_behind_something_is_faint_unless_on_top(picture):
+def test_hidden_segments_are_faint_unless_on_top(picture):
     dot = dots(np.zeros((1, 3)), np.array(RED), 20.0)
     assert_allclose(picture(dot, depth=0.0)[40, 40, 3], HIDDEN, atol=1e-6)
     assert_allclose(picture(dot, depth=0.0, on_top=True)[40, 40, 3], 1.0, atol=1e-6)
@@ -110,12 +110,12 @@ def test_border_is_mixed_in_around(picture):
     assert_allclose(found[..., 0].sum(), np.pi * 10.0**2, rtol=0.01)
 
 
-def test_hidden_opacity_is_as_asked(picture):
+def test_hidden_opacity_is_configurable(picture):
     dot = dots(np.zeros((1, 3)), np.array(RED), 20.0)
     assert_allclose(picture(dot, depth=0.0, hidden=0.75)[40, 40, 3], 0.75, atol=1e-6)
 
 
-def test_lifted_ones_are_seen_on_a_surface_at_their_place(picture):
+def test_lifted_segments_are_visible_on_a_surface(picture):
     # The eye is 2 away: a lift of a quarter moves a dot at z = 0 to z = 0.5, and no other way.
     dot, other = (dots(np.array([[0.5, 0.5, z]]), np.array(RED), 20.0) for z in (0.0, 0.4))
     near = picture(dot)
@@ -127,7 +127,7 @@ def test_lifted_ones_are_seen_on_a_surface_at_their_place(picture):
     assert_allclose(picture(other, depth=between)[30, 50, 3], 1.0, atol=1e-6)
 
 
-def test_nothing_draws_nothing(picture):
+def test_no_segments_draw_nothing(picture):
     assert not picture(dots(np.zeros((0, 3)), np.array(RED), 5.0)).any()
 
 
@@ -138,7 +138,7 @@ def test_many_more_segments_than_before_are_drawn(picture):
     assert_allclose(found[40, 4:76, 3], 1.0, atol=0.02)
 
 
-def test_far_from_the_origin_nothing_shakes(picture):
+def test_segments_far_from_the_origin_do_not_jitter(picture):
     near = picture(line((-1.0, 0.3, 0.0), (1.0, 0.3, 0.0)))
     # float32 counts in steps of 8 there.
     away = np.array([1e8, 0.0, 0.0])

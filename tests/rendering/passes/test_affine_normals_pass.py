@@ -1,4 +1,4 @@
-"""Normals that the GPU gives figures whose joints scale, shear or mirror."""
+"""GPU normals of figures whose joints scale, shear or reflect."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_rigid_poses_never_compile_the_program_for_scaled_joints(ctx, monkeypatc
 
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
-def test_buffers_tell_scaled_instances_from_rigid_ones(ctx, how):
+def test_buffers_distinguish_scaled_instances_from_rigid_ones(ctx, how):
     figure = ball()
     rng = np.random.default_rng(3)
     actors = [Actor(figure, random_pose(figure.skeleton, rng, reach=0.6)) for _ in range(5)]

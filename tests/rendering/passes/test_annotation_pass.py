@@ -1,4 +1,4 @@
-"""Annotations in pictures: segments and words of several, over each other, and how many fit."""
+"""Rendered annotations: segments and labels of several, their order, and how many fit."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def picture(offscreen, *annotations, scene=None):
         offscreen.renderer.annotations = ()
 
 
-def test_later_annotations_lie_over_earlier_ones(offscreen):
+def test_later_annotations_are_drawn_over_earlier_ones(offscreen):
     found = picture(offscreen, dot((0, 0, 1), RED, 20.0), dot((0, 0, -1), GREEN, 8.0))
     assert pixel(found, 0.0, 0.0) == [0, 255, 0, 255]
     assert pixel(found, 0.35, 0.0) == [255, 0, 0, 255]
 
 
-def test_on_top_is_seen_through_a_surface_and_the_other_faintly(offscreen):
+def test_on_top_is_visible_through_a_surface_and_others_faintly(offscreen):
     scene = Scene([Actor(Figure("square", square()))])
     through = picture(offscreen, dot((0, 0, -0.5), RED), scene=scene)
     behind = picture(offscreen, dot((0, 0, -0.5), RED, on_top=False), scene=scene)
@@ -57,7 +57,7 @@ def test_on_top_is_seen_through_a_surface_and_the_other_faintly(offscreen):
     )
 
 
-def test_words_are_drawn_beside_their_point(offscreen):
+def test_labels_are_drawn_next_to_their_point(offscreen):
     alone = drawn(picture(offscreen, dot((0, 0, 0), RED)))
     named = drawn(picture(offscreen, dot((0, 0, 0), RED, words=["ab", "cd", "ef"])))
     more = named & ~alone
@@ -68,7 +68,7 @@ def test_words_are_drawn_beside_their_point(offscreen):
     assert more[half - 12 : half - 8, half - 1 : half + 1].all()
 
 
-def test_words_of_two_annotations_are_both_kept(offscreen):
+def test_labels_of_two_annotations_are_both_kept(offscreen):
     low, high = dot((0, -1, 0), RED, words=["ab"]), dot((0, 1, 0), RED, words=["cd"])
     once, both = drawn(picture(offscreen, low)), drawn(picture(offscreen, low, high))
     np.testing.assert_array_equal(both[PIXELS // 2 :], once[PIXELS // 2 :])

@@ -1,4 +1,4 @@
-"""Shape and pose correctives on the GPU, summed in the shader or before it, and what is sent."""
+"""Shape and pose correctives on the GPU, summed in the shader or before it, and uploads."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_many_vertices_fill_many_rows_of_the_texture(family, posed, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_correctives_of_one_turned_joint_are_those_of_that_joint(family, posed, way):
+def test_correctives_of_one_rotated_joint_affect_only_that_joint(family, posed, way):
     figure = family("smpl")
     mesh = posed(figure, way)
     for joint in (0, 1, 11, 23):
@@ -128,7 +128,7 @@ def test_correctives_can_be_switched_off_and_on(family, posed, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_shape_and_pose_go_back_to_nothing(family, posed, way):
+def test_shape_and_pose_can_be_reset(family, posed, way):
     figure = family("smplx")
     mesh = posed(figure, way)
     rest, pose = figure_pose(figure), shaped_pose(figure, 2)
@@ -147,7 +147,7 @@ def test_shape_and_pose_go_back_to_nothing(family, posed, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_binding_space_of_a_shaped_actor_is_the_mesh_as_stored(family, posed, way):
+def test_bind_pose_of_a_shaped_actor_is_the_stored_mesh(family, posed, way):
     figure = family("smpl")
     mesh = posed(figure, way)
     check(mesh, shaped_pose(figure, 3))

@@ -1,4 +1,4 @@
-"""Dual quaternion skinning in the shader, and the mixture, held to the float64 reference."""
+"""Dual quaternion skinning in the shader, also blended with LBS, against the float64 reference."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_gpu_matches_the_reference_for_scaled_joints(posed, how, scales):
     check(posed, figure, how, seed=3, scales=scales, normals=False)
 
 
-def test_gpu_turns_normals_of_one_stretched_joint_exactly(posed):
+def test_gpu_transforms_normals_of_one_stretched_joint_exactly(posed):
     figure = random_figure(np.random.default_rng(4), 4, n_vertices=100)
     ties = [[(vertex % 4, 1.0)] for vertex in range(100)]
     figure = replace(figure, skin=skin_from_lists(ties, figure.skin.inverse_bind))
@@ -146,7 +146,7 @@ def test_far_figures_keep_their_digits_when_scaled(posed):
 
 @pytest.mark.parametrize("how", METHODS, ids=METHOD_IDS)
 @pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0)])
-def test_vertices_that_nothing_moves_or_all_cancels(posed, how, origin):
+def test_vertices_without_influence_or_with_cancelling_weights(posed, how, origin):
     pairs = [[], [(0, 0.0)], [(1, 1.0), (2, -1.0)], [(0, 1.5), (1, -0.5)], [(2, -1.0)], [(2, 0.5)]]
     figure = random_figure(np.random.default_rng(10), 3, n_vertices=6, origin=origin)
     figure = replace(figure, skin=skin_from_lists(pairs, figure.skin.inverse_bind))
@@ -161,7 +161,7 @@ def test_vertices_that_nothing_moves_or_all_cancels(posed, how, origin):
         np.testing.assert_allclose(found[:3], still, rtol=0, atol=2e-6 * reach)
 
 
-def test_half_a_turn_keeps_its_radius_on_the_gpu(posed):
+def test_twist_of_180_degrees_keeps_its_radius_on_the_gpu(posed):
     """Both quaternions are perpendicular: the sum must not vanish as the sum of matrices does."""
     figure = random_figure(np.random.default_rng(11), 2, n_vertices=50)
     offsets = np.zeros((2, 3))
@@ -178,7 +178,7 @@ def test_half_a_turn_keeps_its_radius_on_the_gpu(posed):
     np.testing.assert_allclose(found[:, 0], rest[:, 0], atol=1e-6)
 
 
-def test_methods_follow_each_other_on_one_mesh(posed):
+def test_methods_can_be_switched_on_one_mesh(posed):
     """Textures and programs of one method must not leak into the next."""
     figure = random_figure(np.random.default_rng(12), 30)
     pose = random_pose(figure.skeleton, np.random.default_rng(12))
@@ -190,7 +190,7 @@ def test_methods_follow_each_other_on_one_mesh(posed):
 
 
 @pytest.mark.parametrize("blend_factor", [0.0, 1.0])
-def test_mix_at_its_ends_is_one_of_the_two(posed, blend_factor):
+def test_mix_at_0_and_1_is_one_of_the_two_methods(posed, blend_factor):
     figure = random_figure(np.random.default_rng(13), 10)
     pose = random_pose(figure.skeleton, np.random.default_rng(13))
     found, _ = posed(figure, pose, Skinning("mix", blend_factor=blend_factor))
@@ -198,7 +198,7 @@ def test_mix_at_its_ends_is_one_of_the_two(posed, blend_factor):
     np.testing.assert_allclose(found, other, rtol=0, atol=1e-6)
 
 
-def test_every_word_of_the_skinning_counts_as_a_change(ctx):
+def test_every_skinning_setting_counts_as_a_change(ctx):
     figure = random_figure(np.random.default_rng(14), 5, n_vertices=30)
     mesh = PosedMesh(ctx, Programs(ctx), MeshBuffers(ctx, figure, []))
     pose = random_pose(figure.skeleton, np.random.default_rng(14))

@@ -1,4 +1,4 @@
-"""Ghosts: surfaces over the scene that are no part of it."""
+"""Ghosts: surfaces drawn over the scene without being part of it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_translucent_ghost_lets_the_scene_through(offscreen):
     assert np.abs(np.subtract(thin[:3], mixed)).max() < 12  # blended as sRGB numbers
 
 
-def test_ghost_behind_a_surface_is_hidden_and_one_within_it_seen(offscreen):
+def test_ghost_behind_a_surface_is_hidden_and_one_inside_it_visible(offscreen):
     scene = Scene([Actor(Figure("square", square()))])
     bare = shown(offscreen, None, scene)
     behind = shown(offscreen, ghost(away=(0.0, 0.0, -0.5)), scene)
@@ -68,12 +68,12 @@ def test_wireframe_ghost_has_edges_alone(offscreen):
     assert picture.shape[0] == PIXELS
 
 
-def test_colours_of_numbers_are_the_scenes_own(offscreen):
+def test_ghost_does_not_affect_scalar_colours(offscreen):
     plain = shown(offscreen, ghost())
     assert (shown(offscreen, ghost(), shading="scalar") == plain).all()
 
 
-def test_another_ghost_takes_its_place_and_none_frees_nothing_twice(offscreen):
+def test_ghosts_are_replaced_and_freed_once(offscreen):
     first = drawn(shown(offscreen, ghost())).sum()
     half = replace(square(), positions=0.5 * square().positions)
     small = Ghost(Figure("small", half), np.eye(4))

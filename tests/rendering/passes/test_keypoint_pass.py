@@ -1,4 +1,4 @@
-"""Keypoints in the picture: where they are, through the surface, and only when asked for."""
+"""Rendered keypoints: position, visibility through the surface, only on request."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_marker_is_where_its_vertex_is(offscreen):
         assert middle(mask) == pytest.approx(place, abs=0.05)
 
 
-def test_marker_follows_pose_and_place(offscreen):
+def test_marker_follows_pose_and_placement(offscreen):
     scene = alone(marked(CORNER))
     pose = scene.actors[0].pose
     pose.dofs[2] = np.pi / 2
@@ -87,7 +87,7 @@ def test_keypoint_at_a_joint_is_drawn_at_the_joint(offscreen):
     assert middle(mask) == pytest.approx((1.0, -1.0), abs=0.05)
 
 
-def test_no_markers_unless_there_is_something_to_mark(offscreen):
+def test_no_markers_without_keypoints(offscreen):
     assert not marks(offscreen, alone(grid_figure())).any()
     assert not marks(offscreen, alone(marked(CENTER)), show="binding").any()
     scene = alone(marked(CENTER))
@@ -104,7 +104,7 @@ def test_markers_are_drawn_over_the_skeleton_alone(offscreen):
     assert middle(found) == pytest.approx((1.5, 1.5), abs=0.05)
 
 
-def test_markers_have_the_size_of_the_figure_not_of_the_picture(offscreen):
+def test_marker_size_depends_on_the_figure_not_on_the_image(offscreen):
     small, large = alone(marked(CENTER)), alone(marked(CENTER))
     large.actors[0].placement[:3, :3] *= 4.0
     # Cubes of 1.2 % of the figure's diagonal of 3 sqrt 2, seen from the front: 1.02 pixels a side.
@@ -112,7 +112,7 @@ def test_markers_have_the_size_of_the_figure_not_of_the_picture(offscreen):
     assert 16 <= marks(offscreen, large).sum() <= 25
 
 
-def test_markers_of_actors_that_left_are_freed(offscreen):
+def test_markers_of_removed_actors_are_freed(offscreen):
     scene = alone(marked(CENTER))
     front_view(offscreen, scene, keypoints=True)
     assert len(offscreen.renderer.buffers.keypoints) == 1

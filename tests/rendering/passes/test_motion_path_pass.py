@@ -1,4 +1,4 @@
-"""Paths in the picture: where, how wide, what part of them, and computed only when needed."""
+"""Rendered motion paths: position, width, visible part, and caching."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def walker(*places, rows=None, rate=1.0) -> Actor:
 ACROSS = [(-1.5, 0.0, 0.0), (0.0, 0.0, 0.0), (1.5, 0.0, 0.0)]
 
 
-def test_a_path_is_a_line_of_some_pixels(offscreen):
+def test_a_path_is_a_line_a_few_pixels_wide(offscreen):
     mask = drawn(front_view(offscreen, Scene([walker(*ACROSS)]), path_joints=PATH))
     # From -1.5 to 1.5 of +-2: columns 10 to 69; 2.5 pixels wide.
     assert mask[:, 12:68].sum(axis=0).min() >= 2 and mask[:, 12:68].sum(axis=0).max() <= 3
@@ -49,7 +49,7 @@ def test_a_path_is_a_line_of_some_pixels(offscreen):
     assert not mask[:37].any() and not mask[43:].any()
 
 
-def test_lines_are_as_wide_however_near_or_large(offscreen):
+def test_line_width_does_not_depend_on_distance_or_size(offscreen):
     actor = walker((0.0, -1.0, 0.0), (0.0, 1.0, 0.0))
     for scale in (0.5, 1.0, 1.8):
         actor.placement[1, 1] = scale
@@ -59,7 +59,7 @@ def test_lines_are_as_wide_however_near_or_large(offscreen):
         assert rows.max() - rows.min() + 1 == pytest.approx(40 * scale, abs=1)
 
 
-def test_gaps_and_absence_leave_holes(offscreen):
+def test_missing_and_absent_frames_interrupt_the_path(offscreen):
     actor = walker(*ACROSS, rows=[0, 1, -1, 2])
     mask = drawn(front_view(offscreen, Scene([actor]), path_joints=PATH))
     assert mask[40, 20] and not mask[40, 55]
@@ -70,7 +70,7 @@ def test_gaps_and_absence_leave_holes(offscreen):
     assert not drawn(front_view(offscreen, Scene([actor]), path_joints=PATH)).any()
 
 
-def test_paths_fade_back_and_forth_in_time(offscreen):
+def test_paths_fade_into_past_and_future(offscreen):
     scene = Scene([walker(*ACROSS)], time=1.0)
     picture = front_view(offscreen, scene, path_joints=PATH, path_seconds=0.5)
     alpha = [pixel(picture, x, 0.01)[3] for x in (-1.2, -0.375, 0.0, 0.375, 1.2)]
@@ -98,7 +98,7 @@ def test_paths_behind_a_surface_are_faint(offscreen):
     assert pixel(picture, 1.3, 0.01)[:3] == pytest.approx(color, abs=2)
 
 
-def test_paths_of_joints_follow_placement(offscreen):
+def test_joint_paths_follow_placement(offscreen):
     figure = arm(2)
     turns = np.tile([0.0, 0.0, 0.0, 1.0], (31, 2, 1))
     angles = np.linspace(0.0, np.pi, 31)
@@ -142,7 +142,7 @@ def test_paths_are_computed_once(offscreen, monkeypatch):
     assert len(calls) == 3
 
 
-def test_a_path_follows_what_the_clip_leaves_to_the_pose(offscreen, monkeypatch):
+def test_a_path_follows_dofs_without_channels(offscreen, monkeypatch):
     calls = []
     original = motion_path_pass.motion_path
     monkeypatch.setattr(
@@ -163,7 +163,7 @@ def test_a_path_follows_what_the_clip_leaves_to_the_pose(offscreen, monkeypatch)
         assert len(calls) == count
 
 
-def test_lines_that_pass_the_camera_are_cut(offscreen):
+def test_lines_that_pass_the_camera_are_clipped(offscreen):
     """From behind the eye to the middle of the picture; nothing may smear over the rest."""
     scene = Scene([walker((0.0, 0.5, 9.0), (0.0, 0.0, -3.0))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=60.0, distance=2.0)
@@ -184,7 +184,7 @@ def test_actors_without_a_clip_and_clips_without_points_have_no_path(offscreen):
     assert np.array_equal(bare, both)
 
 
-def test_paths_of_actors_that_left_are_freed(offscreen):
+def test_paths_of_removed_actors_are_freed(offscreen):
     front_view(offscreen, Scene([walker(*ACROSS)]), path_joints=PATH)
     assert len(offscreen.renderer.buffers.motion_paths) == 1
     front_view(offscreen, Scene([]), path_joints=PATH)

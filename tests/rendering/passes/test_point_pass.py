@@ -1,4 +1,4 @@
-"""Captured keypoints in the picture: where, how large, in what colour, how opaque."""
+"""Rendered captured keypoints: position, size, colour and opacity."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def width(mask) -> int:
     return int(columns.max() - columns.min() + 1) if len(columns) else 0
 
 
-def test_points_are_balls_where_they_are(offscreen):
+def test_points_are_drawn_as_balls_at_their_positions(offscreen):
     picture = front_view(offscreen, Scene([dots((-1.0, 1.0, 0.0), (1.0, -1.0, 0.0))]))
     mask = drawn(picture)
     left, right = mask[:, : PIXELS // 2], mask[:, PIXELS // 2 :]
@@ -73,7 +73,7 @@ def test_a_limb_needs_no_direction(offscreen):
         assert drawn(front_view(offscreen, Scene([actor]))).any()
 
 
-def test_colours_tell_sides(offscreen):
+def test_colours_distinguish_sides(offscreen):
     places = [(-1.5, 0, 0), (0.0, 0, 0), (1.5, 0, 0), (0.0, 1.5, 0)]
     limbs = [(0, 1), (1, 2), (1, 3)]
     scene = Scene([dots(*places, limbs=limbs, sides=[-1, 0, 1, 0])])
@@ -91,7 +91,7 @@ def test_colours_tell_sides(offscreen):
     assert green > 1.5 * max(red, blue)
 
 
-def test_a_limb_across_belongs_to_no_side(offscreen):
+def test_a_limb_between_sides_belongs_to_neither(offscreen):
     scene = Scene([dots((-1.5, 0, 0), (1.5, 0, 0), limbs=[(0, 1)], sides=[-1, 1])])
     red, green, blue, _ = pixel(front_view(offscreen, scene), 0.0, 0.0)
     assert max(red, green, blue) < 1.6 * min(red, green, blue)
@@ -105,7 +105,7 @@ def test_confidence_is_opacity(offscreen):
         assert pixel(picture, x, 0.0)[3] == pytest.approx(alpha, abs=1)
 
 
-def test_what_is_uncertain_or_unseen_is_left_out_with_its_limbs(offscreen):
+def test_uncertain_or_unseen_points_are_left_out_with_their_limbs(offscreen):
     places = [(-1.5, 0.0, 0), (0.0, 0.0, 0), (1.5, 0.0, 0)]
     for confidence, shown in ((0.0, {0.0: False}), (0.05, {0.0: False}), (0.1, {0.0: True})):
         actor = dots(*places, limbs=[(0, 1), (1, 2)], confidence=[1.0, confidence, 1.0])
@@ -129,7 +129,7 @@ def test_absent_actors_and_those_without_points_are_not_drawn(offscreen):
     assert drawn(front_view(offscreen, Scene([actor]))).any()
 
 
-def test_points_behind_a_surface_shine_through_faintly(offscreen):
+def test_points_behind_a_surface_are_faintly_visible(offscreen):
     actor = dots((0.0, 0.0, -0.5), (1.8, 0.0, 0.5))
     wall = Actor(Figure("wall", square(z=0.0, half=1.0)))
     bare = pixel(front_view(offscreen, Scene([wall])), 0.0, 0.0)
@@ -140,7 +140,7 @@ def test_points_behind_a_surface_shine_through_faintly(offscreen):
         assert seen == pytest.approx(0.65 * surface + 0.35 * point, abs=2)
 
 
-def test_placement_counts_and_a_mirror_turns_nothing_inside_out(offscreen):
+def test_placement_is_applied_and_reflection_keeps_balls_outward(offscreen):
     actor = dots((0.5, 0.0, 0.0), (0.5, 0.5, 0.0))
     plain = front_view(offscreen, Scene([actor]))
     actor.placement[0, 0] = -1.0
@@ -150,7 +150,7 @@ def test_placement_counts_and_a_mirror_turns_nothing_inside_out(offscreen):
     assert pixel(mirrored, -0.5, 0.0) == pytest.approx(light, abs=25)
 
 
-def test_translucent_points_are_sorted_as_the_camera_turns(offscreen):
+def test_translucent_points_are_sorted_as_the_camera_orbits(offscreen):
     """A red ball before a blue one, and the other way round: what is near covers more."""
     near, far = (0.0, 0.0, 0.5), (0.0, 0.0, -0.5)
     for places in ((near, far), (far, near)):
@@ -160,7 +160,7 @@ def test_translucent_points_are_sorted_as_the_camera_turns(offscreen):
         assert alpha == pytest.approx(255 * (1 - 0.4 * 0.4), abs=2)
 
 
-def test_still_points_are_sent_once(offscreen, monkeypatch):
+def test_still_points_are_uploaded_once(offscreen, monkeypatch):
     actor = dots((0.5, 0.0, 0.0), (0.5, 0.5, 0.0))
     scene = Scene([actor])
     front_view(offscreen, scene)
@@ -172,7 +172,7 @@ def test_still_points_are_sent_once(offscreen, monkeypatch):
         front_view(offscreen, scene)
 
 
-def test_points_of_actors_that_left_are_freed(offscreen):
+def test_points_of_removed_actors_are_freed(offscreen):
     front_view(offscreen, Scene([dots((0, 0, 0), (1, 0, 0))]))
     assert len(offscreen.renderer.buffers.points) == 1
     front_view(offscreen, Scene([]))

@@ -1,4 +1,4 @@
-"""Seams on the GPU: a row for every split vertex, all copies of one posed alike."""
+"""Seams on the GPU: a row for every split vertex, all copies of one posed identically."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_read_maps_split_vertices_back(posed, method):
     np.testing.assert_allclose(normals, wanted[1], rtol=0, atol=1e-5)
 
 
-def test_copies_of_one_vertex_are_posed_alike(posed, tmp_path):
+def test_copies_of_one_vertex_are_posed_identically(posed, tmp_path):
     figure = family_figure("smplx", tmp_path)
     mesh = posed(figure)
     pose = random_pose(figure.skeleton, np.random.default_rng(1), 1.0)

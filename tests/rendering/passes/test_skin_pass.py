@@ -1,4 +1,4 @@
-"""What the skinning shader writes, held to the float64 reference, and when it runs at all."""
+"""Output of the skinning shader against the float64 reference, and when it runs."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_far_figures_keep_their_digits(ctx, size, origin):
 
 
 @pytest.mark.parametrize(("size", "origin"), FAR)
-def test_far_figures_keep_their_digits_when_turned_about_the_world_origin(ctx, size, origin):
+def test_far_figures_keep_their_digits_when_rotated_about_the_world_origin(ctx, size, origin):
     """The root stands at the origin, so the whole figure swings around it."""
     figure = random_figure(np.random.default_rng(12), 30, size=size, origin=origin)
     offsets = figure.skeleton.rest_translations
@@ -197,7 +197,7 @@ def test_gpu_matches_the_reference_for_skewed_bindings(ctx):
     check(ctx, figure, seed=14)
 
 
-def test_binding_space_is_the_mesh_as_stored(ctx):
+def test_bind_pose_is_the_stored_mesh(ctx):
     figure = random_figure(np.random.default_rng(15), 8, origin=(10_000.0, 0.0, 0.0), size=0.1)
     mesh = posed_mesh(ctx, figure)
     mesh.update(None)
@@ -304,7 +304,7 @@ def test_placement_skins_nothing(drawing):
     assert drawing.draw() == before
 
 
-def test_binding_space_is_skinned_once_and_left_again(drawing):
+def test_bind_pose_is_skinned_once_and_left_again(drawing):
     before = drawing.draw()
     drawing.options = DisplayOptions(show="binding")
     assert drawing.draw() == before + 1
@@ -370,7 +370,7 @@ def test_actors_of_one_figure_share_its_mesh_but_not_its_pose(ctx):
     drawing.release()
 
 
-def test_actors_that_leave_are_freed(ctx, monkeypatch):
+def test_removed_actors_are_freed(ctx, monkeypatch):
     released = []
     original = PosedMesh.release
     monkeypatch.setattr(PosedMesh, "release", lambda s: (released.append(s), original(s)))

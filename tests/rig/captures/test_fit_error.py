@@ -29,25 +29,25 @@ def body(person):
     return Actor(Figure("body", mesh(np.eye(3)), bones), person=person)
 
 
-def test_body_of_the_same_person_is_found():
+def test_body_of_the_same_person_is_matched():
     bodies = [body(2), body(3)]
     assert fitted_body(pointed(3), bodies) is bodies[1]
     assert fitted_body(pointed(4), bodies) is None
 
 
 @pytest.mark.parametrize("person", [None, -1, -2])
-def test_who_has_no_track_has_no_body(person):
+def test_untracked_keypoints_have_no_body(person):
     assert fitted_body(pointed(person), [body(person)]) is None
 
 
-def test_skeleton_alone_is_no_body():
+def test_skeleton_alone_is_not_a_body():
     assert (
         fitted_body(pointed(1), [Actor(Figure("bones", skeleton=skeleton((-1,))), person=1)])
         is None
     )
 
 
-def test_distances_are_those_of_seen_keypoints():
+def test_distances_cover_only_seen_keypoints():
     seen, fitted = pointed(1), body(1)
     fitted.placement[:3, 3] = 0.0, 0.0, -1.0  # the elbow is then at (1, 2, -1), 4 from the point
     found = keypoint_distances(seen, fitted)

@@ -38,14 +38,14 @@ def limbs(layout):
         (543, "mediapipe_total", 35 + 40),
     ],
 )
-def test_number_tells_the_layout(count, title, n_limbs):
+def test_count_determines_the_layout(count, title, n_limbs):
     layout = keypoint_layout(count)
     assert (layout.title, len(layout.names), len(layout.limbs)) == (title, count, n_limbs)
     assert len(set(layout.names)) == count
 
 
 @pytest.mark.parametrize("title", [title for titles in TITLES.values() for title in titles])
-def test_sides_are_those_of_the_names_and_mirror(title):
+def test_sides_match_the_names_and_mirror(title):
     count = next(count for count, titles in TITLES.items() if title in titles)
     layout = keypoint_layout(count, title)
     for name, side in zip(layout.names, layout.sides.tolist(), strict=True):
@@ -69,7 +69,7 @@ def test_sides_are_those_of_the_names_and_mirror(title):
         assert {mirrored(pair) for pair in limbs(layout)} == found
 
 
-def test_body25_is_openposes():
+def test_body25_matches_openpose():
     layout = keypoint_layout(25)
     places = {0: "nose", 1: "neck", 4: "right_wrist", 7: "left_wrist", 8: "mid_hip", 9: "right_hip",
               14: "left_ankle", 15: "right_eye", 18: "left_ear", 19: "left_big_toe",
@@ -79,7 +79,7 @@ def test_body25_is_openposes():
     assert ("right_heel", "right_ankle") in limbs(layout)
 
 
-def test_seventeen_are_coco_unless_someone_says_otherwise():
+def test_seventeen_keypoints_are_coco_by_default():
     assert keypoint_layout(17).names[5] == "left_shoulder"
     h36m = keypoint_layout(17, "h36m")
     assert h36m.names[1:4] == ("left_hip", "left_knee", "left_ankle")
@@ -88,12 +88,12 @@ def test_seventeen_are_coco_unless_someone_says_otherwise():
     assert ("right_shoulder", "right_hip") in limbs(keypoint_layout(17))
 
 
-def test_nineteen_may_be_panoptic():
+def test_nineteen_keypoints_may_be_panoptic():
     assert keypoint_layout(19).names == keypoint_layout(25).names[:19]
     assert keypoint_layout(19, "panoptic").names[:3] == ("neck", "nose", "mid_hip")
 
 
-def test_fingers_grow_from_the_wrists_of_the_body():
+def test_fingers_attach_to_the_wrists_of_the_body():
     layout = keypoint_layout(67)
     assert (layout.names[25], layout.names[46]) == ("left_hand_wrist", "right_hand_wrist")
     assert ("left_wrist", "left_thumb1") in limbs(layout)
@@ -102,7 +102,7 @@ def test_fingers_grow_from_the_wrists_of_the_body():
     assert ("left_ring3", "left_ring_tip") in limbs(layout)
 
 
-def test_face_without_contour_is_the_rest_of_the_face():
+def test_face_without_contour_omits_the_contour_only():
     whole, part = keypoint_layout(70), keypoint_layout(51)
     assert part.names == whole.names[17:68]
     kept = whole.limbs[(whole.limbs >= 17).all(axis=1)] - 17
@@ -111,7 +111,7 @@ def test_face_without_contour_is_the_rest_of_the_face():
     assert whole.names[68:] == ("right_pupil", "left_pupil")
 
 
-def test_other_numbers_have_no_limbs():
+def test_other_counts_have_no_limbs():
     layout = keypoint_layout(7)
     assert (layout.title, layout.names[6], len(layout.limbs)) == ("points", "point6", 0)
 
@@ -129,7 +129,7 @@ def test_wrong_names_are_refused(title, message):
     assert str(caught.value).startswith(message)
 
 
-def test_joints_that_mean_the_same():
+def test_equivalent_joints_are_matched():
     matches = matching_joints(keypoint_layout(25))
     assert matches == {
         1: "neck", 2: "right_shoulder", 3: "right_elbow", 4: "right_wrist", 5: "left_shoulder",

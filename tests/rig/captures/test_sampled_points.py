@@ -29,7 +29,7 @@ def scene_of(up="z", rows=(0, -1, 1), placement=None):
     return Scene([actor], world_up=up), actor
 
 
-def test_frames_come_back_as_they_were_captured():
+def test_frames_are_returned_as_captured():
     animation, up = sample_upright_points(*scene_of())
     assert (animation.name, animation.layout, animation.frame_rate, up) == (
         "two 4",
@@ -56,7 +56,7 @@ def test_another_rate_counts_from_zero():
     assert animation.points[:, 0, 0].tolist() == [1.0, 2.0, 3.0]
 
 
-def test_world_that_hangs_is_turned_over():
+def test_upside_down_world_is_turned_upright():
     animation, up = sample_upright_points(*scene_of("y", placement=rotation_transform(0, np.pi)))
     assert up == "y"
     assert_array_equal(animation.points[2], [[3, -2, -3], [4, -5, -6]])
@@ -69,7 +69,7 @@ def test_placement_between_axes_is_left_out():
     assert_array_equal(animation.points[2], POINTS[1, :, :3])
 
 
-def test_ranges_outside_and_actors_without_points_are_refused():
+def test_ranges_outside_the_capture_and_actors_without_points_are_refused():
     scene, actor = scene_of()
     with pytest.raises(RigError, match=r"^frames: expected a range within 0 to 3, found 5 to 9$"):
         sample_upright_points(scene, actor, frames=(5, 9))

@@ -44,7 +44,7 @@ def measures(difference):
     return {measure.name: measure for measure in difference.measures}
 
 
-def test_figure_does_not_differ_from_itself() -> None:
+def test_figure_equals_itself() -> None:
     found = compare(Actor(figure()), Actor(figure()))
     assert found.mismatches == () and found.notes == ()
     assert [(m.name, m.maximum) for m in found.measures] == [
@@ -57,7 +57,7 @@ def test_figure_does_not_differ_from_itself() -> None:
     assert_allclose(found.size, np.sqrt(2.0))
 
 
-def test_joint_that_is_elsewhere_is_named_with_its_distance() -> None:
+def test_moved_joint_is_named_with_its_distance() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm((1.0, 0.03, 0.04)))), n_poses=0)
     places = measures(found)["joint positions"]
     assert_allclose(places.maximum, 0.05)
@@ -67,7 +67,7 @@ def test_joint_that_is_elsewhere_is_named_with_its_distance() -> None:
     assert found.exceeds(0.03) and not found.exceeds(0.05 / np.sqrt(2) + 1e-9)
 
 
-def test_vertex_that_is_elsewhere_is_numbered() -> None:
+def test_moved_vertex_is_reported_by_index() -> None:
     moved = CORNERS.copy()
     moved[3] += [0.0, 0.0, 0.2]
     vertices = measures(compare(Actor(figure()), Actor(figure(moved)), n_poses=0))["vertices"]
@@ -119,7 +119,7 @@ def told(found):
     return [(one.key, one.values) for one in found]
 
 
-def test_what_only_one_has_is_a_mismatch_that_no_tolerance_covers() -> None:
+def test_data_in_only_one_figure_is_a_mismatch_at_any_tolerance() -> None:
     names = skeleton([-1, 0, 1], names=("base", "tip", "claw"))
     found = compare(Actor(Figure("a", skeleton=names)), Actor(figure()), n_poses=0)
     assert told(found.mismatches) == [
@@ -129,7 +129,7 @@ def test_what_only_one_has_is_a_mismatch_that_no_tolerance_covers() -> None:
     assert found.exceeds(1e9)
 
 
-def test_joints_without_a_name_are_told_by_number() -> None:
+def test_unnamed_joints_are_reported_by_index() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0], names=("base", "")))
     other = Figure("b", skeleton=skeleton([-1], names=("base",)))
     found = compare(Actor(one), Actor(other))
@@ -139,7 +139,7 @@ def test_joints_without_a_name_are_told_by_number() -> None:
     assert measures(found)["joint positions"].items == ("base", "joint 1 (no name)")
 
 
-def test_joints_in_another_order_are_told() -> None:
+def test_joints_in_another_order_are_reported() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 0, 0], names=("a", "b", "c", "d")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
     found = compare(Actor(one), Actor(other))
@@ -155,13 +155,13 @@ def test_joint_with_another_parent_is_a_mismatch() -> None:
     assert told(found.mismatches) == [("D001.parents", {"names": ["c"]})]
 
 
-def test_joints_without_a_common_name_are_compared_by_number() -> None:
+def test_joints_without_common_names_are_compared_by_index() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0], names=("a", "b")))
     other = Figure("b", skeleton=skeleton([-1, 0], names=("x", "y")))
     assert told(compare(Actor(one), Actor(other)).notes) == [("D002.joints-by-index", {})]
 
 
-def test_other_limits_are_told_with_both() -> None:
+def test_differing_limits_are_reported_with_both() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
     limits = {"low": -1.0, "high": 1.0, "other_low": -0.5, "other_high": 1.0}
     assert told(found.mismatches) == [("D001.limits", {"n": 1, "dof": "tip.z", **limits})]
@@ -218,7 +218,7 @@ def test_nan_is_never_within_a_tolerance() -> None:
     assert replace(found, measures=(broken,)).exceeds(1e9)
 
 
-def test_actors_are_left_in_the_worst_pose_also_if_that_is_their_own() -> None:
+def test_actors_are_left_in_the_worst_pose_even_if_it_is_their_own() -> None:
     # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]

@@ -63,7 +63,7 @@ def check(points, positions, triangles):
 
 
 @pytest.mark.parametrize("size", [0.01, 0.1, 1.0])
-def test_closest_agrees_with_trying_every_triangle(size):
+def test_closest_agrees_with_brute_force(size):
     rng = np.random.default_rng(1)
     positions, triangles = soup(rng, 150, size)
     check(rng.uniform(-1.5, 1.5, (60, 3)), positions, triangles)
@@ -83,7 +83,7 @@ def test_closest_finds_long_triangles_among_small_ones():
     check(points, positions, triangles)
 
 
-def test_closest_takes_triangles_without_area_as_segments_and_points():
+def test_closest_treats_zero_area_triangles_as_segments_and_points():
     rng = np.random.default_rng(3)
     positions, triangles = soup(rng, 40, 0.05)
     positions[0:3] = positions[0]  # a point
@@ -100,7 +100,7 @@ def test_closest_when_all_triangles_are_one_point():
     assert found.positions.tolist() == [[1.0, 1.0, 1.0]]
 
 
-def test_closest_of_the_seven_regions_of_a_triangle():
+def test_closest_point_in_each_of_the_seven_regions_of_a_triangle():
     positions = np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0]])
     points = np.array(
         [[1, 1, 2], [-1, -1, 0], [6, -1, 0], [-1, 6, 0], [2, -3, 0], [-3, 1, 0], [4, 4, 0]],
@@ -112,7 +112,7 @@ def test_closest_of_the_seven_regions_of_a_triangle():
     np.testing.assert_allclose(found.barycentric[0], [0.5, 0.25, 0.25], atol=ROUNDING)
 
 
-def test_closest_is_as_exact_far_from_the_origin():
+def test_closest_is_equally_exact_far_from_the_origin():
     rng = np.random.default_rng(4)
     positions, triangles = soup(rng, 50, 0.1)
     points = rng.uniform(-1, 1, (20, 3))
@@ -124,7 +124,7 @@ def test_closest_is_as_exact_far_from_the_origin():
 
 
 @pytest.mark.slow
-def test_closest_from_the_middle_of_a_sphere_looks_at_every_triangle():
+def test_closest_from_the_centre_of_a_sphere_checks_every_triangle():
     turns = np.linspace(0, 2 * np.pi, 41)[:-1]
     heights = np.linspace(0.05, np.pi - 0.05, 40)
     rings = np.stack(
@@ -156,7 +156,7 @@ def test_closest_without_points_is_empty():
         (np.eye(3), [[-1, 1, 2]], "triangles: expected vertex indices 0 to 2, found -1 to 2"),
     ],
 )
-def test_surface_refuses_what_it_cannot_search(positions, triangles, message):
+def test_surface_refuses_unsearchable_meshes(positions, triangles, message):
     with pytest.raises(RigError) as caught:
         Surface(positions, np.asarray(triangles))
     assert str(caught.value) == message
@@ -183,7 +183,7 @@ TWO = SurfacePoints([1, 0], [[0.5, 0.25, 0.25], [0, 1, 0]], np.zeros((2, 3)), np
 TRIANGLES = np.array([[0, 1, 2], [2, 1, 3]])
 
 
-def test_interpolate_mixes_the_values_of_the_corners():
+def test_interpolate_blends_the_corner_values():
     values = np.array([[0.0, 1.0], [2.0, 0.0], [4.0, 0.0], [8.0, 4.0]])
     # 4/2 + 2/4 + 8/4 = 4.5 and 4/4 = 1; then vertex 1 alone.
     assert interpolate(TWO, TRIANGLES, values).tolist() == [[4.5, 1.0], [2.0, 0.0]]

@@ -18,7 +18,7 @@ def about_z(degrees):
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-300, 1e-12, 1e-5, 0.3, np.pi, 6.0, 40.0])
-def test_vectors_turn_as_their_matrices_do(size):
+def test_quaternions_rotate_vectors_like_their_matrices(size):
     axes = RANDOM.normal(size=(20, 3))
     vectors = size * axes / np.linalg.norm(axes, axis=1, keepdims=True)
     found = rotation_vector_to_quaternion(vectors)
@@ -47,7 +47,7 @@ def test_product_is_the_product_of_matrices():
         (20, 20, 0.7, 20),
     ],
 )
-def test_slerp_goes_the_shorter_way_at_even_speed(start, end, fraction, expected):
+def test_slerp_takes_the_shorter_arc_at_constant_speed(start, end, fraction, expected):
     found = slerp(about_z(start), about_z(end), fraction)
     assert_allclose(
         quaternion_to_matrix(found), quaternion_to_matrix(about_z(expected)), atol=1e-13
@@ -64,7 +64,7 @@ def test_slerp_ends_are_the_ends():
     )
 
 
-def test_slerp_agrees_with_the_power_of_the_rotation_between():
+def test_slerp_agrees_with_the_power_of_the_relative_rotation():
     # Independent: R(u) = R0 exp(u log(R0^T R1)), the angle from the trace.
     for _ in range(20):
         a, b = rotation_vector_to_matrix(RANDOM.uniform(-1.2, 1.2, (2, 3)))

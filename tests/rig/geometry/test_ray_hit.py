@@ -46,7 +46,7 @@ def test_distance_is_in_lengths_of_the_direction():
         ((-1.0, 0.5, 0.0), (1.0, 0.0, 0.0)),  # within the plane of one
     ],
 )
-def test_what_is_not_ahead_is_not_hit(origin, direction):
+def test_triangles_behind_the_ray_are_not_hit(origin, direction):
     assert first_hit(POSITIONS, TRIANGLES, np.array(origin), np.array(direction)) is None
     assert first_hit(POSITIONS, TRIANGLES[:0], np.array(origin), np.array(direction)) is None
 
@@ -56,7 +56,7 @@ def test_edges_have_no_gap():
         assert first_hit(POSITIONS, TRIANGLES[:2], np.array([x, x, 1.0]), DOWN) is not None
 
 
-def test_many_triangles_are_looked_at_in_parts(monkeypatch):
+def test_many_triangles_are_processed_in_chunks(monkeypatch):
     monkeypatch.setattr("viewer.rig.geometry.ray_hit._AT_ONCE", 1)
     hit = first_hit(POSITIONS, TRIANGLES, np.array([0.25, 0.75, 3.0]), DOWN)
     assert (hit.triangle, hit.distance) == (3, 2.0)

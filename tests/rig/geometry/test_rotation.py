@@ -12,7 +12,7 @@ ROUNDING = 1e-15  # a few units in the last place of numbers up to 1
     ("axis", "start", "end"),
     [(0, [0, 1, 0], [0, 0, 1]), (1, [0, 0, 1], [1, 0, 0]), (2, [1, 0, 0], [0, 1, 0])],
 )
-def test_axis_rotation_turns_right_handed(axis, start, end):
+def test_axis_rotation_is_right_handed(axis, start, end):
     assert_allclose(axis_rotations(axis, np.array(np.pi / 2)) @ start, end, atol=ROUNDING)
 
 
@@ -23,7 +23,7 @@ def test_axis_rotation_is_the_textbook_matrix(axis, plain):
     assert_allclose(axis_rotations(axis, angles), expected, atol=ROUNDING)
 
 
-def test_axis_rotations_keep_the_shape_of_the_batch():
+def test_axis_rotations_keep_the_batch_shape():
     assert axis_rotations(0, np.zeros((2, 5))).shape == (2, 5, 3, 3)
     assert axis_rotations(0, np.zeros(0)).shape == (0, 3, 3)
 
@@ -57,6 +57,6 @@ def test_quaternion_120_degrees_about_the_diagonal_permutes_the_axes():
     assert matrix.tolist() == [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
 
 
-def test_quaternions_keep_the_shape_of_the_batch():
+def test_quaternions_keep_the_batch_shape():
     batch = np.tile([0.0, 0, 0, 2.0], (4, 2, 1))
     assert quaternion_to_matrix(batch).shape == (4, 2, 3, 3)

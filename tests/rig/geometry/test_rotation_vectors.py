@@ -58,7 +58,7 @@ def angle_between(first, second):
 
 @pytest.mark.parametrize("angle", ANGLES)
 @pytest.mark.parametrize("axis", AXES)
-def test_rotation_vector_turns_about_its_direction_by_its_length(axis, angle):
+def test_rotation_vector_rotates_about_its_direction_by_its_length(axis, angle):
     found = rotation_vector_to_matrix(angle * unit_axis(axis))
     # An angle of 100 is itself rounded to 1e-14.
     assert_allclose(found, about(axis, angle), atol=ROUNDING * max(1.0, angle))
@@ -83,7 +83,7 @@ def test_tiny_rotation_keeps_its_digits():
     assert_allclose(found[0, 0] - 1.0, -0.5e-12, atol=1.2e-16)
 
 
-def test_half_a_turn_is_twice_the_projection_less_the_identity():
+def test_half_turn_is_twice_the_projection_minus_the_identity():
     for axis in AXES:
         unit = unit_axis(axis)
         found = rotation_vector_to_matrix(np.pi * unit)
@@ -92,14 +92,14 @@ def test_half_a_turn_is_twice_the_projection_less_the_identity():
 
 @pytest.mark.parametrize("angle", [1e-12, 1e-9, 1e-4, 0.3, 3.0, np.pi - 1e-6, np.pi - 1e-9])
 @pytest.mark.parametrize("axis", AXES)
-def test_rotation_vector_up_to_half_a_turn_comes_back(axis, angle):
+def test_rotation_vector_up_to_a_half_turn_round_trips(axis, angle):
     vector = angle * unit_axis(axis)
     found = matrix_to_rotation_vector(rotation_vector_to_matrix(vector))
     assert_allclose(found, vector, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_half_a_turn_comes_back_up_to_its_sign(axis):
+def test_half_turn_round_trips_up_to_its_sign(axis):
     vector = np.pi * unit_axis(axis)
     found = matrix_to_rotation_vector(rotation_vector_to_matrix(vector))
     sign = 1.0 if found @ vector > 0.0 else -1.0
@@ -107,21 +107,21 @@ def test_half_a_turn_comes_back_up_to_its_sign(axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_more_than_half_a_turn_comes_back_as_the_shorter_way(axis):
+def test_more_than_a_half_turn_returns_the_shorter_rotation(axis):
     vector = matrix_to_rotation_vector(rotation_vector_to_matrix(4.2 * unit_axis(axis)))
     assert_allclose(vector, (4.2 - 2.0 * np.pi) * unit_axis(axis), atol=ROUNDING)
     whole = matrix_to_rotation_vector(rotation_vector_to_matrix(2.0 * np.pi * unit_axis(axis)))
     assert_allclose(whole, 0.0, atol=ROUNDING)
 
 
-def test_matrices_come_back_from_their_rotation_vectors():
+def test_matrices_round_trip_through_rotation_vectors():
     matrices = random_rotations(2_000)
     vectors = matrix_to_rotation_vector(matrices)
     assert np.linalg.norm(vectors, axis=1).max() <= np.pi
     assert_allclose(rotation_vector_to_matrix(vectors), matrices, atol=ROUNDING)
 
 
-def test_matrices_come_back_from_their_quaternions():
+def test_matrices_round_trip_through_quaternions():
     matrices = random_rotations(5_000, seed=1)
     quaternions = matrix_to_quaternion(matrices)
     assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=ROUNDING)
@@ -131,7 +131,7 @@ def test_matrices_come_back_from_their_quaternions():
 
 @pytest.mark.parametrize("w", [0.0, 1e-17, 1e-9, 1e-5])
 @pytest.mark.parametrize("axis", AXES)
-def test_quaternions_at_and_near_half_a_turn_come_back(axis, w):
+def test_quaternions_at_and_near_a_half_turn_round_trip(axis, w):
     quaternion = np.array([*unit_axis(axis), w])
     quaternion /= np.linalg.norm(quaternion)
     found = matrix_to_quaternion(quaternion_to_matrix(quaternion))
@@ -139,7 +139,7 @@ def test_quaternions_at_and_near_half_a_turn_come_back(axis, w):
     assert_allclose(found * np.sign(found @ quaternion), quaternion, atol=ROUNDING)
 
 
-def test_conversions_keep_the_shape_of_the_batch():
+def test_conversions_keep_the_batch_shape():
     batch = np.broadcast_to(np.eye(3), (2, 5, 3, 3))
     assert matrix_to_quaternion(batch).shape == (2, 5, 4)
     assert matrix_to_rotation_vector(batch).shape == (2, 5, 3)
@@ -153,7 +153,7 @@ def plain_euler(x, y, z):
     return turn_z(z) @ turn_y(y) @ turn_x(x)
 
 
-def test_euler_angles_come_back():
+def test_euler_angles_round_trip():
     rng = np.random.default_rng(2)
     angles = rng.uniform(-1.0, 1.0, (500, 3)) * [np.pi, 1.5, np.pi]
     matrices = np.array([plain_euler(*row) for row in angles])
@@ -192,7 +192,7 @@ def random_stretch(rng):
     return frame @ np.diag(rng.uniform(0.2, 5.0, 3)) @ frame.T
 
 
-def test_rotation_and_stretch_are_told_apart():
+def test_rotation_and_stretch_are_separated():
     rng = np.random.default_rng(5)
     rotations = random_rotations(200, seed=6)
     stretches = np.array([random_stretch(rng) for _ in rotations])
@@ -208,7 +208,7 @@ def test_scale_along_axes_has_no_rotation():
 
 
 @pytest.mark.parametrize("shear", [0.1, 1.0, 10.0])
-def test_shear_turns_by_the_angle_of_its_polar_form(shear):
+def test_shear_rotates_by_the_angle_of_its_polar_decomposition(shear):
     matrix = np.eye(3)
     matrix[0, 1] = shear
     rotation, stretch = nearest_rotations(matrix)
@@ -218,7 +218,7 @@ def test_shear_turns_by_the_angle_of_its_polar_form(shear):
     assert_allclose(rotation @ stretch, matrix, atol=ROUNDING * (1 + shear))
 
 
-def test_mirroring_matrix_gives_a_proper_rotation_and_a_mirroring_stretch():
+def test_reflection_gives_a_proper_rotation_and_a_reflecting_stretch():
     # The shortest of the three axes is flipped, which gives the nearest proper rotation.
     rotation, stretch = nearest_rotations(np.diag([-1.0, 2.0, 3.0]))
     assert_allclose(rotation, np.eye(3), atol=ROUNDING)
@@ -249,6 +249,6 @@ def test_singular_matrices_still_give_a_rotation():
         assert_allclose(rotation @ stretch, matrix, atol=ROUNDING)
 
 
-def test_random_rotations_of_this_file_reach_half_a_turn():
+def test_sampled_random_rotations_include_half_turns():
     angles = angle_between(random_rotations(5_000, seed=1), np.eye(3))
     assert angles.max() > 3.1

@@ -81,7 +81,7 @@ def test_every_term_of_dual_quaternions():
     assert_allclose(dual.position, one.skinned)
 
 
-def test_quaternion_on_the_other_side_is_turned():
+def test_quaternion_in_the_other_hemisphere_is_negated():
     figure = arm([[(0, 0.6), (1, 0.4)]] * 4)
     # The shoulder rotates by 200 degrees: either its quaternion's w or the other's sign is
     # negative.
@@ -98,7 +98,7 @@ def test_quaternion_on_the_other_side_is_turned():
     assert set(found) == {1.0, -1.0}
 
 
-def test_mixture_lies_between_the_two():
+def test_blend_lies_between_the_two():
     figure = arm()
     pose = bent(figure, 1.0)
     ends = [explain(figure, pose, Skinning(method), 1).position for method in ("lbs", "dqs")]
@@ -117,7 +117,7 @@ def test_weights_that_do_not_add_up_to_one_are_as_stored():
     assert_allclose(scaled.position, [0, 3, 0], atol=1e-15)
 
 
-def test_cut_influences_are_not_listed():
+def test_pruned_influences_are_not_listed():
     figure = arm()
     one = explain(figure, bent(figure), Skinning(max_influences=1), 1)
     assert one.names == ("elbow",) and one.weights.tolist() == [1.0]
@@ -186,14 +186,14 @@ def test_stretch_of_a_joint_that_scales_comes_first():
         ),
     ],
 )
-def test_what_cannot_be_explained_is_refused(make, vertex, message):
+def test_unexplainable_vertices_are_refused(make, vertex, message):
     figure = make()
     with pytest.raises(RigError) as caught:
         explain(figure, bent(arm()), Skinning(), vertex)
     assert str(caught.value) == message
 
 
-def test_text_of_linear_blending():
+def test_linear_blending_text():
     figure = arm()
     text = explanation_text(explain(figure, bent(figure), Skinning(), 1), digits=2)
     assert text == [
@@ -220,7 +220,7 @@ def test_text_of_linear_blending():
     ]
 
 
-def test_text_of_dual_quaternions_and_placement():
+def test_dual_quaternion_and_placement_text():
     figure = arm([[(1, 1.0)]] * 4)
     pose = bent(figure)
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 1, 0)
@@ -243,7 +243,7 @@ def test_text_of_dual_quaternions_and_placement():
     ]
 
 
-def test_text_says_what_is_special():
+def test_text_mentions_special_cases():
     figure = arm()
     free = explanation_text(explain(figure, bent(figure), Skinning("dqs"), 3))
     assert free[3:] == [
@@ -259,7 +259,7 @@ def test_text_says_what_is_special():
     assert any(line.startswith("0.2500 of the way   (") for line in mixed)
 
 
-def test_numbers_of_the_text_stand_below_each_other():
+def test_numbers_in_the_text_are_aligned():
     figure = arm()
     pose = bent(figure, 1.0, 2.0, 3.0)
     pose.figure_translation[:] = -12345.678, 0.1, 3

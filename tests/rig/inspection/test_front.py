@@ -60,7 +60,7 @@ BODY = {"hips": (-1, (0, 1, 0)), "LeftUpLeg": (0, (0.1, 1, 0)), "RightUpLeg": (0
 
 
 @pytest.mark.parametrize(("files", "front"), [((), "+z"), ((bundled_body(),), "+z")])
-def test_bundled_figures_face_the_usual_way_and_turn(files, front):
+def test_bundled_figures_face_the_default_front_also_when_rotated(files, front):
     assert fronts(viewer.load(*files)) == cycle("y", front)
 
 
@@ -73,12 +73,12 @@ def test_bundled_figures_face_the_usual_way_and_turn(files, front):
         (("smpl_synthetic/SMPL_NEUTRAL.npz",), "+z"),
     ],
 )
-def test_real_figures_show_their_front_and_turn(shared_data, names, front):
+def test_real_figures_have_a_front_also_when_rotated(shared_data, names, front):
     found = viewer.load(*(shared_data / name for name in names))
     assert fronts(found) == cycle(found.up, front)
 
 
-def test_people_who_face_each_other_leave_the_usual_front(shared_data):
+def test_people_facing_each_other_give_the_default_front(shared_data):
     found = viewer.load(shared_data / "smpl_synthetic" / "easymocap")
     assert guess_front(found) == "-y"
 
@@ -88,7 +88,7 @@ def test_tube_has_no_front(shared):
     assert fronts(tube) == ["+z"] * 4
 
 
-def test_left_and_right_show_the_front():
+def test_left_and_right_determine_the_front():
     assert fronts(scene(figure(BODY))) == cycle("y", "+z")
     # With z up and the left at +y a figure faces +x.
     lying = {name: (p, (0.0, place[0], place[1])) for name, (p, place) in BODY.items()}
@@ -111,11 +111,11 @@ def test_slanted_figure_gets_the_nearest_axis(degrees):
     ],
     ids=["toe", "jaw", "head", "tail"],
 )
-def test_feet_faces_and_ends_show_the_front(joints):
+def test_feet_faces_and_end_joints_determine_the_front(joints):
     assert fronts(scene(figure(joints))) == cycle("y", "-x")
 
 
-def test_all_other_evidence_together_outvotes_sides_that_are_named_the_wrong_way_round():
+def test_all_other_evidence_together_outvotes_swapped_side_names():
     joints = {
         **BODY,
         "toe": (1, (0.1, 0.9, -0.2)),
@@ -137,7 +137,7 @@ def _walk(way, n_frames=11):
     return Actor(figure(chain), clip=SampledClip("walk", timing, turns, figure_translations=places))
 
 
-def test_travel_shows_the_front_where_nothing_else_does():
+def test_travel_direction_determines_the_front_without_other_evidence():
     assert fronts(Scene([_walk((-3.0, 0.0, 0.2))])) == cycle("y", "-x")
     assert guess_front(Scene([_walk((0.0, 5.0, 0.0))])) == "+z"  # upward motion is no evidence
     assert guess_front(Scene([_walk((-0.1, 0.0, 0.0))])) == "+z"  # swaying is no evidence either
@@ -153,7 +153,7 @@ def test_travel_does_not_outvote_names():
     assert guess_front(Scene([Actor(figure(sided), clip=clip)])) == "+z"
 
 
-def test_captured_points_show_it_by_their_sides():
+def test_sides_of_captured_points_determine_the_front():
     layout = PointLayout("two", ("left_hip", "right_hip"), np.zeros((0, 2)), np.array([1, -1]))
     points = np.array([[0.0, -0.1, 1.0, 0.9], [0.0, 0.1, 1.0, 0.9]])  # the left is -y
     actor = Actor(Figure("points", points=layout, up="z"), points=points)
@@ -175,7 +175,7 @@ def _boots():
     return np.concatenate([half, half * (-1, 1, 1)])
 
 
-def test_mesh_alone_shows_it_by_its_feet():
+def test_feet_of_a_mesh_determine_the_front():
     assert fronts(scene(Figure("boots", mesh=mesh(_boots())))) == cycle("y", "+z")
 
 
@@ -189,11 +189,11 @@ def test_mesh_alone_shows_it_by_its_feet():
     ],
     ids=["cube", "box", "point", "flat"],
 )
-def test_shapes_without_a_front_get_the_usual_one(positions):
+def test_shapes_without_a_front_get_the_default(positions):
     assert fronts(scene(Figure("shape", mesh=mesh(positions)))) == ["+z"] * 4
 
 
-def test_actors_that_disagree_leave_the_usual_front_and_those_that_agree_do_not():
+def test_only_agreeing_actors_override_the_default_front():
     place = matrix(turn_y(math.pi / 2))
     one, other = Actor(figure(BODY), placement=place), Actor(figure(BODY), placement=place)
     assert guess_front(Scene([one, other])) == "+x"
@@ -204,7 +204,7 @@ def test_actors_that_disagree_leave_the_usual_front_and_those_that_agree_do_not(
     assert guess_front(Scene([])) == "+z"
 
 
-def test_guessing_changes_nothing():
+def test_guessing_the_front_changes_no_pose():
     actor = _walk((-3.0, 0.0, 0.0))
     before = actor.pose.figure_translation.copy()
     guess_front(Scene([actor]))

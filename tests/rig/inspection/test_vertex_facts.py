@@ -38,7 +38,7 @@ def posed(one, slide=0.0, turn=0.0):
     return pose
 
 
-def test_influences_come_by_falling_weight_each_joint_once():
+def test_influences_are_sorted_by_weight_each_joint_once():
     one = figure()
     facts = vertex_facts(one, posed(one), Skinning(), 0)
     assert facts.names == ("knee", "hip", "#3")
@@ -46,13 +46,13 @@ def test_influences_come_by_falling_weight_each_joint_once():
     assert_allclose(facts.weights, [0.5, 0.3, 0.2])
 
 
-def test_influences_are_those_that_count():
+def test_influences_are_those_in_use():
     one = figure()
     facts = vertex_facts(one, posed(one), Skinning(max_influences=1), 0)
     assert facts.names == ("knee",) and facts.weights.tolist() == [1.0]
 
 
-def test_position_and_normal_are_those_of_the_posed_figure():
+def test_position_and_normal_match_the_posed_figure():
     one = figure()
     pose = posed(one, 2.0, np.pi / 2)
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 0, 5)
@@ -62,7 +62,7 @@ def test_position_and_normal_are_those_of_the_posed_figure():
     assert_allclose(facts.normal, [0, 0, 1])
 
 
-def test_figure_without_a_skin_has_a_place_all_the_same():
+def test_figure_without_a_skin_still_has_a_position():
     bare = Figure("bare", mesh(POINTS))
     facts = vertex_facts(bare, None, Skinning(), 3)
     assert facts.position.tolist() == [0, 0, 1]
@@ -107,7 +107,7 @@ def test_texture_coordinates_are_all_of_a_seam_the_triangles_own_first():
         (0, 2, "triangle: expected -1 to 1, found 2"),
     ],
 )
-def test_indices_that_are_none_are_refused(vertex, triangle, message):
+def test_invalid_indices_are_refused(vertex, triangle, message):
     one = figure()
     with pytest.raises(RigError) as caught:
         vertex_facts(one, posed(one), Skinning(), vertex, triangle)
@@ -128,7 +128,7 @@ def test_nearest_corner_of_a_triangle():
     assert nearest_corner(corners, triangle, np.array([0.3, 0.3, 0])) == 7
 
 
-def test_text_of_the_facts():
+def test_facts_text():
     one = figure(body_parts=BodyParts(("leg",), np.zeros(4, dtype=int)))
     assert facts_text(vertex_facts(one, posed(one, 0.5), Skinning(), 0, 1)) == [
         "vertex 0, triangle 1, leg",
@@ -141,7 +141,7 @@ def test_text_of_the_facts():
     assert facts_text(vertex_facts(one, posed(one), Skinning(), 2))[-1] == "no influence"
 
 
-def test_text_of_many_influences_says_how_many_more():
+def test_long_influence_text_counts_the_remainder():
     count = 12
     bones = skeleton([-1] * count)
     rows = [[(joint, 1 / count) for joint in range(count)]] * 4
@@ -153,7 +153,7 @@ def test_text_of_many_influences_says_how_many_more():
 
 @pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
 @pytest.mark.parametrize("count", [0, 2])
-def test_some_vertices_are_deformed_like_all(method, count):
+def test_subset_of_vertices_is_deformed_as_in_the_whole(method, count):
     rng = np.random.default_rng(1)
     one = figure(
         blend_shapes=BlendShapes(("a", "b"), rng.normal(size=(2, 4, 3))),

@@ -61,7 +61,7 @@ def without_root(kind, vectors, shape=(), columns=None):
 
 
 @pytest.mark.parametrize(("kind", "count"), [("smpl", 24), ("smplh", 52), ("smplx", 55)])
-def test_root_turns_about_the_origin(family, kind, count):
+def test_root_rotates_about_the_origin(family, kind, count):
     vectors, shape = waves(count, 3), waves(10, seed=1.0)
     vectors[0] = TURN
     given = motion(FAMILY[count].names, vectors, about_origin=True, shape=shape[None])
@@ -72,7 +72,7 @@ def test_root_turns_about_the_origin(family, kind, count):
 
 
 @pytest.mark.parametrize("kind", ["smpl", "smplx"])
-def test_root_turns_about_the_pelvis(family, kind):
+def test_root_rotates_about_the_pelvis(family, kind):
     names = FAMILY[24 if kind == "smpl" else 55].names
     vectors, shape = waves(len(names), 3), waves(10, seed=2.0)
     vectors[0] = TURN
@@ -84,7 +84,7 @@ def test_root_turns_about_the_pelvis(family, kind):
     assert_allclose(found, expected, rtol=0, atol=ATOL)
 
 
-def test_world_turns_the_posed_body_about_the_origin(family):
+def test_world_rotates_the_posed_body_about_the_origin(family):
     vectors, shape, world = waves(24, 3), waves(10, seed=3.0), np.array([[1.5, 0.2, -0.6]])
     given = motion(FAMILY[24].names, vectors, shape=shape[None], world_rotations=world)
     found, _ = posed(family("smpl"), given)
@@ -115,7 +115,7 @@ def test_expression_moves_face_and_root(family):
 
 @pytest.mark.parametrize("flat", [True, False])
 @pytest.mark.parametrize(("kind", "count"), [("smplh", 52), ("smplx", 55)])
-def test_hands_turn_by_their_components(family, kind, count, flat):
+def test_hands_rotate_by_their_components(family, kind, count, flat):
     arrays, names = model(kind), FAMILY[count].names
     body, left, right = waves(22, 3), waves(6, seed=7.0), waves(12, seed=8.0)
     given = motion(
@@ -154,7 +154,7 @@ def test_root_positions_follow_the_shape(family):
     assert_allclose(root_positions(family("smpl"), shapes), expected, rtol=0, atol=ATOL)
 
 
-def test_what_a_figure_lacks_is_noted(family):
+def test_missing_joints_of_the_figure_are_reported(family):
     vectors = np.zeros((55, 3))
     vectors[[22, 30]] = 0.1
     given = motion(
@@ -181,14 +181,14 @@ def test_other_skeletons_are_refused():
     assert caught.value.diagnostic.values == values
 
 
-def test_arrays_must_fit():
+def test_array_shapes_must_match():
     with pytest.raises(RigError, match=r"^world_rotations: expected shape 1 x 3, found 2 x 3$"):
         motion(("pelvis",), TURN, world_rotations=np.zeros((2, 3)))
     with pytest.raises(RigError, match=r"^translations: expected shape 1 x 3, found 1 x 2$"):
         motion(("pelvis",), TURN, translations=np.zeros((1, 2)))
 
 
-def test_of_many_joints_left_out_six_are_named(family):
+def test_only_six_of_many_omitted_joints_are_named(family):
     names = (*FAMILY[55].names,)
     vectors = np.zeros((1, 55, 3))
     vectors[:, 22:] = 0.1

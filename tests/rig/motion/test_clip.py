@@ -49,7 +49,7 @@ def test_slopes_follow_the_rule(rule: str, expected: list[list[float]]) -> None:
     np.testing.assert_allclose(slopes(curve), expected, atol=1e-15)
 
 
-def test_slopes_take_numbers_per_side() -> None:
+def test_slopes_accept_values_per_side() -> None:
     curve = channel([(0, 0, 13.7, -0.22), (1, 5, "flat", "linear")])
     np.testing.assert_allclose(slopes(curve), [[13.7, -0.22], [0, 5]])
 
@@ -94,7 +94,7 @@ def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
         ("bounce", -1.5, 13.0),
     ],
 )
-def test_extrapolation_by_hand(mode: str, time: float, expected: float) -> None:
+def test_extrapolation_matches_hand_calculation(mode: str, time: float, expected: float) -> None:
     curve = channel([(1, 10, "linear", "linear"), (3, 14, "linear", "linear")], mode, mode)
     assert evaluate(curve, np.array(time)) == pytest.approx(expected, abs=1e-12)
 
@@ -122,7 +122,7 @@ def test_one_time_is_that_value_everywhere(mode: str, keys: list[tuple[float, fl
     np.testing.assert_array_equal(evaluate(curve, np.array([-9.0, 2.0, 9.0])), 5.0)
 
 
-def test_no_keys_are_zero() -> None:
+def test_channel_without_keys_is_zero() -> None:
     empty = Channel(0, np.zeros(0), np.zeros(0), ())
     np.testing.assert_array_equal(evaluate(empty, np.array([-1.0, 0.0, 5.0])), 0.0)
 
@@ -134,19 +134,19 @@ def test_equal_times_jump_without_dividing_by_zero() -> None:
         assert values[0] == 5.0 and np.isfinite(values).all()
 
 
-def test_falling_times_are_refused() -> None:
+def test_decreasing_times_are_refused() -> None:
     with pytest.raises(RigError, match="non-decreasing"):
         channel([(1, 0, "flat", "flat"), (0, 0, "flat", "flat")])
 
 
-def test_check_fit_names_both_numbers() -> None:
+def test_check_fit_names_both_counts() -> None:
     skeleton = viewer.load().actors[0].figure.skeleton
     assert skeleton is not None
     with pytest.raises(RigError, match=rf"has 0 channels, the skeleton needs {skeleton.n_dofs} "):
         check_fit(Clip("empty", (), 0.0, 1.0), skeleton)
 
 
-def test_check_fit_refuses_skeletons_that_move_otherwise() -> None:
+def test_check_fit_refuses_skeletons_without_matching_dofs() -> None:
     """A body of 24 ball joints has 72 DOFs, like the wasp with 23 joints and a root."""
     skeleton = hand_made.skeleton([-1, 0], [(j, axis, 0.0) for j in (0, 1) for axis in "xyz"])
     assert not is_course_rig(skeleton)
@@ -176,7 +176,7 @@ def test_check_fit_refuses_skeletons_that_move_otherwise() -> None:
         ),
     ],
 )
-def test_misfit_names_what_is_no_course_rig(rows, reason) -> None:
+def test_misfit_names_incompatible_joints(rows, reason) -> None:
     skeleton = hand_made.skeleton([-1, 0], [(*row, 0.0) for row in rows])
     found = misfit(Clip("walk", (), 0.0, 1.0), skeleton)
     assert found == Phrase("not-course-rig", reason=reason)
@@ -190,7 +190,7 @@ def test_misfit_is_empty_where_a_clip_fits() -> None:
     assert misfit(short, skeleton) == Phrase("clip-needs", n=6, joints=1)
 
 
-def test_course_rigs_list_translation_then_rotations_joint_by_joint() -> None:
+def test_skel_rigs_list_translation_then_rotations_joint_by_joint() -> None:
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, kind, 0.0) for kind in "xyz"]
     assert is_course_rig(hand_made.skeleton([-1, 0], rows))
@@ -207,19 +207,19 @@ def test_course_rigs_list_translation_then_rotations_joint_by_joint() -> None:
         ((("flat", "flat"),), ("cycle",), "expected two of constant"),
     ],
 )
-def test_channel_refuses_unknown_words(tangents, modes, message) -> None:
+def test_channel_refuses_unknown_rules(tangents, modes, message) -> None:
     with pytest.raises(RigError, match=message):
         Channel(0, np.zeros(1), np.zeros(1), tangents, modes)
 
 
 @pytest.mark.parametrize(("start", "end"), [(2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
-def test_clip_refuses_a_range_that_is_none(start, end) -> None:
+def test_clip_refuses_an_invalid_range(start, end) -> None:
     with pytest.raises(RigError, match="clip odd: expected a range, found"):
         Clip("odd", (), start, end)
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
-def test_walk_has_the_check_values() -> None:
+def test_walk_has_the_published_values() -> None:
     """Section 10 of the format's specification."""
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     clip = scene.actors[0].clip

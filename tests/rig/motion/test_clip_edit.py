@@ -53,7 +53,7 @@ def same_but(new, old, **changed):
 @pytest.mark.parametrize("rule", ["flat", "linear", "smooth", 0.5])
 @pytest.mark.parametrize("time", [0.25, 1.75, 2.999])
 @pytest.mark.parametrize("modes", [("linear", "linear"), ("cycle_offset", "bounce")])
-def test_key_added_on_the_curve_leaves_it_as_it_is(rule, time, modes) -> None:
+def test_key_added_on_the_curve_does_not_change_it(rule, time, modes) -> None:
     curve = channel((0.0, 1.0, 3.0, 3.5), (0.0, 2.0, -2.0, 1.0), rule, modes)
     longer, index = add_key(curve, time)
     assert len(longer.times) == 5 and longer.times[index] == time
@@ -62,7 +62,7 @@ def test_key_added_on_the_curve_leaves_it_as_it_is(rule, time, modes) -> None:
     assert len(curve.times) == 4
 
 
-def test_key_added_on_the_curve_has_the_slope_that_is_there() -> None:
+def test_key_added_on_the_curve_has_its_slope() -> None:
     # 3 u^2 - 2 u^3 over 2 s, from 0 to 4: at the middle 2, rising by 4 * 1.5 / 2 a second.
     curve = channel((0.0, 2.0), (0.0, 4.0), "flat")
     longer, index = add_key(curve, 1.0)
@@ -95,7 +95,7 @@ def test_key_added_outside_lies_on_the_extrapolation(time, index, value) -> None
         assert longer.values[3] == -2.0 - 4.0 * 1.5
 
 
-def test_key_added_where_one_is_changes_that_one() -> None:
+def test_key_added_at_an_existing_time_replaces_the_value() -> None:
     changed, index = add_key(channel(), 1.0, 9.0)
     assert index == 1
     same_but(changed, channel(), values=[0, 9, -2])
@@ -147,7 +147,7 @@ def test_moved_keys_keep_order_and_index() -> None:
         ([2], 5.0, [0, 1, 8]),
     ],
 )
-def test_moved_keys_stop_at_those_that_stay(keys, dt, times) -> None:
+def test_moved_keys_stop_at_unselected_keys(keys, dt, times) -> None:
     assert move_keys(channel(), keys, dt, 0.0).times.tolist() == times
 
 
@@ -157,7 +157,7 @@ def test_moved_keys_leave_a_gap_where_there_is_room() -> None:
     assert move_keys(close, [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 1, 1.1]
 
 
-def test_rounding_lets_no_key_pass_and_moves_no_neighbour() -> None:
+def test_rounding_does_not_reorder_or_move_neighbours() -> None:
     rng = np.random.default_rng(2)
     for _ in range(200):
         times = np.sort(rng.uniform(-1e3, 1e3, 3))
@@ -166,7 +166,7 @@ def test_rounding_lets_no_key_pass_and_moves_no_neighbour() -> None:
             assert (moved[[0, 2]] == times[[0, 2]]).all() and (np.diff(moved) >= 0).all()
 
 
-def test_set_key_takes_time_and_value_as_they_are() -> None:
+def test_set_key_stores_time_and_value_exactly() -> None:
     same_but(set_key(channel(), 1, 0.1, 0.7), channel(), times=[0, 0.1, 3], values=[0, 0.7, -2])
     same_but(set_key(channel(), 2, value=4.5), channel(), values=[0, 2, 4.5])
     assert set_key(channel(), 1, 9.0).times.tolist() == [0, 3, 3]
@@ -206,7 +206,7 @@ def test_range_is_put_in_order_and_channels_stay() -> None:
     assert (changed.start, changed.end) == (2.0, 5.0) and changed.channels is clip.channels
 
 
-def test_one_channel_is_exchanged_and_the_others_stay_the_same_objects() -> None:
+def test_replacing_one_channel_keeps_the_other_objects() -> None:
     other = Channel(1, np.zeros(1), np.ones(1), (("flat", "flat"),))
     clip = Clip("c", (other, channel()), 0.0, 1.0)
     changed = with_channel(clip, 4, lambda old: delete_keys(old, [0]))
@@ -220,7 +220,7 @@ def test_one_channel_is_exchanged_and_the_others_stay_the_same_objects() -> None
 # Whole poses
 
 
-def test_clip_of_a_pose_holds_it_for_ever() -> None:
+def test_clip_of_a_pose_holds_it_forever() -> None:
     pose = rest_pose(rig())
     pose.dofs[:] = [1, 2, 3, 0.1, 0.2, 0.3]
     clip = clip_from_pose(rig(), pose, "new", 2.0, 5.0)
@@ -236,7 +236,7 @@ def test_empty_clip_has_a_channel_for_every_dof_and_no_key() -> None:
     assert [(one.target, len(one.times)) for one in clip.channels] == [(dof, 0) for dof in range(6)]
 
 
-def test_keyed_pose_is_met_exactly_and_the_range_grows_to_it() -> None:
+def test_keyed_pose_is_reproduced_exactly_and_extends_the_range() -> None:
     pose = rest_pose(rig())
     clip = clip_from_pose(rig(), pose, "new", 0.0, 1.0)
     pose.dofs[:] = [1, 0, 0, 0.25, 0, -0.5]
@@ -255,7 +255,7 @@ def test_only_changed_dofs_get_keys_if_asked() -> None:
     assert [len(one.times) for one in changed.channels] == [1, 1, 1, 2, 1, 1]
 
 
-def test_limits_are_no_change() -> None:
+def test_clamping_is_not_a_change() -> None:
     """A curve beyond the limits is clamped, so the pose at the limit is unchanged."""
     beyond = Channel(5, np.zeros(1), np.full(1, 4.0), (("flat", "flat"),))
     clip = Clip("beyond", (beyond,), 0.0, 1.0)
@@ -300,7 +300,7 @@ def test_missing_frames_get_no_keys_and_the_range_stays() -> None:
     assert evaluate(clip.channels[0], np.array(2.0)) == 2.0
 
 
-def test_no_frame_at_all_is_refused() -> None:
+def test_motion_without_frames_is_refused() -> None:
     with pytest.raises(RigError) as caught:
         clip_from_frames("gap", np.zeros((1, 1)), np.zeros(1), present=np.array([False]))
     assert str(caught.value) == "clip gap: expected at least one frame, found none"

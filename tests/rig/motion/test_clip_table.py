@@ -129,7 +129,7 @@ def test_random_clips_with_few_and_many_keys(seed) -> None:
     assert_is_the_plain_curve(channels, rng.uniform(-3700, 3700, 60))
 
 
-def test_many_times_take_the_same_values_as_few() -> None:
+def test_batch_of_times_gives_the_same_values_as_single_times() -> None:
     """Long lists of times are searched channel by channel, short ones all at once."""
     rng = np.random.default_rng(5)
     clip = Clip("two ways", tuple(random_channel(rng, row, 7) for row in range(5)), 0.0, 1.0)
@@ -143,14 +143,14 @@ def test_many_times_take_the_same_values_as_few() -> None:
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("rule", ["flat", "linear", "smooth", -3.5], ids=str)
-def test_keys_are_met_exactly(mode, rule) -> None:
+def test_keys_are_reproduced_exactly(mode, rule) -> None:
     times = np.array([-0.7, 0.1, 0.3, 1.9, 2.2])
     values = np.array([0.1, -0.3, 7.7, 1e-9, 0.7])
     curve = Channel(0, times, values, ((rule, rule),) * 5, (mode, mode))
     np.testing.assert_array_equal(evaluate(curve, times), values)
 
 
-def test_whole_periods_away_the_ends_come_back() -> None:
+def test_ends_repeat_after_whole_periods() -> None:
     """At first + k T: a power of two as the period, so that the times are exact."""
     turns = np.arange(-5, 6)
     times, values = np.array([0.5, 1.0, 2.5]), np.array([3.0, -1.0, 4.0])
@@ -167,7 +167,7 @@ def test_whole_periods_away_the_ends_come_back() -> None:
 
 
 @pytest.mark.parametrize("start", [3600.0, -36000.0, 1e6])
-def test_hours_of_play_do_not_drift(start) -> None:
+def test_hours_of_playback_do_not_drift(start) -> None:
     """A period of 0.1 s, which no float holds exactly, many thousand times over."""
     times = np.array([0.0, 0.04, 0.1])
     curve = Channel(0, times, np.array([0.0, 1.0, 0.0]), (("smooth", 0.0),) * 3, ("cycle", "cycle"))
@@ -178,7 +178,7 @@ def test_hours_of_play_do_not_drift(start) -> None:
         assert far == pytest.approx(float(evaluate(curve, np.array(phase))), abs=40 * 2e-10)
 
 
-def test_times_an_hour_away_are_not_those_of_float32() -> None:
+def test_times_an_hour_away_exceed_float32_precision() -> None:
     """After an hour one frame at 1000 per second still changes the value, unlike in float32."""
     curve = Channel(
         0, np.array([0.0, 1.0]), np.array([0.0, 1.0]), (("linear",) * 2,) * 2, ("cycle",) * 2
@@ -187,7 +187,7 @@ def test_times_an_hour_away_are_not_those_of_float32() -> None:
     np.testing.assert_allclose(values, [0.25, 0.251, 0.252], atol=1e-12)
 
 
-def test_of_keys_at_one_time_the_outer_ones_are_the_ends() -> None:
+def test_outermost_of_coincident_keys_are_the_ends() -> None:
     times, values = np.array([1.0, 1.0, 2.0, 2.0]), np.array([5.0, 6.0, 7.0, 8.0])
     curve = Channel(0, times, values, ((2.0, 3.0),) * 4, ("constant", "linear"))
     np.testing.assert_array_equal(
@@ -217,7 +217,7 @@ def test_largest_numbers_of_files_stay_finite() -> None:
         assert np.isfinite(evaluate(curve, np.array([-big, -1.0, 0.5e-8, 1.0, big]))).all()
 
 
-def test_clip_without_channels_and_times_without_number() -> None:
+def test_clip_without_channels_and_non_finite_times() -> None:
     targets, values = evaluate_all(Clip("none", (), 0.0, 1.0), np.array([0.0, 1.0]))
     assert targets.shape == (0,) and values.shape == (2, 0)
     one = Channel(4, np.array([0.0, 1.0]), np.array([1.0, 2.0]), (("flat", "flat"),) * 2)

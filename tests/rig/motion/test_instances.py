@@ -46,7 +46,7 @@ def random_poses(joints: Skeleton, count: int) -> list[Pose]:
     return poses
 
 
-def test_matrices_are_those_of_each_pose():
+def test_batched_matrices_match_each_pose():
     joints = moving_skeleton()
     poses = random_poses(joints, 7)
     rotations, found, places = (
@@ -153,7 +153,7 @@ def test_frames_pose_actors_together(kind, time, interpolate):
         assert {actor.is_present for actor in actors} == {True, False}
 
 
-def test_actors_of_many_kinds_are_all_posed():
+def test_mixed_actors_are_all_posed():
     joints = moving_skeleton()
     first, second = Figure("a", skeleton=joints), Figure("b", skeleton=joints)
     layout = PointLayout("one", ("p",), np.zeros((0, 2)), [0])

@@ -29,21 +29,21 @@ def capture(rows=(0, 1), **parts) -> SampledClip:
     return SampledClip("c", Timing(10.0, rows), turns, **parts)
 
 
-def test_a_joint_goes_where_its_parent_turns_it():
+def test_a_joint_path_follows_its_parent():
     path = motion_path(two_joints(), capture(), [1, 0])
     assert path.times.tolist() == [0.0, 0.1]
     assert path.present.all()
     assert np.allclose(path.points, [[[2, 0, 0], [0, 0, 0]], [[0, 2, 0], [0, 0, 0]]], atol=1e-12)
 
 
-def test_between_frames_and_with_the_figures_place():
+def test_path_between_frames_with_placement():
     clip = capture(figure_translations=[[0, 0, 0], [0, 0, 3.0]], figure_scales=[1.0, 2.0])
     path = motion_path(two_joints(), clip, [1], times=[0.05, 0.1])
     half = np.sqrt(0.5)
     assert np.allclose(path.points[:, 0], [[3 * half, 3 * half, 1.5], [0, 4, 3]], atol=1e-12)
 
 
-def test_the_pose_gives_what_the_motion_has_not():
+def test_the_pose_supplies_missing_dofs():
     figure = two_joints()
     base = figure_pose(figure)
     base.figure_translation[:] = 5.0, 0.0, 0.0
@@ -61,7 +61,7 @@ def test_gaps_break_the_line():
     assert np.allclose(points[5], [[0, 2, 0], [2, 0, 0]], atol=1e-12)
 
 
-def test_curves_are_followed_sixty_times_a_second():
+def test_keyed_paths_are_sampled_at_60_hz():
     figure = two_joints()
     channel = Channel(0, np.array([1.0, 2.0]), np.array([0.0, np.pi]), (("linear", "linear"),) * 2)
     clip = Clip("k", (channel,), 1.0, 2.0)
@@ -74,17 +74,17 @@ def test_curves_are_followed_sixty_times_a_second():
 
 
 @pytest.mark.parametrize(("length", "count"), [(0.0, 1), (0.01, 2), (1e6, 20_000)])
-def test_short_and_endless_curves_have_few_points(length, count):
+def test_very_short_and_very_long_paths_have_few_points(length, count):
     assert len(path_times(Clip("k", (), 0.0, length))) == count
 
 
-def test_captures_are_followed_frame_by_frame():
+def test_capture_paths_have_a_point_per_frame():
     timing = Timing(25.0, [0, -1, 0], start=2.0)
     clip = SampledClip("c", timing, np.tile(STILL, (1, 2, 1)))
     assert path_times(clip) == pytest.approx([2.0, 2.04, 2.08])
 
 
-def test_long_captures_are_the_same_in_pieces():
+def test_long_captures_give_the_same_path_in_chunks():
     count = 9000  # more than one batch
     angles = np.linspace(0.0, 20.0, count)
     turns = np.tile(STILL, (count, 2, 1))
@@ -104,7 +104,7 @@ def points_clip() -> tuple[Figure, PointClip]:
     return Figure("p", points=layout), PointClip("p", Timing(1.0, [0, 1, 2, 3, -1, 3]), points)
 
 
-def test_points_leave_paths_where_they_were_seen():
+def test_captured_points_have_paths_where_seen():
     figure, clip = points_clip()
     path = motion_path(figure, clip, [1, 0], min_confidence=0.1)
     assert path.present[:, 0].tolist() == [True, False, True, True, False, True]

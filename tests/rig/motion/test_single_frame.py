@@ -88,7 +88,7 @@ def course_rig() -> Figure:
     return Figure("rig", skeleton=skeleton)
 
 
-def test_rigs_of_keys_get_their_own_numbers_as_keys():
+def test_keyed_rigs_get_raw_pose_values_as_keys():
     # Only these angles are possible: those nearest to zero are outside the limits.
     actor = Actor(course_rig())
     actor.pose.dofs[:] = [5.0, 0.0, 0.0, 0.25, 2.5, 0.0]
@@ -105,12 +105,12 @@ def test_rigs_of_keys_get_their_own_numbers_as_keys():
     assert_allclose(found[:3, 3], [5, 0, 0], atol=ATOL)
 
 
-def test_who_is_away_is_missing():
+def test_absent_people_are_missing():
     actor = Actor(arm(), is_present=False)
     assert single_frame(actor).frames.present.tolist() == [False]
 
 
-def test_scales_of_joints_are_kept():
+def test_joint_scales_are_kept():
     actor = Actor(arm())
     actor.pose.scales[0] = [3.0, 1.0, 1.0]
     assert_allclose(places(single_frame(actor)), [[0, 0, 0], [3, 0, 0], [6, 0, 0]], atol=ATOL)
@@ -130,7 +130,7 @@ def test_figures_without_joints_are_refused():
         single_frame(Actor(Figure("stone", mesh=Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]])))))
 
 
-def test_who_hangs_stands_up_unless_the_world_is_kept():
+def test_upside_down_figure_is_turned_upright_unless_the_world_is_kept():
     actor = Actor(arm(), placement=rotation_transform(0, np.pi))
     set_dof(actor, "elbow", 5, np.pi / 2)
     actor.pose.figure_translation[:] = [0.0, 4.0, 0.5]

@@ -37,7 +37,7 @@ def test_times_find_their_rows(time, expected):
     assert located(GAP, time) == pytest.approx(expected, abs=1e-9)
 
 
-def test_absence_outside_if_ends_are_not_held():
+def test_figure_is_absent_outside_the_range_unless_ends_are_held():
     timing = Timing(4.0, GAP.rows, start=1.0, holds=False)
     assert located(timing, 0.99)[0] == located(timing, 2.26)[0] == -1
     assert located(timing, 1.0)[0] == 0 and located(timing, 2.25)[0] == 3
@@ -71,17 +71,17 @@ def test_times_and_frames():
     assert GAP.present.tolist() == [True, True, False, False, True, True]
 
 
-def test_nothing_at_all_is_absence():
+def test_empty_timing_means_absence():
     for rows in ([], [-1, -1]):
         assert located(Timing(30.0, np.array(rows, dtype=int)), 0.0) == (-1, -1, 0.0)
 
 
 @pytest.mark.parametrize("rate", [0.0, -30.0, 1e-320, 1.5e6, float("nan"), float("inf")])
-def test_rates_that_are_none_are_refused(rate):
+def test_invalid_rates_are_refused(rate):
     with pytest.raises(RigError, match="frame rate: expected 1e-06 to 1,000,000 "):
         Timing(rate, np.arange(3))
 
 
-def test_share_between_frames_is_linear():
+def test_fraction_between_frames_is_linear():
     shares = GAP.locate(np.linspace(1.0, 1.249, 7))[2]
     assert_allclose(shares, np.linspace(0.0, 0.996, 7), atol=1e-12)

@@ -50,11 +50,11 @@ def pointed(direction, count=25, confidence=1.0, title=""):
         ((0.4, 0, 0.4), "y"),
     ],
 )
-def test_bodies_show_it(figure, turn, up):
+def test_bodies_determine_the_up_axis(figure, turn, up):
     assert guess_up([standing(figure, [turn, turn])]) == up
 
 
-def test_most_frames_count_and_missing_ones_do_not(figure):
+def test_majority_of_present_frames_decides(figure):
     upright, fallen = (np.pi / 2, 0, 0), (np.pi, 0, 0)
     assert guess_up([standing(figure, [upright, upright, fallen])]) == "z"
     actor = standing(figure, [fallen, upright], rows=np.array([-1, 1, -1]))
@@ -63,15 +63,15 @@ def test_most_frames_count_and_missing_ones_do_not(figure):
 
 @pytest.mark.parametrize(("count", "title"), [(25, ""), (17, "coco"), (17, "h36m"), (33, "")])
 @pytest.mark.parametrize(("direction", "up"), [((0, 0.1, -2), "-z"), ((0.3, 1, 0), "y")])
-def test_keypoints_show_it(count, title, direction, up):
+def test_keypoints_determine_the_up_axis(count, title, direction, up):
     assert guess_up([pointed(direction, count, title=title)]) == up
 
 
-def test_keypoints_that_are_not_seen_do_not_count():
+def test_unseen_keypoints_do_not_count():
     assert guess_up([pointed((0, 1, 0), confidence=0.0)]) == "z"
 
 
-def test_where_nobody_shows_it_the_custom_is_z(figure):
+def test_up_axis_defaults_to_z(figure):
     lying = standing(figure, [(0, 0, np.pi / 2)])
     clip = Clip("a", (), 0.0, 1.0)
     assert guess_up([]) == "z"

@@ -44,30 +44,30 @@ def standing(up, placement=None, world_up=None, **parts):
         ("y", "z", -1, ("y", True)),
     ],
 )
-def test_what_is_up_before_the_placement(figure, world, quarters, expected):
+def test_up_axis_before_the_placement(figure, world, quarters, expected):
     scene, actor = standing(figure, rotation_transform(0, quarters * np.pi / 2), world)
     assert own_up(scene, actor) == expected
 
 
-def test_lying_along_x_counts_as_the_scene_has_it():
+def test_lying_along_x_uses_the_scene_up_axis():
     scene, actor = standing("y", rotation_transform(2, -np.pi / 2), "z")
     actor.placement = rotation_transform(1, np.pi / 2)
     assert own_up(scene, actor) == ("z", False)
 
 
-def test_nothing_different_is_the_same_actor():
+def test_upright_actor_is_returned_unchanged():
     scene, actor = standing("z", rotation_transform(0, -np.pi / 2), "y")
     assert upright_actor(scene, actor) is actor
 
 
-def test_figure_says_the_axis_of_the_capture():
+def test_figure_has_the_up_axis_of_the_capture():
     scene, actor = standing("y", None, "z")
     found = upright_actor(scene, actor)
     assert (found.figure.up, actor.figure.up) == ("z", "y")
     assert found.pose is actor.pose and found.figure.skeleton is actor.figure.skeleton
 
 
-def test_body_that_hangs_is_turned_over_with_shape_and_place():
+def test_upside_down_body_is_turned_upright_with_shape_and_placement():
     (actor,) = viewer.load(bundled_body()).actors
     rng = np.random.default_rng(5)
     actor.pose.dofs[:] = rng.uniform(-1, 1, len(actor.pose.dofs))
@@ -84,7 +84,7 @@ def test_body_that_hangs_is_turned_over_with_shape_and_place():
     assert found.figure is actor.figure
 
 
-def test_every_root_is_turned_over():
+def test_every_root_is_turned_upright():
     figure = Figure(
         "two",
         skeleton=ball_skeleton(("a", "b"), np.array([-1, -1]), np.array([[1, 2, 3], [4, 5, 6.0]])),

@@ -41,7 +41,7 @@ def hand_at(skeleton: Skeleton, dofs: np.ndarray) -> np.ndarray:
     )
 
 
-def test_arm_reaches_a_place_by_the_law_of_cosines() -> None:
+def test_arm_reaches_a_target_by_the_law_of_cosines() -> None:
     skeleton = arm()
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.3, 0.4
@@ -53,7 +53,7 @@ def test_arm_reaches_a_place_by_the_law_of_cosines() -> None:
     assert_allclose(pose.dofs, [0.3, 0.4])  # the start is unchanged
 
 
-def test_place_beyond_reach_is_pointed_at_with_a_straight_arm() -> None:
+def test_unreachable_target_is_pointed_at_with_a_straight_arm() -> None:
     skeleton = arm()
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.5, 1.0
@@ -76,7 +76,7 @@ def test_elbow_bends_only_to_the_side_that_its_limits_allow() -> None:
     assert_allclose(found.dofs[1], 2 * np.pi / 3, atol=1e-4)
 
 
-def test_limit_that_is_reached_is_reported_and_the_other_joint_makes_up_for_it() -> None:
+def test_reached_limit_is_reported_and_another_joint_compensates() -> None:
     skeleton = arm({1: (0.0, 1.0)})
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.1, 0.5
@@ -89,14 +89,14 @@ def test_limit_that_is_reached_is_reported_and_the_other_joint_makes_up_for_it()
     assert_allclose(found.dofs[0], np.pi / 2 - 0.5, atol=1e-2)
 
 
-def test_start_outside_its_limits_is_brought_within_them() -> None:
+def test_start_outside_its_limits_is_clamped() -> None:
     skeleton = arm({1: (0.0, 1.0)})
     pose = rest_pose(skeleton)
     pose.dofs[1] = 2.0
     assert 0 <= reach(skeleton, pose, 2, np.array([2.0, 0, 0])).dofs[1] <= 1
 
 
-def test_jacobian_is_the_derivative_also_with_scales_and_several_axes() -> None:
+def test_jacobian_matches_finite_differences() -> None:
     rng = np.random.default_rng(3)
     skeleton = ball_skeleton(("a", "b", "c", "d"), np.array([-1, 0, 1, 2]), rng.normal(size=(4, 3)))
     turned = rng.normal(size=(4, 4))
@@ -118,7 +118,7 @@ def test_jacobian_is_the_derivative_also_with_scales_and_several_axes() -> None:
         assert_allclose(found[:, row], (ends[0] - ends[1]) / 2e-5, atol=1e-8)
 
 
-def test_chain_has_the_nearest_joints_that_can_turn() -> None:
+def test_chain_has_the_nearest_rotatable_joints() -> None:
     skeleton = ball_skeleton(tuple("abcd"), np.array([-1, 0, 1, 2]), np.zeros((4, 3)))
     assert chain_above(skeleton, 3, 2).tolist() == [2, 1]
     assert chain_above(skeleton, 3, 9).tolist() == [2, 1, 0]
@@ -133,6 +133,6 @@ def test_chain_of_one_leaves_the_joints_above_it_alone() -> None:
     assert_allclose(found.dofs, [0.0, np.pi / 2], atol=1e-5)
 
 
-def test_root_has_nothing_to_be_moved_by() -> None:
+def test_root_has_no_chain() -> None:
     with pytest.raises(RigError, match=r"^no joint above shoulder can rotate$"):
         reach(arm(), rest_pose(arm()), 0, np.zeros(3))

@@ -74,7 +74,7 @@ def test_order_of_axes_is_the_order_of_the_rows() -> None:
     assert_allclose(found.dofs, angles, atol=1e-12)
 
 
-def test_of_two_solutions_the_one_near_the_present_values_is_taken() -> None:
+def test_of_two_solutions_the_one_nearer_the_current_values_is_chosen() -> None:
     skeleton = single("xyz")
     pose = rest_pose(skeleton)
     # y beyond a right angle: the same rotation as (x + pi, pi - y, z + pi).
@@ -87,7 +87,7 @@ def test_of_two_solutions_the_one_near_the_present_values_is_taken() -> None:
     assert_allclose(found, [0.05 + 4 * np.pi, 2.1, 0.25], atol=1e-9)
 
 
-def test_limits_choose_the_solution_that_they_allow() -> None:
+def test_limits_select_the_allowed_solution() -> None:
     # Only y between 1.6 and 2.5 is allowed; the usual solution has y below pi / 2.
     skeleton = single("xyz", FREE, (1.6, 2.5), FREE)
     wanted = about(2, 0.4) @ about(1, 2.2) @ about(0, -0.3)
@@ -95,13 +95,13 @@ def test_limits_choose_the_solution_that_they_allow() -> None:
     assert_allclose(found.dofs, [-0.3, 2.2, 0.4], atol=1e-9)
 
 
-def test_limits_a_whole_turn_away_are_found() -> None:
+def test_limits_a_full_turn_away_are_found() -> None:
     skeleton = single("x", (2 * np.pi + 0.1, 2 * np.pi + 1.0))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(0, 0.5))
     assert_allclose(found.dofs, [2 * np.pi + 0.5], atol=1e-12)
 
 
-def test_beyond_a_limit_the_nearest_rotation_is_taken_and_the_dof_named() -> None:
+def test_beyond_a_limit_the_nearest_rotation_is_used_and_the_dof_named() -> None:
     skeleton = single("xyz", (-0.5, 0.5), (-0.5, 0.5), (-0.5, 0.5))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(1, 0.8))
     assert_allclose(found.dofs, [0, 0.5, 0], atol=1e-9)
@@ -128,7 +128,7 @@ def test_nothing_within_the_limits_is_nearer() -> None:
         assert (found.dofs <= skeleton.dof_limits[:, 1]).all()
 
 
-def test_one_axis_takes_the_turn_about_it() -> None:
+def test_one_axis_takes_the_twist_about_it() -> None:
     skeleton = single("y")
     # Of Ry(0.7) Rx(0.2) an axis y alone gets 0.7 by symmetry of the trace in x.
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(1, 0.7) @ about(0, 0.2))
@@ -149,14 +149,14 @@ def test_joint_without_rotations_stays() -> None:
     assert found.dofs.shape == (0,) and found.error == pytest.approx(0.5)
 
 
-def test_start_is_left_as_it_is() -> None:
+def test_start_is_not_modified() -> None:
     skeleton = single("xyz")
     pose = rest_pose(skeleton)
     nearest_dofs(skeleton, pose, 0, about(2, 0.5))
     assert not pose.dofs.any()
 
 
-def test_locked_dofs_are_no_freedom() -> None:
+def test_locked_dofs_are_ignored() -> None:
     assert rotates_freely(single("zyx"), 0)
     assert not rotates_freely(single("xyz", (0.2, 0.2)), 0)
     assert not rotates_freely(single("xyx"), 0)

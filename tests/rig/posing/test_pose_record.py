@@ -57,7 +57,7 @@ def hinges() -> Figure:
     return Figure("hinges", skeleton=skeleton([-1, 0], dofs, names=["hip", "knee"]))
 
 
-def test_dofs_are_taken_by_name_and_the_others_stay():
+def test_dofs_are_set_by_name_and_the_others_stay():
     figure = hinges()
     pose = rest_pose(figure.skeleton)
     assert apply_record(PoseRecord(dofs={"knee.z": 0.75, "hip.x": -0.5}), figure, pose) == []
@@ -100,7 +100,7 @@ def test_figure_without_skeleton_is_refused():
 
 
 @pytest.mark.parametrize("kind", ["smpl", "smplh", "smplx", "mano", "flame"])
-def test_own_vector_turns_every_joint(family, kind):
+def test_raw_pose_vector_rotates_every_joint(family, kind):
     figure = family(kind)
     wanted = np.random.default_rng(0).uniform(-1, 1, (figure.skeleton.n_joints, 3))
     found, notes = applied(figure, vector=wanted.ravel())
@@ -120,7 +120,9 @@ def test_own_vector_turns_every_joint(family, kind):
         ("smpl", 66, None, 0),
     ],
 )
-def test_vector_of_another_member_goes_by_joint_names(family, kind, count, shared, left_out):
+def test_vector_of_another_family_member_is_matched_by_joint_names(
+    family, kind, count, shared, left_out
+):
     figure = family(kind)
     wanted = np.random.default_rng(1).uniform(-1, 1, (count // 3, 3))
     expected = np.zeros((figure.skeleton.n_joints, 3))
@@ -134,7 +136,7 @@ def test_vector_of_another_member_goes_by_joint_names(family, kind, count, share
     assert lines(notes) == (said if left_out else [])
 
 
-def test_joints_that_the_vector_lacks_go_to_rest(family):
+def test_joints_missing_from_the_vector_go_to_rest(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.dofs[:] = 0.1
@@ -142,7 +144,7 @@ def test_joints_that_the_vector_lacks_go_to_rest(family):
     assert not pose.dofs.any()
 
 
-def test_mano_takes_a_hand_of_either_side(family):
+def test_mano_accepts_a_hand_of_either_side(family):
     wanted = np.random.default_rng(7).uniform(-0.5, 0.5, 45)
     found, notes = applied(family("mano"), parts={"left_hand_pose": wanted})
     assert_allclose(found[1:].ravel(), wanted, atol=1e-13)
@@ -150,7 +152,7 @@ def test_mano_takes_a_hand_of_either_side(family):
 
 
 @pytest.mark.parametrize("scale", [0.0, -2.0, 1e-300, 1e300])
-def test_scale_that_cannot_be_drawn_is_left_out(family, scale):
+def test_invalid_scale_is_left_out(family, scale):
     figure = family("smpl")
     pose = figure_pose(figure)
     pose.figure_scale = 1.5
@@ -163,7 +165,7 @@ def test_scale_that_cannot_be_drawn_is_left_out(family, scale):
     )
 
 
-def test_place_and_shape_beyond_all_measure_are_left_out_or_refused(family):
+def test_extreme_placement_and_shape_are_left_out_or_refused(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
@@ -173,7 +175,7 @@ def test_place_and_shape_beyond_all_measure_are_left_out_or_refused(family):
     assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
 
 
-def test_hands_at_rest_of_another_member_are_not_worth_a_note(family):
+def test_resting_hands_of_another_family_member_give_no_note(family):
     wanted = np.zeros(72)
     wanted[:66] = 0.1
     assert applied(family("smplx"), vector=wanted)[1] == []
@@ -183,7 +185,7 @@ def test_hands_at_rest_of_another_member_are_not_worth_a_note(family):
     ("kind", "count", "own"),
     [("smpl", 71, 72), ("smpl", 63, 72), ("mano", 72, 48), ("flame", 165, 15)],
 )
-def test_vector_of_no_member_is_refused(family, kind, count, own):
+def test_vector_of_unknown_length_is_refused(family, kind, count, own):
     figure = family(kind)
     message = refusal(figure, vector=np.ones(count))
     assert message == f"expected {own} pose values for {figure.name}, found {count}"
@@ -228,7 +230,7 @@ def test_single_joints_by_the_names_of_smplx(family, part, kind, joint):
     assert notes == []
 
 
-def test_part_that_the_figure_lacks_is_noted_if_it_says_something(family):
+def test_missing_part_is_reported_unless_at_rest(family):
     figure = family("smpl")
     assert applied(figure, parts={"jaw_pose": np.zeros(3)})[1] == []
     found, notes = applied(figure, parts={"jaw_pose": np.ones(3)})
@@ -274,7 +276,7 @@ def test_forty_five_numbers_are_rotation_vectors(family, kind, side, first, flat
     assert_allclose(found[first : first + 15].ravel(), expected, atol=1e-13)
 
 
-def test_forty_five_coefficients_where_the_file_says_so(family):
+def test_forty_five_coefficients_if_the_file_says_so(family):
     components, mean = hand_arrays("smplx", "left")
     weights = np.zeros(45)
     weights[44] = 0.5
@@ -342,7 +344,7 @@ def test_shapes_for_a_figure_without_any_are_refused_all_the_same():
     assert str(caught.value) == "bones has 0 shape coefficients, found 3"
 
 
-def test_place_is_taken_and_what_is_missing_stays(family):
+def test_placement_is_applied_and_missing_values_stay(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     pose.dofs[:] = 0.1
@@ -363,7 +365,7 @@ def test_pose_shares_no_array_with_its_record(family):
 
 
 @pytest.mark.parametrize("kind", ["smpl", "smplx", "mano"])
-def test_record_of_a_pose_gives_it_back(family, kind):
+def test_pose_record_round_trips(family, kind):
     figure = family(kind)
     rng = np.random.default_rng(6)
     pose = figure_pose(figure)
@@ -375,7 +377,7 @@ def test_record_of_a_pose_gives_it_back(family, kind):
     assert pose_key(again) == pose_key(pose)
 
 
-def test_record_holds_words_and_own_numbers(family):
+def test_record_holds_labels_and_raw_pose_values(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.dofs[3 * 4] = 0.5  # left knee about x

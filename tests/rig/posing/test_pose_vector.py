@@ -48,7 +48,7 @@ def test_smpl_numbers_are_rotation_vectors():
     assert_allclose(found, [about(row) for row in vector.reshape(4, 3)], atol=1e-13)
 
 
-def test_pig_root_is_turned_about_x_then_y_then_z():
+def test_pig_root_is_rotated_about_x_then_y_then_z():
     vector = np.arange(16) / 10.0
     pose = posed(PIG, vector)
     found = joint_rotations(BALLS, pose)
@@ -61,7 +61,7 @@ def test_pig_root_is_turned_about_x_then_y_then_z():
 
 
 @pytest.mark.parametrize("layout", [SMPL, PIG], ids=["smpl", "pig"])
-def test_numbers_come_back(layout):
+def test_pose_values_round_trip(layout):
     rng = np.random.default_rng(1)
     for _ in range(20):
         vector = rng.uniform(-1.5, 1.5, layout.n_numbers)
@@ -69,7 +69,7 @@ def test_numbers_come_back(layout):
         assert_allclose(found, vector, atol=1e-12)
 
 
-def test_long_vectors_come_back_as_the_same_rotation():
+def test_long_vectors_round_trip_as_the_same_rotation():
     vector = np.zeros(12)
     vector[3:6] = 0.0, 5.0, 0.0
     assert_allclose(write_vector(SMPL, BALLS, posed(SMPL, vector))[4], 5.0 - 2.0 * np.pi)
@@ -83,14 +83,14 @@ def test_pig_root_at_a_right_angle_about_y_keeps_its_rotation():
     assert_allclose(turn_z(z) @ turn_y(y) @ turn_x(x), wanted, atol=1e-13)
 
 
-def test_own_numbers_of_each_joint():
+def test_raw_pose_values_of_each_joint():
     root = turn_z(0.3) @ turn_y(0.4) @ turn_x(0.5)
     rotations = np.array([root, about([0.1, 0.2, 0.3]), np.eye(3), np.eye(3)])
     expected = [[0.3, 0.4, 0.5], [0.1, 0.2, 0.3], [0, 0, 0], [0, 0, 0]]
     assert_allclose(own_numbers(PIG, rotations), expected, atol=1e-14)
 
 
-def test_numbers_may_be_in_another_order_than_the_joints():
+def test_values_may_be_in_another_order_than_the_joints():
     layout = PoseLayout(13, [9, 0, 6, 3], np.zeros(4, bool), scale=12)
     vector = np.zeros(13)
     vector[0], vector[12] = 0.5, 2.0
@@ -100,7 +100,7 @@ def test_numbers_may_be_in_another_order_than_the_joints():
     assert_allclose(write_vector(layout, BALLS, pose), vector, atol=1e-15)
 
 
-def test_model_without_layout_takes_its_dofs():
+def test_model_without_layout_uses_its_dofs():
     bones = skeleton([-1, 0], [(0, "tx", 0.0), (1, "z", 0.0, -1.0, 1.0)])
     pose = posed(None, [3.0, 2.0], bones)
     assert pose.dofs.tolist() == [3.0, 1.0]  # clamped to its limits
@@ -112,7 +112,7 @@ def test_model_without_layout_takes_its_dofs():
 
 @pytest.mark.parametrize(("layout", "count"), [(SMPL, 12), (PIG, 16), (None, 12)])
 @pytest.mark.parametrize("extra", [-1, 1, 3])
-def test_wrong_number_of_numbers_is_refused(layout, count, extra):
+def test_wrong_number_of_values_is_refused(layout, count, extra):
     pose = rest_pose(BALLS)
     with pytest.raises(RigError) as caught:
         read_vector(layout, BALLS, pose, np.ones(count + extra))
@@ -142,7 +142,7 @@ def test_rotation_rows_are_those_of_ball_joints_only():
     "axes", ["xyz", "zyx", "xz", "y", "", "xyx"], ids=lambda axes: axes or "none"
 )
 @pytest.mark.parametrize("turned_rest", [False, True])
-def test_any_joint_takes_any_rotation(axes, turned_rest):
+def test_any_joint_accepts_any_rotation(axes, turned_rest):
     bones = skeleton([-1, 0], [(1, axis, 0.3) for axis in axes])
     if turned_rest:
         bones = replace(bones, rest_rotations=[[0, 0, 0, 1], [0.5, 0.5, 0.5, 0.5]])
@@ -153,7 +153,7 @@ def test_any_joint_takes_any_rotation(axes, turned_rest):
     assert_allclose(found, [np.eye(3), wanted], atol=1e-14)
 
 
-def test_limits_hold_ball_joints_unless_left_out():
+def test_limits_apply_to_ball_joints_unless_disabled():
     bones = skeleton([-1], [(0, "x", 0.0, -0.1, 0.1), (0, "y", 0.0), (0, "z", 0.0)])
     pose = rest_pose(bones)
     joint = np.array([0])
@@ -171,7 +171,7 @@ def test_limits_of_a_hinge_leave_the_rest_to_its_quaternion():
     assert_allclose(pose.rotations, [[np.sin(0.25), 0, 0, np.cos(0.25)]], atol=1e-15)
 
 
-def test_only_the_named_joints_turn():
+def test_only_the_named_joints_rotate():
     pose = rest_pose(BALLS)
     pose.dofs[:] = 0.25
     set_joint_rotations(BALLS, pose, np.array([2]), np.eye(3)[None])

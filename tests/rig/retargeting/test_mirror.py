@@ -85,7 +85,7 @@ def check_mirror(figure, pose, axis=0):
     assert_allclose(found[figure.symmetry], flipped(positions, axis), atol=1e-12)
 
 
-def test_partners_are_left_and_right():
+def test_mirror_counterparts_are_left_and_right():
     assert joint_partners(symmetric_figure()).tolist() == PARTNERS
     assert joint_partners(symmetric_figure(1, "z")).tolist() == PARTNERS
 
@@ -159,7 +159,7 @@ def test_scales_change_sides():
 
 
 @pytest.mark.parametrize("make", [symmetric_figure, turned_figure])
-def test_translations_of_joints_change_sides(make):
+def test_joint_translations_change_sides(make):
     figure = make()
     pose = random_pose(figure)
     pose.translations[:] = np.random.default_rng(6).normal(size=(10, 3))
@@ -223,7 +223,7 @@ def test_axis_with_a_map_is_the_one_that_fits():
     assert mirror_axis(symmetric_figure(1, "y")) == 1
 
 
-def test_asymmetry_is_how_far_a_vertex_is_from_its_partners_image():
+def test_asymmetry_is_the_distance_to_the_mirrored_counterpart():
     figure = symmetric_figure()
     assert_allclose(asymmetry(figure), 0.0, atol=1e-15)
     positions = figure.mesh.positions.copy()
@@ -254,7 +254,7 @@ def test_skeleton_that_is_not_symmetric_is_refused():
     assert refused(Figure("lone", skeleton=lone)) == ("F004.asymmetric", "l_arm")
 
 
-def test_two_joints_for_one_partner_are_refused():
+def test_two_joints_with_one_counterpart_are_refused():
     places = [[0.0, 0, 0], [1, 0, 0], [1.01, 0, 0], [-1, 0, 0]]
     bones = ball_skeleton(("a", "b", "c", "d"), np.array([-1, 0, 0, 0]), np.array(places))
     key, joint = refused(Figure("double", skeleton=bones))
@@ -268,7 +268,7 @@ def test_figure_without_skeleton_is_refused():
     assert caught.value.diagnostic.values == {"figure": "bust"}
 
 
-def test_mirrored_turn_of_the_hips_is_the_mirror_image_of_the_turn():
+def test_mirrored_hip_rotation_is_its_mirror_image():
     figure = symmetric_figure()
     pose = rest_pose(figure.skeleton)
     pose.dofs[:3] = 0.2, 0.4, 0.6

@@ -90,7 +90,7 @@ def test_labels_alone_would_give_another_pose() -> None:
     assert np.abs([x - 0.5, y - 0.6, z - 0.7]).max() > 0.1
 
 
-def test_joints_that_are_missing_are_named_in_one_line_and_others_stay() -> None:
+def test_missing_joints_are_named_in_one_line_and_others_stay() -> None:
     one = figure(["a", "b", "tail", "tip"], ["xyz"] * 4, "cat")
     other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
     start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
@@ -128,7 +128,7 @@ def test_up_axes_may_differ() -> None:
     assert_allclose(back.dofs, [0, 0.4, 0], atol=1e-12)
 
 
-def test_limits_and_missing_axes_are_kept_and_said() -> None:
+def test_limits_and_missing_axes_are_respected_and_reported() -> None:
     one = figure("ab", ["xyz", "xyz"])
     other = figure("ab", ["xyz", "x"], "stiff", limits=[[-0.1, 0.1]] * 3 + [[0, 1]])
     pose, notes = transfer_pose(one, posed(one, 0.5, 0, 0, 0.4, 0, 0.2), other,
@@ -139,7 +139,7 @@ def test_limits_and_missing_axes_are_kept_and_said() -> None:
     assert lines(notes)[1:] == ["rotated as far as DOFs and limits allow: a, b"]
 
 
-def test_place_size_and_shape_stay() -> None:
+def test_placement_scale_and_shape_stay() -> None:
     one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
     source = posed(one, 0.1, 0.2, 0.3)
     source.figure_translation[:] = 1, 2, 3
@@ -164,7 +164,7 @@ def test_repeated_and_empty_names_match_nothing() -> None:
     assert joints_by_name(one.skeleton.names, other.skeleton.names).tolist() == [-1, 0, -1]
 
 
-def test_same_numbers_need_the_same_dofs_rest_and_up() -> None:
+def test_copying_values_needs_the_same_dofs_rest_and_up() -> None:
     one = figure("ab", ["xyz", "xyz"])
     assert shares_dofs(one, one) and shares_dofs(one, figure("ab", ["xyz", "xyz"], "other"))
     assert shares_dofs(one, shaped(one, 3)) and shares_dofs(shaped(one, 10), shaped(one, 8))
@@ -175,7 +175,7 @@ def test_same_numbers_need_the_same_dofs_rest_and_up() -> None:
     assert not shares_dofs(one, figure("ab", ["xyz"] * 2, rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]]))
 
 
-def test_long_lists_are_cut() -> None:
+def test_long_lists_are_truncated() -> None:
     one = figure(["a", *(f"j{k}" for k in range(20))], ["xyz"] * 21)
     other = figure("a", ["zyx"], "man")
     _, notes = transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
@@ -184,7 +184,7 @@ def test_long_lists_are_cut() -> None:
     ].endswith("8 more")
 
 
-def test_turns_are_those_of_the_figures_axes() -> None:
+def test_rotations_are_about_the_figures_axes() -> None:
     # The second joint rotates about x, its parent about z: the product is Rz(0.5) Rx(0.3).
     one = figure("ab", ["z", "x"])
     turns = relative_rotations(one, posed(one, 0.5, 0.3))
@@ -194,7 +194,7 @@ def test_turns_are_those_of_the_figures_axes() -> None:
     assert (turns.figure, turns.names, turns.up) == ("one", ("a", "b"), "y")
 
 
-def test_record_of_the_same_dofs_brings_back_what_lies_beneath_them() -> None:
+def test_record_of_the_same_dofs_restores_rotations_beneath_them() -> None:
     # A motion has also rotated the hinge "b" about y, and moved it.
     one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
     pose = posed(one, 0.1, 0.2, 0.3, 0.4)
@@ -208,7 +208,7 @@ def test_record_of_the_same_dofs_brings_back_what_lies_beneath_them() -> None:
     assert found.translations.tolist() == pose.translations.tolist()
 
 
-def test_record_for_other_dofs_turns_joints_and_leaves_place_and_size() -> None:
+def test_record_for_other_dofs_rotates_joints_and_keeps_placement_and_scale() -> None:
     one, other = figure("ab", ["xyz", "xyz"], "cat"), figure("ab", ["zxy", "yzx"], "man")
     pose = posed(one, 0.3, -0.5, 0.8, 1.0, 0.2, -0.7)
     pose.figure_translation[:] = 1, 0, 0
@@ -234,7 +234,7 @@ def test_refused_record_leaves_the_pose() -> None:
     assert pose_key(found) == before
 
 
-def test_hand_written_part_of_a_record_leaves_the_rest_beneath() -> None:
+def test_handwritten_partial_record_keeps_rotations_beneath() -> None:
     one = figure("ab", ["xyz", "x"])
     found = rest_pose(one.skeleton)
     found.rotations[1] = 0.0, 1.0, 0.0, 0.0
@@ -243,7 +243,7 @@ def test_hand_written_part_of_a_record_leaves_the_rest_beneath() -> None:
     assert found.dofs.tolist() == [0, 0, 0, 0.25] and found.rotations[1].tolist() == [0, 1, 0, 0]
 
 
-def test_edited_dofs_count_and_not_the_turns_beside_them() -> None:
+def test_edited_dofs_override_the_stored_rotations() -> None:
     one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
     record = record_of(one, posed(one, 0.1, 0.2, 0.3, 0.4))
     edited = replace(record, dofs={**record.dofs, "a.y": -0.5, "b.x": 0.25})
@@ -259,7 +259,7 @@ def test_edited_dofs_count_and_not_the_turns_beside_them() -> None:
     assert_allclose(joint_rotations(one.skeleton, found)[1], turned, atol=1e-12)
 
 
-def test_edited_dofs_keep_what_lies_beneath_them() -> None:
+def test_edited_dofs_keep_rotations_beneath_them() -> None:
     one = figure("ab", ["xyz", "x"])
     pose = posed(one, 0, 0, 0, 0.4)
     pose.rotations[1] = 0.0, np.sin(0.35), 0.0, np.cos(0.35)
@@ -282,7 +282,7 @@ def test_edited_dof_beyond_its_limit_leaves_no_rotation_beneath() -> None:
     assert found.rotations.tolist() == [[0, 0, 0, 1]]
 
 
-def test_part_of_a_record_brings_what_it_says_of_what_lies_beneath() -> None:
+def test_partial_record_restores_its_rotations_beneath() -> None:
     one = figure("ab", ["xyz", "x"])
     pose = posed(one, 0, 0, 0, 0.4)
     pose.rotations[1] = 0.0, 1.0, 0.0, 0.0
@@ -294,7 +294,7 @@ def test_part_of_a_record_brings_what_it_says_of_what_lies_beneath() -> None:
     assert found.translations.tolist() == [[0, 2, 0], [0, 0, 0]]
 
 
-def test_lists_that_do_not_fit_the_skeleton_go_by_name() -> None:
+def test_lists_that_do_not_fit_the_skeleton_are_matched_by_name() -> None:
     # A joint was removed from the file's lists, but the digest of the DOFs was kept.
     one = figure("ab", ["xyz", "x"], "cat")
     record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
@@ -325,7 +325,7 @@ def body_pose(fig: Figure):
 
 
 @pytest.mark.parametrize("cut", [False, True])
-def test_same_skeleton_with_fewer_shapes_takes_place_size_and_the_shapes_of_both(cut) -> None:
+def test_same_skeleton_with_fewer_shapes_takes_placement_scale_and_common_shapes(cut) -> None:
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), replace(shaped(bones, 2, 1), name="kin")
     found = rest_pose(bones.skeleton)
@@ -338,7 +338,7 @@ def test_same_skeleton_with_fewer_shapes_takes_place_size_and_the_shapes_of_both
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_same_skeleton_with_more_shapes_takes_place_size_and_the_shapes_of_both() -> None:
+def test_same_skeleton_with_more_shapes_takes_placement_scale_and_common_shapes() -> None:
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), shaped(bones, 5, 3)
     found = rest_pose(bones.skeleton)
@@ -348,7 +348,7 @@ def test_same_skeleton_with_more_shapes_takes_place_size_and_the_shapes_of_both(
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_same_skeleton_without_shapes_says_which_it_leaves() -> None:
+def test_same_skeleton_without_shapes_reports_dropped_shapes() -> None:
     bones = figure("ab", ["xyz", "x"], "bones")
     one = shaped(bones, 4, 2)
     found = rest_pose(bones.skeleton)

@@ -43,7 +43,7 @@ def assert_same_limbs(source: SkeletonMotion, figure: Figure, clip: SampledClip,
         np.testing.assert_allclose(bones(mine, own), wanted, atol=EXACT, err_msg=own[0])
 
 
-def test_onto_itself_is_the_identity() -> None:
+def test_retargeting_onto_itself_is_the_identity() -> None:
     motion = moving(figure_of(HIK, "mocap"))
     clip, notes = retarget(motion, motion.figure)
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
@@ -55,7 +55,7 @@ def test_onto_itself_is_the_identity() -> None:
     ]
 
 
-def test_joints_with_repeated_names_come_back_by_hierarchy() -> None:
+def test_joints_with_repeated_names_are_matched_by_hierarchy() -> None:
     table = {"a": ("", (0, 0, 0)), "b": ("a", (1, 0, 0)), "c": ("b", (2, 0, 0))}
     figure = figure_of(table, "snake")
     figure = replace(figure, skeleton=replace(figure.skeleton, names=("tail", "tail", "")))
@@ -65,7 +65,7 @@ def test_joints_with_repeated_names_come_back_by_hierarchy() -> None:
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
 
 
-def test_limbs_point_as_the_source_s_do_from_t_pose_to_a_pose() -> None:
+def test_limb_directions_match_the_source_from_t_pose_to_a_pose() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
@@ -79,7 +79,7 @@ def test_limbs_point_as_the_source_s_do_from_t_pose_to_a_pose() -> None:
     ]
 
 
-def test_a_trunk_at_rest_in_quite_another_way_is_aligned_too() -> None:
+def test_a_very_different_trunk_rest_pose_is_aligned_too() -> None:
     bowed = {**HIK, "Head": ("Neck", (0, 145, 12)), "Spine1": ("Spine", (0, 112, 14))}
     source, figure = moving(figure_of(bowed, "mocap")), figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
@@ -91,7 +91,7 @@ def test_a_trunk_at_rest_in_quite_another_way_is_aligned_too() -> None:
         np.testing.assert_allclose(bones(mine, own), bones(theirs, pair), atol=EXACT)
 
 
-def test_limbs_point_as_the_source_s_do_from_a_pose_to_t_pose() -> None:
+def test_limb_directions_match_the_source_from_a_pose_to_t_pose() -> None:
     source, figure = moving(figure_of(BODY, "body")), figure_of(HIK, "mocap")
     clip, _ = retarget(source, figure)
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
@@ -110,7 +110,7 @@ def test_trunk_and_feet_keep_their_own_bend() -> None:
         )
 
 
-def test_axes_of_the_figure_s_joints_do_not_matter() -> None:
+def test_joint_axes_of_the_figure_do_not_matter() -> None:
     source, plain = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     rng = np.random.default_rng(1)
     skeleton = plain.skeleton
@@ -163,7 +163,7 @@ def path_scale() -> float:
     return lengths[0] / lengths[1]
 
 
-def test_the_path_is_scaled_by_the_legs() -> None:
+def test_the_path_is_scaled_by_leg_length() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     theirs = places(source.figure, source.clip)["Hips"]
@@ -183,7 +183,7 @@ def test_a_skinned_figure_moves_as_a_whole() -> None:
         np.testing.assert_allclose(place, expected[name], atol=1e-12)
 
 
-def test_a_source_that_looks_elsewhere_at_rest_turns_the_figure() -> None:
+def test_a_source_with_another_front_at_rest_rotates_the_figure() -> None:
     quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z, its front, is now x
     source = moving(figure_of(HIK, "mocap", quarter))
     figure = figure_of(BODY, "body")

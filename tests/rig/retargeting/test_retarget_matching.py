@@ -32,7 +32,7 @@ def test_joints_between_two_that_match_are_folded_in() -> None:
     assert "unmatched joints of mocap: LeftToeBase, LeftArmRoll" in lines(notes)
 
 
-def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
+def test_unmapped_joints_stay_at_rest_relative_to_their_parent() -> None:
     table = {**BODY, "jaw": ("head", (0.0, 1.52, 0.08)), "tail": ("pelvis", (0, 0.9, -0.2))}
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
     clip, notes = retarget(source, figure)
@@ -40,7 +40,7 @@ def test_joints_that_nothing_moves_stay_at_rest_in_their_parent() -> None:
     assert "joints kept at rest: spine2, jaw, tail" in lines(notes)
 
 
-def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
+def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles() -> None:
     def with_fingers(table: dict, wrist: str, names: list[str], turn: np.ndarray) -> dict:
         base = np.array(table[wrist][1], dtype=float)
         size = 0.01 if base[1] > 10 else 0.0001
@@ -72,7 +72,7 @@ def test_fingers_turn_with_the_hand_and_bend_about_the_knuckles() -> None:
         np.testing.assert_allclose(bones(mine, ours), bones(theirs, pair), atol=EXACT)
 
 
-def test_same_hierarchy_with_other_proportions_takes_rotations_over() -> None:
+def test_same_hierarchy_with_other_proportions_transfers_rotations() -> None:
     source = moving(figure_of(BODY, "one"))
     names = list(BODY)
     # Depth-first instead of breadth-first, with 0.9 times the width and 1.1 times the height.
@@ -96,7 +96,7 @@ def test_same_hierarchy_with_other_proportions_takes_rotations_over() -> None:
     assert lines(notes)[0] == "one drives 20 of 20 joints of two"
 
 
-def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> None:
+def test_joint_translations_are_transferred_between_equal_hierarchies() -> None:
     figure = figure_of(BODY, "one")
     motion = moving(figure)
     shifts = motion.clip.translations.copy()
@@ -113,7 +113,7 @@ def test_moves_of_inner_joints_are_carried_where_the_hierarchy_is_the_same() -> 
     )
 
 
-def test_mapping_names_what_rules_do_not_know() -> None:
+def test_mapping_covers_names_without_rules() -> None:
     strange = {
         f"x{i}": (f"x{list(HIK).index(p)}" if p else "", at)
         for i, (p, at) in enumerate(HIK.values())
@@ -169,7 +169,7 @@ def test_equal_names_match_whatever_they_mean() -> None:
         ({"tail": "haed"}, "F004.mapping-joint", {"joint": "haed", "figure": "body", "n": 0}),
     ],
 )
-def test_what_does_not_fit_is_refused(
+def test_incompatible_figures_are_refused(
     mapping: dict[str, str] | None, key: str, values: dict[str, object]
 ) -> None:
     snake = figure_of({"base": ("", (0, 0, 0)), "tail": ("base", (0, 0, 1))}, "snake")

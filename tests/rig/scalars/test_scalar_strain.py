@@ -42,7 +42,7 @@ def test_figure_at_rest_is_not_strained(name):
 
 
 @pytest.mark.parametrize("name", ["stretch", "stretch-mean", "area"])
-def test_place_size_and_turn_of_a_figure_are_no_strain(name):
+def test_placement_scale_and_rotation_are_not_strain(name):
     def change(pose):
         pose.figure_scale, pose.figure_translation[:] = 3.0, (7, 8, 9)
         pose.dofs[2:] = 1.2
@@ -82,7 +82,7 @@ def test_area_change_is_that_of_all_triangles_around_a_vertex():
     assert_allclose(found("area", -1.0), [-100, -100, -100, -100, 0], atol=1e-9)
 
 
-def test_area_change_weighs_triangles_by_their_area():
+def test_area_change_is_weighted_by_triangle_area():
     # A second triangle of area 1.5 beside one of 0.5; only the small one doubles.
     corners = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-3, 0, 0]]
     skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(0, 1.0)], [(0, 1.0)]],
@@ -107,7 +107,7 @@ def test_rest_is_the_shaped_mesh():
     assert_allclose(found("area", 1.0, figure, change), [50, 50, 50, 50, 0])
 
 
-def test_edges_and_triangles_without_size_do_not_count():
+def test_degenerate_edges_and_triangles_do_not_count():
     corners = [[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]]
     rows = [[(0, 1.0)], [(0, 1.0)], [(1, 1.0)], [(0, 1.0)]]
     skin = skin_from_lists(rows, np.tile(np.eye(4), (2, 1, 1)))

@@ -32,13 +32,13 @@ def found(name, rows=ROWS, **how):
     return compute(name, figure, None, Skinning(**how)).tolist()
 
 
-def test_weight_of_a_joint_is_what_its_entries_add_up_to():
+def test_weight_of_a_joint_is_the_sum_of_its_entries():
     assert found("weight:j0") == [0.5, 0, 0, 0, 0.4, 1.5, 0]
     assert found("weight:j1") == [0.25, 0, 0, 0, 0.6, -0.5, 0]
     assert found("weight:#3") == [0, 0, 0, 0, 0, 0, 0.5]
 
 
-def test_weights_are_those_that_count():
+def test_weights_are_those_in_use():
     # Two influences: 0.5 and 0.25 scaled to a sum of 1; of the tie the first stays.
     assert found("weight:j0", max_influences=2)[0] == pytest.approx(2 / 3)
     assert found("weight:j1", max_influences=2)[0] == pytest.approx(1 / 3)
@@ -79,14 +79,14 @@ def test_entropy_of_equal_weights_is_the_logarithm_of_their_number():
     np.testing.assert_allclose(found("entropy", rows), [0, 1, 2, 0], atol=1e-15)
 
 
-def test_entropy_by_hand():
+def test_entropy_matches_hand_calculation():
     # 1/2 1 + 1/4 2 + 1/4 2 bits; 0.4 and 0.6; three quarters and one quarter of 2.
     binary = -0.4 * math.log2(0.4) - 0.6 * math.log2(0.6)
     quarter = -0.75 * math.log2(0.75) + 0.25 * 2
     np.testing.assert_allclose(found("entropy"), [1.5, 0, 0, 0, binary, quarter, 0], atol=1e-15)
 
 
-def test_figure_of_no_triangles_and_no_weights_has_numbers():
+def test_figure_without_triangles_or_weights_has_values():
     for name in ("weight:j1", "influences", "entropy"):
         assert found(name, [[], []]) == [0, 0]
     assert found("dominant", [[], []]) == [-1, -1]

@@ -48,7 +48,7 @@ def slid(figure, *moves):
     return pose
 
 
-def test_cut_is_the_distance_to_four_influences():
+def test_influence_limit_error_is_the_distance_to_four_influences():
     # Six equal sixths; the last two joints move by 6: one unit each is lost.
     sixths = [(joint, 1 / 6) for joint in range(6)]
     figure = sliding([sixths, [(5, 1.0)], []])
@@ -56,7 +56,7 @@ def test_cut_is_the_distance_to_four_influences():
     assert_allclose(found, [2.0, 0, 0], atol=1e-14)
 
 
-def test_cut_follows_the_chosen_number_of_influences():
+def test_influence_limit_error_follows_the_chosen_number():
     figure = sliding([[(0, 0.5), (1, 0.25), (2, 0.25)], [(0, 1.0)], []])
     pose = slid(figure, 4, 0, 0)
     # With one influence 4 instead of 2; with two 4 * 2/3; with three nothing is cut.
@@ -65,7 +65,7 @@ def test_cut_follows_the_chosen_number_of_influences():
         assert_allclose(found, [expected, 0, 0], atol=1e-14)
 
 
-def test_normalized_is_what_the_sum_of_the_weights_takes_away():
+def test_normalized_is_the_displacement_by_normalising_weights():
     # 0.9 of a vertex 5 from the origin: half a unit. 0.5 of (1, 1, 1) is half its length.
     figure = sliding([[(0, 0.9)], [(0, 0.5), (1, 0.5)], [(0, 0.5)]])
     for how in (Skinning(), Skinning(normalize=True), Skinning(max_influences=4)):
@@ -73,7 +73,7 @@ def test_normalized_is_what_the_sum_of_the_weights_takes_away():
         assert_allclose(found, [0.5, 0, np.sqrt(3) / 2], atol=1e-14)
 
 
-def test_methods_is_what_linear_blending_loses_in_a_twist():
+def test_methods_is_the_radius_lost_by_linear_blending_in_a_twist():
     figure = sliding([[(0, 0.5), (1, 0.5)], [(0, 1.0)], [(1, 1.0)]])
     pose = rest_pose(figure.skeleton)
     pose.dofs[3] = np.pi / 2  # joint 1 about x
@@ -107,7 +107,7 @@ def test_asymmetry_of_a_posed_figure():
     assert compute("asymmetry", figure, slid(figure, 1, 0, 0.5), Skinning()).tolist() == [1, 1, 1]
 
 
-def test_asymmetry_is_not_that_of_the_place_but_of_the_figure():
+def test_asymmetry_ignores_placement():
     points = [[2.0, 0, 0], [-1.0, 0, 0], [0.0, 1, 0]]
     figure = sliding([[(0, 1.0)]] * 3, symmetry=np.array([1, 0, 2]))
     figure = replace(figure, mesh=mesh(points))
@@ -116,7 +116,7 @@ def test_asymmetry_is_not_that_of_the_place_but_of_the_figure():
     assert_allclose(compute("asymmetry", figure, pose, Skinning()), [2, 2, 0], atol=1e-14)
 
 
-def test_asymmetry_without_a_map_is_nothing():
+def test_asymmetry_without_a_map_is_missing():
     figure = sliding([[(0, 1.0)]] * 3)
     assert compute("asymmetry", figure, slid(figure, 1), Skinning()).tolist() == [0, 0, 0]
 
@@ -127,13 +127,13 @@ MOVING = [name for name, view in SCALARS.items() if view.moves]
 
 
 @pytest.mark.parametrize("name", MOVING)
-def test_mesh_in_its_binding_space_shows_nothing(name):
+def test_mesh_in_bind_pose_shows_zero(name):
     figure = sliding([[(0, 0.5), (1, 0.2)]] * 3)
     assert compute(name, figure, None, Skinning()).tolist() == [0, 0, 0]
 
 
 @pytest.mark.parametrize("name", SCALARS)
-def test_figure_without_what_a_view_shows_has_nothing(name):
+def test_figure_without_the_data_of_a_view_has_no_values(name):
     figure = sliding([[(0, 1.0)]] * 3)
     bare = Figure("bare", mesh(POINTS), figure.skeleton)
     nothing = -1 if SCALARS[name].kind == "categorical" else 0
@@ -142,7 +142,7 @@ def test_figure_without_what_a_view_shows_has_nothing(name):
 
 
 @pytest.mark.parametrize("name", [name for name in SCALARS if name not in MOVING])
-def test_views_of_weights_and_parts_need_no_pose(name):
+def test_weight_and_part_views_need_no_pose(name):
     parts = BodyParts(("a", "b"), np.array([0, 1, 1]))
     figure = replace(
         sliding([[(0, 0.5), (1, 0.2)]] * 3, body_parts=parts),
@@ -187,7 +187,7 @@ def test_parts_are_the_indices_of_the_parts():
     assert categories("dominant", figure) == ("j0", "j1", "j2", "j3", "j4", "j5")
 
 
-def test_name_of_a_view_may_hold_a_joint():
+def test_view_name_may_include_a_joint():
     assert split_name("weight:left:knee") == ("weight", "left:knee")
     assert split_name("stretch") == ("stretch", "")
     assert find_quantity("weight:#4") is SCALARS["weight"]
@@ -249,7 +249,7 @@ def test_joints_without_a_skeleton_have_indices():
     assert str(caught.value) == 'no joint "knee"; without a skeleton there are #0 to #1'
 
 
-def test_what_a_figure_lacks_for_the_weight_of_a_joint():
+def test_missing_data_for_the_joint_weight_view():
     figure = named("hip", "knee")
     assert missing_part("weight:knee", figure) == ""
     assert missing_part("weight", figure) == "a selected joint"
@@ -276,7 +276,7 @@ def test_every_module_of_the_folder_is_in_the_table():
     assert modules == {view.module for view in SCALARS.values()}
 
 
-def test_small_lengths_are_millimetres_or_a_share_of_the_size():
+def test_small_lengths_are_millimetres_or_a_fraction_of_the_size():
     figure = sliding([[]] * 3, unit="m")
     assert length_unit(figure) == (1000.0, "mm")
     # A centimetre is 10 mm, an inch 25.4.
@@ -309,7 +309,7 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
         compute("field:match", figure, None, Skinning())
 
 
-def test_titles_tell_how_many_influences_are_kept():
+def test_titles_give_the_influence_limit():
     figure = sliding([[(0, 1.0)]] * 3)
     assert quantity_title("pruning", figure, Skinning()) == "Distance to 4 influences"
     assert menu_title("pruning", Skinning(max_influences=1)) == "Distance to 1 influence"

@@ -65,7 +65,7 @@ def test_sphere_bound_by_a_scaled_matrix_has_the_normals_of_an_ellipsoid(tmp_pat
 
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
-def test_scaled_joint_below_a_turned_one_shears_the_sphere_exactly(how):
+def test_scaled_joint_below_a_rotated_one_shears_the_sphere_exactly(how):
     joints = skeleton([-1, 0], [(1, "y", 0.7)], offsets=[[0, 0, 0], [0, 0, 0]])
     shape = Mesh(DIRECTIONS, DIRECTIONS, [[0, 1, 2]])
     figure = Figure("ball", shape, joints, skin_from_lists([[(1, 1.0)]] * 200, EYES))
@@ -94,7 +94,7 @@ def test_rigid_joints_keep_the_blended_matrix_itself():
 
 
 @pytest.mark.parametrize("factor", [1e-3, 0.5, 1000.0])
-def test_unit_of_length_does_not_change_normals(factor):
+def test_length_unit_does_not_change_normals(factor):
     turns = [matrix(turn_x(0.4)), matrix(turn_z(1.0))]
     pairs = [(0, 0.25), (1, 0.75)]
     larger = [factor * turn for turn in turns]
@@ -112,7 +112,7 @@ def test_mirrored_normals_point_outward(method):
 
 
 @pytest.mark.parametrize("method", [lbs, dqs, mix])
-def test_flattened_joint_leaves_the_normal_of_its_plane(method):
+def test_flattened_joint_gives_the_normal_of_its_plane(method):
     found = sphere_on([matrix(np.diag([1.0, 0.0, 2.0])), np.eye(4)], [(0, 1.0)], method)
     assert_allclose(np.abs(found), np.tile([0.0, 1.0, 0.0], (200, 1)), atol=1e-15)
     assert (np.sign(found[:, 1]) == np.sign(DIRECTIONS[:, 1])).all()
@@ -151,7 +151,7 @@ def test_palettes_of_several_poses_are_judged_one_by_one():
 
 
 @pytest.mark.parametrize("blend_factor", [0.0, 0.3, 1.0])
-def test_mixed_normals_are_those_of_the_surface_that_is_mixed(blend_factor):
+def test_blended_normals_match_the_blended_surface(blend_factor):
     """With equal weights everywhere, each method maps the sphere linearly, and so does the mixture.
 
     Its matrix is found by moving the three unit vectors; the ellipsoid A p has normals A^-T p.

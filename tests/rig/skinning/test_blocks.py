@@ -40,7 +40,7 @@ def random_palette(seed, n_joints):
 @pytest.mark.parametrize(
     ("n_vertices", "n_joints"), [(1, 1), (5, 3), (255, 4), (256, 9), (257, 9), (700, 40)]
 )
-def test_blocks_give_the_plain_sum(n_vertices, n_joints):
+def test_blocks_match_the_direct_sum(n_vertices, n_joints):
     influences, skin = random_skin(n_vertices, n_vertices, n_joints)
     rng = np.random.default_rng(1)
     positions, normals = rng.normal(size=(2, n_vertices, 3))
@@ -140,7 +140,7 @@ def poses_of(figure, count):
     [Skinning(), Skinning(normalize=True), Skinning(max_influences=2)],
     ids=["stored", "normalized", "limited"],
 )
-def test_many_frames_are_the_single_poses(count, correctives, skinning):
+def test_many_frames_match_single_poses(count, correctives, skinning):
     figure = animated(correctives)
     poses = poses_of(figure, count)
     expected = [deform(figure, pose, skinning)[0] for pose in poses]
@@ -165,7 +165,7 @@ def test_many_frames_need_poses_a_skin_and_linear_blending():
         assert str(caught.value) == message
 
 
-def test_place_of_the_figure_comes_after_raw_weights():
+def test_placement_is_applied_after_raw_weights():
     # Weights sum to 0.5: halfway to the origin, then scaled by 2, then moved by 1 along x.
     bones = skeleton([-1], [(0, "z", 0.0)])
     skin = skin_from_lists([[(0, 0.5)]], np.eye(4)[None])
@@ -179,7 +179,7 @@ def test_place_of_the_figure_comes_after_raw_weights():
     assert deform(figure, pose)[1].tolist() == [[0, 0, 1]]
 
 
-def test_joint_matrices_include_shape_and_place():
+def test_joint_matrices_include_shape_and_placement():
     figure = animated()
     pose = poses_of(figure, 1)[0]
     pose.dofs[:] = 0.0

@@ -96,7 +96,7 @@ def test_twist_keeps_the_radius_where_linear_blending_collapses(degrees):
         assert np.hypot(*linear[1:]) == pytest.approx(np.cos(angle / 2))
 
 
-def test_half_a_turn_keeps_the_radius():
+def test_half_turn_keeps_the_radius():
     palette = [np.eye(4), matrix(np.diag([1.0, -1.0, -1.0]))]
     for point in ((0.3, 1.0, 0.0), (0.0, 0.6, 0.8)):
         moved, _ = move(point, [(0, 0.5), (1, 0.5)], palette)
@@ -124,7 +124,7 @@ def middle_screw(first, second):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_equal_weights_of_two_joints_meet_half_way_along_the_screw(seed):
+def test_equal_weights_meet_halfway_along_the_screw(seed):
     rng = np.random.default_rng(seed)
     first, second = random_rigid(rng, 2)
     point = rng.normal(size=3)
@@ -146,7 +146,7 @@ def test_result_does_not_depend_on_the_origin():
 
 
 @pytest.mark.parametrize("angle", [2.0, 3.0, 3.5, 5.0, 6.2])
-def test_turns_take_the_shorter_way(angle):
+def test_rotations_take_the_shorter_arc(angle):
     """Joints at angle and angle + 0.4: the mean is angle + 0.2, regardless of the sign of w."""
     palette = [matrix(turn_y(angle)), matrix(turn_y(angle + 0.4))]
     for pairs in ([(0, 0.5), (1, 0.5)], [(1, 0.5), (0, 0.5)]):
@@ -154,7 +154,7 @@ def test_turns_take_the_shorter_way(angle):
         assert_allclose(moved, turn_y(angle + 0.2) @ [1, 2, 3], atol=ROUNDING)
 
 
-def test_chain_turned_by_more_than_half_a_turn_blends_across_its_last_joint():
+def test_chain_rotated_by_more_than_a_half_turn_blends_across_its_last_joint():
     # Ten joints of 50 degrees each: 450 and 500 degrees meet at 475.
     bones = skeleton([-1, *range(9)], [(joint, "z", np.radians(50)) for joint in range(10)])
     skin = bound([[(8, 0.5), (9, 0.5)]], 10)
@@ -163,7 +163,7 @@ def test_chain_turned_by_more_than_half_a_turn_blends_across_its_last_joint():
     assert_allclose(deform(figure, method="dqs")[0][0], expected, atol=ROUNDING)
 
 
-def test_side_is_that_of_the_strongest_influence():
+def test_hemisphere_is_that_of_the_strongest_influence():
     # 0, 100 and 200 degrees about z, most at 100: 0 and 200 both differ by less than 180.
     angles = np.radians([0.0, 100.0, 200.0])
     palette = [matrix(turn_z(angle)) for angle in angles]
@@ -201,7 +201,7 @@ def test_joint_listed_twice_adds_up():
 
 
 @pytest.mark.parametrize("pairs", [[], [(0, 0.0)], [(0, 1.0), (1, -1.0)], [(0, 0.5), (0, -0.5)]])
-def test_vertex_that_nothing_moves_or_all_cancels_stays(pairs):
+def test_vertex_without_influence_or_with_cancelling_weights_stays(pairs):
     moved, turned = move((1, 2, 3), pairs, RIGID)
     assert moved.tolist() == [1, 2, 3]
     assert_allclose(turned, [0.6, 0, 0.8], atol=ROUNDING)
@@ -241,7 +241,7 @@ def test_mix_is_the_straight_line_between_both(blend_factor):
     assert_allclose(normals, between, atol=1e-13)
 
 
-def test_mix_takes_half_of_each_unless_told_otherwise():
+def test_mix_defaults_to_half_of_each():
     palette = [np.eye(4), matrix(turn_x(np.pi / 2))]
     moved, _ = move((0, 1, 0), [(0, 0.5), (1, 0.5)], palette, mix)
     # LBS gives (0, 1/2, 1/2), DQS a point on the circle at 45 degrees.

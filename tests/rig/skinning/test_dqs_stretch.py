@@ -95,7 +95,7 @@ def test_scale_and_twist_keep_the_scaled_radius():
     assert_allclose(moved[0], 2.0 * turn_x(angle / 2) @ points[0], atol=1e-14)
 
 
-def test_stretch_of_a_turned_joint_is_blended_before_the_turn():
+def test_stretch_of_a_rotated_joint_is_blended_before_the_rotation():
     """Kavan 2008, 4.2: (sum w S) in binding space, then the blended rigid motion."""
     stretches = [np.diag([2.0, 1.0, 1.0]), np.diag([1.0, 1.0, 3.0])]
     turns = [turn_y(0.4), turn_y(1.2)]
@@ -106,7 +106,7 @@ def test_stretch_of_a_turned_joint_is_blended_before_the_turn():
     assert_allclose(moved, expected, atol=1e-13)
 
 
-def test_binding_with_scale_and_shear_is_part_of_the_map():
+def test_bind_matrix_with_scale_and_shear_is_part_of_the_map():
     """Only the product M counts: a sheared binding cancelled by the pose changes nothing."""
     rng = np.random.default_rng(3)
     bind = np.tile(np.eye(4), (3, 1, 1))

@@ -60,13 +60,13 @@ def test_one_influence_is_a_rigid_motion(joint):
     assert_allclose(normals[0], RIGID[joint][:3, :3] @ [0.6, 0, 0.8], atol=1e-15)
 
 
-def test_two_influences_meet_in_between():
+def test_two_influences_give_the_weighted_mean():
     # Moved by +2 and by -1 along x with weights 3/4 and 1/4: 1 + 1.5 - 0.25.
     palette = np.array([matrix(None, (2, 0, 0)), matrix(None, (-1, 0, 0)), np.eye(4)])
     assert skinned([(0, 0.75), (1, 0.25)], palette)[0].tolist() == [[2.25, 2, 3]]
 
 
-def test_half_a_turn_collapses_to_the_axis():
+def test_half_turn_collapses_to_the_axis():
     palette = np.array([np.eye(4), matrix(np.diag([-1.0, -1.0, 1.0])), np.eye(4)])
     assert skinned([(0, 0.5), (1, 0.5)], palette)[0].tolist() == [[0, 0, 3]]
 
@@ -90,13 +90,13 @@ def test_joint_listed_twice_adds_up():
 
 
 @pytest.mark.parametrize("pairs", [[], [(0, 0.0)], [(0, 0.0), (1, 0.0)]])
-def test_vertex_that_nothing_moves_stays(pairs):
+def test_vertex_without_influence_stays(pairs):
     positions, normals = skinned(pairs)
     assert positions.tolist() == [[1, 2, 3]]
     assert_allclose(normals, [[0.6, 0, 0.8]], atol=1e-15)
 
 
-def test_vertices_without_influence_at_either_end_do_not_disturb_the_others():
+def test_vertices_without_influence_at_either_end_do_not_affect_the_others():
     skin = skin_from_lists([[], [(0, 1.0)], [], [], [(1, 1.0)], []], np.tile(np.eye(4), (3, 1, 1)))
     blended = blended_matrices(skin, PALETTE)
     for vertex, expected in enumerate([2, 0, 2, 2, 1, 2]):
@@ -108,7 +108,7 @@ def test_mesh_without_any_influence_stays():
     assert skin_mesh(POINT, skin, PALETTE)[0].tolist() == [[1, 2, 3]]
 
 
-def test_thousands_of_influences_all_count():
+def test_all_of_thousands_of_influences_count():
     # 2,500 of joint 0 and 2,500 of joint 1, 1/4096 each: exact sums of 0.6103515625 of each matrix.
     pairs = [(number % 2, 1 / 4096) for number in range(5000)]
     positions, _ = skinned(pairs)
@@ -119,7 +119,7 @@ def test_thousands_of_influences_all_count():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_deform_equals_the_plain_sum(seed):
+def test_deform_matches_the_direct_sum(seed):
     figure, influences = random_figure(seed)
     from viewer.rig.kinematics import world_matrices
 
@@ -137,11 +137,11 @@ def test_normals_are_unit(seed):
     assert_allclose(lengths, 1.0, atol=1e-15)
 
 
-def test_unit_leaves_zero_alone():
+def test_unit_keeps_zero_vectors():
     assert unit(np.array([[0.0, 0, 0], [0, -3, 0]])).tolist() == [[0, 0, 0], [0, -1, 0]]
 
 
-def test_deform_without_skeleton_returns_the_binding_space():
+def test_deform_without_skeleton_returns_the_bind_pose():
     figure = Figure("a", mesh=mesh([[1, 2, 3]], [[0, 0, 5.0]]))
     positions, normals = deform(figure)
     assert (positions.tolist(), normals.tolist()) == ([[1, 2, 3]], [[0, 0, 1]])
@@ -149,7 +149,7 @@ def test_deform_without_skeleton_returns_the_binding_space():
     assert figure.mesh.positions.tolist() == [[1, 2, 3]]
 
 
-def test_deform_without_pose_takes_the_rest_pose():
+def test_deform_without_pose_uses_the_rest_pose():
     figure, _ = random_figure(1)
     assert np.array_equal(deform(figure)[0], deform(figure, rest_pose(figure.skeleton))[0])
 

@@ -37,18 +37,18 @@ def test_strongest_come_first_and_ties_keep_their_order():
     ]
 
 
-def test_limit_keeps_the_strongest_and_scales_them_to_one():
+def test_limit_keeps_the_strongest_and_normalises_them():
     cut = limit_influences(skin([(0, 0.125), (1, 0.5), (2, 0.25), (3, 0.125)]), 2)
     assert rows(cut) == [[(1, 0.5 / 0.75), (2, 0.25 / 0.75)]]
 
 
-def test_influences_of_one_joint_are_added_up_before_the_cut():
+def test_influences_of_one_joint_are_added_up_before_pruning():
     # Joint 4 holds 0.25 + 0.25: more than joint 1's 0.375 alone.
     cut = limit_influences(skin([(4, 0.25), (1, 0.375), (4, 0.25), (0, 0.125)]), 1)
     assert rows(cut) == [[(4, 1.0)]]
 
 
-def test_limit_leaves_vertices_with_fewer_influences_alone_but_for_their_sum():
+def test_limit_only_normalises_vertices_with_fewer_influences():
     cut = limit_influences(skin([(2, 0.5)], [], [(0, 0.25), (1, 0.25)]), 4)
     assert rows(cut) == [[(2, 1.0)], [], [(0, 0.5), (1, 0.5)]]
 
@@ -60,7 +60,7 @@ def test_limit_keeps_bindings_and_the_number_of_vertices():
     assert np.array_equal(cut.inverse_bind, bind)
 
 
-def test_weights_without_a_sum_cannot_be_scaled():
+def test_weights_summing_to_zero_cannot_be_normalised():
     cancelled = skin([(0, 1.0), (1, -1.0)], [(2, 0.0)], [])
     assert rows(normalized(cancelled)) == rows(cancelled)
 
@@ -74,7 +74,7 @@ def test_normalized_weights_sum_to_one():
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 7, 100])
-def test_limit_is_what_a_plain_loop_gives(count):
+def test_limit_matches_a_plain_loop(count):
     rng = np.random.default_rng(count)
     influences = [
         [(int(rng.integers(6)), float(rng.uniform(0.01, 1))) for _ in range(rng.integers(0, 9))]
@@ -103,12 +103,12 @@ def test_entries_in_any_order_become_rows_that_keep_theirs():
     assert rows(built) == [[(1, 0.2), (4, 0.5)], [], [(5, 0.1), (0, 0.3)], [(2, 0.4)]]
 
 
-def test_skin_as_stored_is_used_itself():
+def test_unmodified_skin_is_used_as_is():
     stored = skin([(0, 0.5)])
     assert skin_used(stored, Skinning()) is stored
 
 
-def test_cut_and_scaled_skins_are_made_once():
+def test_limited_and_normalised_skins_are_cached():
     stored = skin([(0, 0.5), (1, 0.125)])
     assert rows(skin_used(stored, Skinning(normalize=True))) == [[(0, 0.8), (1, 0.2)]]
     assert rows(skin_used(stored, Skinning(max_influences=1))) == [[(0, 1.0)]]

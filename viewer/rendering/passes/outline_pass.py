@@ -15,7 +15,7 @@ from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.outlined import Outlined
-from viewer.rendering.overlay.segments import Manner, SegmentPass, dots
+from viewer.rendering.overlay.segments import SegmentPass, SegmentStyle, dots
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
@@ -156,7 +156,7 @@ class OutlinePass:
         mask = (0.0, 1.0, 0.0, 1.0) if one.is_hovered else (1.0, 0.0, 0.0, 1.0)
         if len(one.points):
             marks = dots(one.points, np.array(mask), picture_scale(size) * _POINT)
-            self._segments.draw(marks, view, size, Manner(on_top=True))
+            self._segments.draw(marks, view, size, SegmentStyle(on_top=True))
             return
         if not actor.is_drawn:
             return
