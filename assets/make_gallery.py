@@ -16,7 +16,7 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from gallery_generator.inputs import make_inputs
-from gallery_generator.page import page
+from gallery_generator.page import file_name, page
 from gallery_generator.pictures import PAPER, PICTURES
 from gallery_generator.saturation import MOST, saturated_fraction
 
@@ -44,7 +44,7 @@ def main(names: list[str]) -> int:
             paper = tuple(round(255 * channel) for channel in parse_color(PAPER))
             burnt = saturated_fraction(pixels, paper, PICTURES[name].has_data)
             faults += burnt > MOST
-            path = _HERE / "pictures" / f"gallery_{name}.png"
+            path = _HERE / "pictures" / file_name(name)
             path.write_bytes(_small(pixels))
             total += path.stat().st_size
             sys.stdout.write(
@@ -62,9 +62,9 @@ def main(names: list[str]) -> int:
 def _small(pixels: np.ndarray) -> bytes:
     """Return a picture as a PNG of 256 colours."""
     picture = Image.fromarray(pixels).convert("RGB")
-    picture = picture.quantize(
-        _COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG
-    )
+    palette = picture.quantize(_COLORS, Image.Quantize.MEDIANCUT)
+    # Pillow dithers only towards a given palette.
+    picture = picture.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
     stream = io.BytesIO()
     picture.save(stream, "PNG", optimize=True)
     return stream.getvalue()

@@ -27,7 +27,7 @@ def write_images(folder: Path, scene: Scene, frames: range, rate: float, numbers
 
     ``frames`` is all frames of the capture, ``numbers`` those to write.
     """
-    options = DisplayOptions(background="#aeb3ad", grid=True, quality="normal")
+    options = DisplayOptions(background="#d3d5d0", grid=True, quality="normal")
     for number in numbers:
         pose_actors(scene.actors, (number - frames.start) / rate)
         for view in scene.views:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gallery_generator.pictures import PICTURES
 
-__all__ = ["page"]
+__all__ = ["file_name", "page"]
 
 _HEAD = """<!-- Written by assets/make_gallery.py: make gallery -->
 
@@ -17,12 +17,17 @@ bundled body; `assets/gallery_generator/` makes them.
 """
 
 
+def file_name(name: str) -> str:
+    """Return the file of a picture; that of the window is also the README's."""
+    return "window.png" if name == "window" else f"gallery_{name}.png"
+
+
 def page() -> str:
     """Return the page as Markdown."""
     parts = [_HEAD]
     for name, picture in PICTURES.items():
         parts.append(f"\n## {picture.title}\n\n{picture.text}\n")
-        parts.append(f"\n![{picture.title}](../../assets/pictures/gallery_{name}.png)\n")
+        parts.append(f"\n![{picture.title}](../../assets/pictures/{file_name(name)})\n")
         if picture.commands:
             lines = "\n".join(_wrapped(command) for command in picture.commands)
             parts.append(f"\n```sh\n{lines}\n```\n")

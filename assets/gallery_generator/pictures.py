@@ -24,7 +24,7 @@ from viewer.rig.skin import limit_influences
 __all__ = ["PICTURES", "Picture"]
 
 PAPER = "#e9ebee"
-_OPTIONS = f"--quality final --background {PAPER}"
+_OPTIONS = f"--quality final --background '{PAPER}'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +76,11 @@ def _draw_finding() -> Bytes:
     _lower_arms(actor)
     scene = Scene([actor])
     finding = next(f for f in lint_scene(scene) if f.code in ("W004", "W005"))
-    options = _options(wireframe=True, grid=False)
+    options = _options(grid=False)
     places = places_of(finding, scene, options.skinning)
     points = scene_points(scene)
     camera = Camera(azimuth=25.0, inclination=12.0)
-    fit(camera, points[points[:, 1] > -0.1], 1.6)
+    fit(camera, points[points[:, 1] > -0.4], 1.6)
     with Offscreen() as offscreen:
         vertices = places.vertices
         offscreen.renderer.marks = Marks(vertices, np.full(len(vertices), 3.0))
@@ -148,6 +148,12 @@ def _bend(actor: Actor) -> None:
 
 
 PICTURES: dict[str, Picture] = {
+    "window": Picture(
+        "The window",
+        "The bundled fox with its panels, drawn without a display.",
+        ("viewer render --panels --size 1280x760",),
+        has_data=True,
+    ),
     "fox": Picture(
         "The bundled fox",
         "Final quality: soft shadows, ambient occlusion, smooth edges.",
@@ -165,8 +171,8 @@ PICTURES: dict[str, Picture] = {
         "A contact sheet",
         "The same walk in cells with frame numbers, at one scale and with one ground line.",
         (
-            "viewer render walk --model body.npz --contact-sheet 8 --frames 0:34 --azimuth -75 "
-            f"--inclination 6 {_OPTIONS} --quality normal --size 1000x330",
+            "viewer render walk --model body.npz --contact-sheet 6 --frames 0:28 --azimuth -75 "
+            f"--inclination 6 {_OPTIONS} --size 900x270",
         ),
     ),
     "capture": Picture(
@@ -174,7 +180,7 @@ PICTURES: dict[str, Picture] = {
         "Two people fitted to keypoints, and the calibrated cameras with their images.",
         (
             f"viewer render capture --model body.npz --up y --frame {IMAGE} --cameras --azimuth 35 "
-            f"--inclination 18 {_OPTIONS} --size 900x560",
+            f"--inclination 18 {_OPTIONS} --size 760x460",
         ),
     ),
     "view": Picture(
@@ -201,7 +207,7 @@ PICTURES: dict[str, Picture] = {
     "scan": Picture(
         "A mesh without a rig",
         "A person of another shape, as a scanner leaves it.",
-        (f"viewer render scan.obj --wireframe --azimuth 30 {_OPTIONS} --size 420x560",),
+        (f"viewer render scan.obj --azimuth 30 {_OPTIONS} --size 420x560",),
     ),
     "rigged": Picture(
         "The same mesh, rigged",

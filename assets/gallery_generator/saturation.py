@@ -29,7 +29,10 @@ def saturated_fraction(
         Whether colours show numbers: the last colour of the colour map has one full channel, so
         only two count.
     """
-    colors = pixels[..., :3].reshape(-1, 3)
+    white = (pixels[..., :3] == 255).all(axis=2)
+    # Gutters of contact sheets are white from side to side.
+    kept = pixels[~white.all(axis=1)][:, ~white.all(axis=0)]
+    colors = kept[..., :3].reshape(-1, 3)
     if background is not None:
         colors = colors[(colors != np.array(background)).any(axis=1)]
     full = (colors == 255).sum(axis=1) > has_data

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.phrases import printable
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
-from viewer.rendering.overlay.segments import SegmentStyle, Segments
+from viewer.rendering.overlay.segments import Segments, SegmentStyle
 from viewer.rendering.pinhole import picture_size
 from viewer.rendering.projection import picture_scale
 from viewer.rig.arrays import Floats
