@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from gallery_generator.pictures import PICTURES
+import textwrap
+
+from gallery_generator.pictures import COMMON, PICTURES
 
 __all__ = ["file_name", "page"]
 
@@ -10,11 +12,12 @@ _HEAD = """<!-- Written by assets/make_gallery.py: make gallery -->
 
 # Gallery
 
-Pictures from bundled data alone, and the commands that drew them (without `-o FILE`). `make
-gallery` draws them again, and fails if 0.1 % of the pixels are burnt or black. `walk` and `capture`
-are synthetic recordings in EasyMocap's layout, `scan.obj` a person without a rig, `body.npz` the
-bundled body; `assets/gallery_generator/` makes them.
+Pictures from bundled data alone, and the commands that drew them, with the options
+`{common}`. `make gallery` draws them again, and
+fails if 0.1 % of the pixels are burnt or black. `walk` and `capture` are synthetic recordings in EasyMocap's layout, `scan.obj` a person without a rig,
+`body.npz` the bundled body; `assets/gallery_generator/` makes them.
 """
+_WIDTH = 96
 
 
 def file_name(name: str) -> str:
@@ -24,24 +27,14 @@ def file_name(name: str) -> str:
 
 def page() -> str:
     """Return the page as Markdown."""
-    parts = [_HEAD]
+    parts = [_HEAD.format(common=COMMON)]
     for name, picture in PICTURES.items():
-        parts.append(f"\n## {picture.title}\n\n{picture.text}\n")
+        text = textwrap.fill(picture.text, _WIDTH)
+        parts.append(f"\n## {picture.title}\n\n{text}\n")
         parts.append(f"\n![{picture.title}](../../assets/pictures/{file_name(name)})\n")
         if picture.commands:
-            lines = "\n".join(_wrapped(command) for command in picture.commands)
+            lines = "\n".join([*picture.commands[:-1], f"{picture.commands[-1]} -o {name}.png"])
             parts.append(f"\n```sh\n{lines}\n```\n")
         else:
             parts.append("\nDrawn with Python: `assets/gallery_generator/pictures.py`.\n")
     return "".join(parts)
-
-
-def _wrapped(command: str) -> str:
-    """Return a command on lines of at most 96 characters."""
-    lines, line = [], ""
-    for word in command.split():
-        if len(line) + len(word) > 94:
-            lines.append(f"{line} \\")
-            line = "   "
-        line = f"{line} {word}" if line else word
-    return "\n".join([*lines, line])

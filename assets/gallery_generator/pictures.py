@@ -21,10 +21,10 @@ from viewer.rig.arrays import Bytes
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 from viewer.rig.skin import limit_influences
 
-__all__ = ["PICTURES", "Picture"]
+__all__ = ["COMMON", "PAPER", "PICTURES", "Picture"]
 
 PAPER = "#e9ebee"
-_OPTIONS = f"--quality final --background '{PAPER}'"
+COMMON = f"--quality final --background '{PAPER}'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,12 @@ class Picture:
     title, text : str
         Heading and description in the manual.
     commands : tuple of str
-        Commands that draw it, the last one without its output; empty if Python draws it.
+        Commands that draw it, the last one without output, size and ``COMMON`` options; empty if
+        Python draws it.
     draw : callable or None
         Draws it otherwise.
+    size : (int, int)
+        Width and height, pixels.
     has_data : bool
         Whether its colours show numbers.
     """
@@ -47,6 +50,7 @@ class Picture:
     text: str
     commands: tuple[str, ...] = ()
     draw: Callable[[], Bytes] | None = None
+    size: tuple[int, int] = (800, 500)
     has_data: bool = False
 
     def pixels(self, folder: Path) -> Bytes:
@@ -56,10 +60,12 @@ class Picture:
         from viewer.cli import run
 
         output = folder / "picture.png"
+        common = [] if "--panels" in self.commands[-1] else shlex.split(COMMON)
+        size = "x".join(map(str, self.size))
+        last = ["-o", str(output), "--size", size, *common]
         for number, command in enumerate(self.commands, start=1):
-            words = shlex.split(command)[1:]
-            last = ["-o", str(output), "--force"] if number == len(self.commands) else ["--force"]
-            status = run([*words, *last])
+            more = last if number == len(self.commands) else []
+            status = run([*shlex.split(command)[1:], *more, "--force"])
             if status:
                 raise SystemExit(f"{command}: exit code {status}")
         return decode_picture(output, output.read_bytes())
@@ -151,46 +157,39 @@ PICTURES: dict[str, Picture] = {
     "window": Picture(
         "The window",
         "The bundled fox with its panels, drawn without a display.",
-        ("viewer render --panels --size 1280x760",),
+        ("viewer render --panels",),
+        size=(1280, 760),
         has_data=True,
     ),
     "fox": Picture(
         "The bundled fox",
         "Final quality: soft shadows, ambient occlusion, smooth edges.",
-        (f"viewer render {_OPTIONS} --size 800x500",),
+        ("viewer render",),
     ),
     "walk": Picture(
         "A motion in one picture",
         "Six poses of a walk, evenly spaced; earlier ones are fainter, and so are their shadows.",
-        (
-            "viewer render walk --model body.npz --onion 6 --azimuth -72 --inclination 8 "
-            f"{_OPTIONS} --size 800x460",
-        ),
+        ("viewer render walk --model body.npz --onion 6 --azimuth -72 --inclination 8",),
+        size=(800, 460),
     ),
     "sheet": Picture(
         "A contact sheet",
         "The same walk in cells with frame numbers, at one scale and with one ground line.",
-        (
-            "viewer render walk --model body.npz --contact-sheet 6 --frames 0:28 --azimuth -75 "
-            f"--inclination 6 {_OPTIONS} --size 900x270",
-        ),
+        ("viewer render walk --model body.npz --contact-sheet 6 --frames 0:28 --azimuth -75",),
+        size=(900, 270),
     ),
     "capture": Picture(
         "A capture",
         "Two people fitted to keypoints, and the calibrated cameras with their images.",
-        (
-            f"viewer render capture --model body.npz --up y --frame {IMAGE} --cameras --azimuth 35 "
-            f"--inclination 18 {_OPTIONS} --size 760x460",
-        ),
+        (f"viewer render capture --model body.npz --frame {IMAGE} --cameras --azimuth 35",),
+        size=(760, 460),
     ),
     "view": Picture(
         "Through a camera",
         "The same frame through camera 02: its image, without the lens distortion, dimmed behind "
         "the fitted bodies.",
-        (
-            f"viewer render capture --model body.npz --up y --frame {IMAGE} --view 02 --xray "
-            f"{_OPTIONS} --size 800x450",
-        ),
+        (f"viewer render capture --model body.npz --frame {IMAGE} --view 02 --xray",),
+        size=(800, 450),
     ),
     "knee": Picture(
         "The weights of a joint",
@@ -203,21 +202,22 @@ PICTURES: dict[str, Picture] = {
         "Vertices of the forearm without weights stay where the skin was bound. Lint names them; "
         "the Lint panel marks them in the view.",
         draw=_draw_finding,
+        has_data=True,
     ),
     "scan": Picture(
         "A mesh without a rig",
         "A person of another shape, as a scanner leaves it.",
-        (f"viewer render scan.obj --azimuth 30 {_OPTIONS} --size 420x560",),
+        ("viewer render scan.obj",),
+        size=(420, 560),
     ),
     "rigged": Picture(
         "The same mesh, rigged",
         "With the skeleton and the weights of the bundled body, in a pose of its own.",
         (
             "viewer rig scan.obj --from body -o scan.npz",
-            "viewer render scan.npz --show both --dof left_shoulder.z=-30deg "
-            "--dof right_shoulder.z=50deg --dof right_elbow.y=80deg --dof left_hip.x=-50deg "
-            f"--dof left_knee.x=70deg --azimuth 30 {_OPTIONS} --size 420x560",
+            "viewer render scan.npz --show both --dof left_hip.x=-50deg --dof left_knee.x=70deg",
         ),
+        size=(420, 560),
     ),
     "influences": Picture(
         "13 influences against 4",
