@@ -1,5 +1,5 @@
 #version 330
-// A single triangle that covers the whole picture.
+// A single triangle that covers the whole image.
 
 out float v_height;     // 0 at the bottom, 1 at the top
 

@@ -1,5 +1,6 @@
 #version 330
-// One axis of a separable Gaussian blur of two fields of darkness. The first axis makes them of depths.
+// One axis of a separable Gaussian blur of two fields of darkness. The first pass converts depths
+// to them.
 
 in vec2 v_place;
 
@@ -11,7 +12,7 @@ uniform float u_near;       // height at which contact ends
 uniform vec2 u_narrow;      // standard deviations of the blurs, widths of the field
 uniform vec2 u_wide;
 
-out vec2 f_darkness;        // by contact, and by what is farther above
+out vec2 f_darkness;        // by contact, and by occluders farther above
 
 const int REACH = 8;        // samples to either side, over two and a half deviations
 

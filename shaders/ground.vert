@@ -3,7 +3,7 @@
 
 in vec2 in_corner;      // -1 or 1
 
-uniform mat4 u_model_view;  // ground space (x right, y up the picture seen from above) to camera
+uniform mat4 u_model_view;  // ground space (x right, y up in the image seen from above) to camera
 uniform mat4 u_projection;
 uniform float u_extent;     // half the side length of the square, scene units
 

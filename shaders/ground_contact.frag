@@ -1,9 +1,10 @@
 #version 330
-// Contact shadows on the ground: black with an opacity, so that they also lie on no background.
+// Contact shadows on the ground: black with an opacity, so that they also show on a transparent
+// background.
 
 in vec2 v_place;            // of the field
 
-uniform sampler2D u_field;  // darkness by contact, and by what is farther above
+uniform sampler2D u_field;  // darkness by contact, and by occluders farther above
 uniform vec2 u_opacity;     // of both
 
 out vec4 f_color;           // sRGB, premultiplied by alpha

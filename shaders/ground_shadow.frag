@@ -1,5 +1,6 @@
 #version 330
-// The key light's shadow on the ground: black with an opacity, so that it also lies on no background.
+// The key light's shadow on the ground: black with an opacity, so that it also shows on a
+// transparent background.
 
 #pragma include shadow
 

@@ -1,12 +1,12 @@
 #version 330
 // One rectangle of a texture per instance, drawn at its size in pixels.
 
-in vec2 in_corner;          // per instance: top left corner in the picture, pixels
+in vec2 in_corner;          // per instance: top left corner in the image, pixels
 in vec2 in_source;          // top left corner in the texture, texels
 in vec2 in_extent;          // width and height, pixels
 in vec3 in_color;           // sRGB colour of the letters
 
-uniform vec2 u_picture;     // size of the picture, pixels
+uniform vec2 u_picture;     // size of the image, pixels
 
 out vec2 v_pixel;           // texel coordinates
 flat out vec3 v_color;

@@ -8,7 +8,7 @@ in vec3 in_color;       // sRGB
 
 uniform mat4 u_model_view;
 uniform mat4 u_projection;
-uniform vec2 u_size;    // of the picture, pixels
+uniform vec2 u_size;    // of the image, pixels
 uniform float u_width;  // of the line, pixels
 
 out vec3 v_color;       // sRGB
@@ -30,7 +30,7 @@ void main() {
     way = dot(way, way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
     float side = gl_VertexID % 2 == 0 ? -1.0 : 1.0;
     vec4 place = at_end ? end : start;
-    // Half a width to each side; the picture is 2 units wide in normalized device coordinates.
+    // Half a width to each side; the image is 2 units wide in normalized device coordinates.
     place.xy += u_width / u_size * side * vec2(-way.y, way.x) * place.w;
     gl_Position = place;
     v_time = at_end ? in_times.y : in_times.x;

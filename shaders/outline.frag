@@ -7,7 +7,9 @@ uniform int u_reach;            // pixels
 uniform float u_width;          // of the coloured line, pixels
 uniform vec3 u_colors[2];       // sRGB, selected and hovered
 
-out vec4 f_color;               // sRGB, premultiplied by alpha
+uniform bool u_straight;        // do not multiply by alpha
+
+out vec4 f_color;               // sRGB, premultiplied by alpha unless u_straight
 
 const vec3 DARK = vec3(0.03, 0.04, 0.06);
 
@@ -36,4 +38,5 @@ void main() {
     if (f_color.a == 0.0) {
         discard;
     }
+    f_color.rgb /= u_straight ? f_color.a : 1.0;
 }

@@ -1,9 +1,9 @@
 #version 330
-// A rectangle of the picture, drawn at its size in pixels.
+// A rectangle of the image, drawn at its size in pixels.
 
 uniform vec2 u_place;       // lower left corner, pixels
 uniform vec2 u_extent;      // width and height, pixels
-uniform vec2 u_picture;     // of the picture, pixels
+uniform vec2 u_picture;     // of the image, pixels
 
 out vec2 v_pixel;           // from the lower left corner
 

@@ -9,7 +9,7 @@ in float in_width;      // pixels
 
 uniform mat4 u_model_view;
 uniform mat4 u_projection;
-uniform vec2 u_size;        // of the picture, pixels
+uniform vec2 u_size;        // of the image, pixels
 uniform float u_border;     // width of the border, pixels
 uniform float u_lift;       // fraction of the distance to the eye by which it is moved forward
 uniform float u_height;     // the same for parallel projections, scene units

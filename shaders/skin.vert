@@ -4,7 +4,7 @@
 #pragma include normals
 #pragma include skinning
 
-uniform bool u_attached;    // false: leave the vertex in its binding space
+uniform bool u_attached;    // false: leave the vertex in its bind pose
 uniform vec3 u_rest_shift;  // rest centre minus posed centre
 uniform vec3 u_center;      // posed centre, figure space
 

@@ -45,7 +45,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The folder of real files of the course, if it lies beside the checkout."""
+    """The folder of real .skel and .skin files, if it is next to the checkout."""
     if not SHARED.is_dir():
         pytest.skip(f"no real files in {SHARED}")
     return SHARED
@@ -53,7 +53,7 @@ def shared() -> Path:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """The folder of all real and large files, if it lies beside the checkout."""
+    """The folder of all real and large files, if it is next to the checkout."""
     if not SHARED_DATA.is_dir():
         pytest.skip(f"no real files in {SHARED_DATA}")
     return SHARED_DATA

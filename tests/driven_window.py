@@ -1,4 +1,4 @@
-"""The real window as hands see it: xdotool moves the mouse, pictures of the screen are compared."""
+"""The real window driven by xdotool; screenshots are compared."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _ask_to_close(display, window):
 
 
 class Window:
-    """A running viewer, its window, and a hand on its mouse and keys."""
+    """A running viewer, its window, mouse and keyboard."""
 
     def __init__(self, display, folder, arguments):
         self.display, self.folder = display, folder

@@ -264,7 +264,7 @@ def test_missing_file_suggests_the_nearest_name(tmp_path):
 def test_folder_is_refused(tmp_path):
     wanted = (
         "expected a file, a folder of PIG tables or a folder of EasyMocap frames, "
-        "found another folder"
+        "found an unrecognised folder"
     )
     assert refusal(tmp_path) == f"{tmp_path}: {wanted}"
     assert refusal("") == f".: {wanted}"
@@ -371,8 +371,8 @@ def test_warnings_of_all_files_are_gathered(files, tmp_path):
     first.write_text("balljoint a { foo }")
     second.write_text("balljoint b {\nbar }")
     assert viewer.load(first, second).warnings == (
-        f'{first}:1: skipped unknown "foo"',
-        f'{second}:2: skipped unknown "bar"',
+        f'{first}:1: skipped unknown keyword "foo"',
+        f'{second}:2: skipped unknown keyword "bar"',
     )
 
 

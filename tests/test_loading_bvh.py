@@ -169,11 +169,11 @@ def test_a_model_that_does_not_fit_is_refused(bvh, tmp_path):
     with pytest.raises(RigError) as caught:
         load(path, motion=MotionSettings(model=bundled_body()))
     message = str(caught.value)
-    assert message.startswith(f"{path}: walk does not fit body: expected hips and a leg or an arm")
+    assert message.startswith(f"{path}: walk does not match body: expected hips and a leg or")
     assert message.endswith("(--model selects the model)")
     with pytest.raises(FormatError) as wrong:
         load(path, motion=MotionSettings(model=path))
-    assert str(wrong.value) == f"{path}: --model: expected a body model, found another file"
+    assert str(wrong.value) == f"{path}: --model: not a body model"
 
 
 def test_option_beside_skips_the_model_with_a_note(bvh):

@@ -237,7 +237,7 @@ def test_morph_alone_and_morph_of_another_skin_are_refused(tmp_path):
     with pytest.raises(RigError, match=r"open it together with its \.skin"):
         load(morph)
     skel, skin = write_rig(tmp_path)
-    with pytest.raises(RigError, match="vertex index 99999 is outside"):
+    with pytest.raises(RigError, match="vertex index 99999 is out of range"):
         load(skel, skin, morph)
 
 

@@ -2,7 +2,7 @@
 
 >>> import viewer
 >>> scene = viewer.load()                                  # the bundled figure
->>> picture = viewer.render(scene, size=(320, 240))
+>>> image = viewer.render(scene, size=(320, 240))
 >>> picture.shape
 (240, 320, 4)
 

@@ -53,7 +53,7 @@ class ViewerError(Exception):
 
     @property
     def cause(self) -> str | Diagnostic:
-        """The fault as data if it is known, else the line: a value for another diagnostic."""
+        """The diagnostic as data if there is one, else the line: a value for another diagnostic."""
         return self.diagnostic or str(self)
 
     def _line(self, problem: str | Diagnostic) -> str:
@@ -86,7 +86,7 @@ class FormatError(ViewerError):
 
 
 class UnsupportedFormatError(ViewerError):
-    """There is no reader or writer for this kind of file."""
+    """There is no reader or writer for this file format."""
 
     def _line(self, problem: str | Diagnostic) -> str:
         return printable(problem, _LONGEST)

@@ -73,7 +73,7 @@ def save_model_folder(folder: str | Path) -> Path:
     except OSError as problem:
         raise OutputError(f"{printable(_settings_file(), 300)}: {problem.strerror}") from None
     text = json.dumps({"folder": str(path.resolve())}, indent=1)
-    with deferred():  # signals raise again afterwards, because this is not a result
+    with deferred():  # deferred signals are re-raised: this is a setting, not output
         save_bytes(_settings_file(), text.encode("utf-8", "replace"))
     return path
 
@@ -102,7 +102,7 @@ def known_models(folder: Path) -> dict[str, Path]:
 
 def _files(folder: Path) -> list[Path]:
     paths, looked = [], 0
-    # The setting may be any text, and Path.is_dir() raises for some texts.
+    # The setting may be any string, and Path.is_dir() raises for some strings.
     if not os.path.isdir(folder):  # noqa: PTH112
         return []
     for root, folders, names in os.walk(folder):
@@ -123,7 +123,7 @@ def _name_of(path: Path) -> str | None:
     """Return ``kind:variant`` of a published file name, None for others."""
     stem, above = path.stem.lower(), path.parent.name.lower()
     if stem == "model" and above in _SEX and path.parent.parent.name.lower() == "smplh":
-        return f"smplh:{_SEX[above]}"  # the folders that AMASS tells users to unpack it to
+        return f"smplh:{_SEX[above]}"  # the folder layout given in AMASS's instructions
     for pattern, kind in _PUBLISHED:
         match = re.fullmatch(pattern, stem)
         if match:

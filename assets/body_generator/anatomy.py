@@ -10,7 +10,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Bulge:
-    """Displacement of the skin around a point when a joint bends, in metres at a right angle.
+    """Displacement of the skin around a point when a joint bends, in metres, at a 90 degree bend.
 
     It grows with 1 - cos of the angle, and only if the bend about ``about`` is positive.
     """
@@ -139,8 +139,8 @@ def samples(bend: Bend, count: int, seed: int) -> Floats:
                 row[axis] = part * limit[axis]
                 rows.append(row)
     spread = np.random.default_rng(seed).uniform(0, 1, (count, 3))
-    # Full bends about all axes at once are implausible: samples stay in a ball in units of the
-    # limits.
+    # Full bends about all axes at once are implausible: samples stay inside the unit ball after
+    # division by the limits.
     mixed = np.where(spread < 0.5, (1 - 2 * spread) * low, (2 * spread - 1) * high)
     unit = mixed / np.maximum(np.where(mixed < 0, -low, high), 1)
     mixed /= np.maximum(np.linalg.norm(unit, axis=1, keepdims=True), 1)

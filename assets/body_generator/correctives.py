@@ -30,7 +30,7 @@ STRAIGHT = 0.2  # minimum length of the sum of two unit vectors at a joint that 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """The rest figure: vertices, weights, mirror partners and smoothing matrix (V, V)."""
+    """The rest figure: vertices, weights, mirror counterparts and smoothing matrix (V, V)."""
 
     vertices: Floats
     weights: Floats

@@ -38,7 +38,7 @@ def rounded_rows(matrix: Floats) -> np.ndarray:
 
 
 def rounded_texcoords(coordinates: Floats) -> np.ndarray:
-    """Round texture coordinates to quarters of a texel of a 4096 picture."""
+    """Round texture coordinates to quarters of a texel of a 4096-pixel image."""
     return (np.round(coordinates * TEXCOORD_LEVELS) / TEXCOORD_LEVELS).astype(np.float32)
 
 

@@ -47,7 +47,7 @@ def _other(name: str) -> str:
     return f"{swapped[side]}_{rest}" if side in swapped else name
 
 
-# Each joint's partner on the other side; a middle joint is its own partner.
+# Each joint's mirror counterpart; a middle joint is its own.
 PARTNERS = np.array([NAMES.index(_other(name)) for name in NAMES])
 
 

@@ -88,7 +88,7 @@ def regress(vertices: Floats, partner: np.ndarray, shapes: Floats, moved: Floats
     ----------
     vertices : (V, 3)
     partner : (V,)
-        Mirror partner of each vertex.
+        Mirror counterpart of each vertex.
     shapes : (V, 3, S)
         Shape directions.
     moved : (24, 3, S)

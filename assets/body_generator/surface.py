@@ -62,7 +62,7 @@ def _grid() -> list[Floats]:
 
 
 def model() -> tuple[Floats, np.ndarray, np.ndarray]:
-    """Return vertices (V, 3), triangles (F, 3) and the mirror partner of each vertex (V,)."""
+    """Return vertices (V, 3), triangles (F, 3) and the mirror counterpart of each vertex (V,)."""
     half, triangles = drop_unused(*polygonise(distance, _grid()))
     half, triangles = remesh(half, triangles, wanted_length, project)
     vertices, triangles, source = mirror(half, triangles)

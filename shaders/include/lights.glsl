@@ -1,4 +1,4 @@
-// The lights of the scene, for every shading that is lit by them.
+// The lights of the scene, for all lit shading modes.
 
 uniform vec3 u_light_directions[2];  // key and rim: towards each light, unit length, camera space
 uniform vec3 u_light_colors[2];      // linear, times strength

@@ -13,7 +13,8 @@ vec4 base_color() {
     return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);
 }
 #else
-const int BASE = 0, METALLIC = 1, ROUGHNESS = 2, NORMAL = 3, OCCLUSION = 4, EMISSIVE = 5;
+const int BASE_MAP = 0, METALLIC_MAP = 1, ROUGHNESS_MAP = 2;
+const int NORMAL_MAP = 3, OCCLUSION_MAP = 4, EMISSIVE_MAP = 5;
 
 in vec2 v_second_uv;
 
@@ -34,7 +35,7 @@ vec2 place(int map) {
 vec4 base_color() {
     vec4 color = u_has_base_factor ? u_base_factor : vec4(v_color, 1.0);
     if (u_textured)
-        color = u_base_factor * texture(u_texture, place(BASE));
+        color = u_base_factor * texture(u_texture, place(BASE_MAP));
     return color;
 }
 
@@ -55,7 +56,7 @@ float surface_alpha() {
 vec3 mapped_normal(vec3 position, vec3 normal) {
     if (u_normal_scale == 0.0)
         return normal;
-    vec2 uv = place(NORMAL);
+    vec2 uv = place(NORMAL_MAP);
     vec3 mapped = 2.0 * texture(u_normal_map, uv).xyz - 1.0;
     vec3 across = cross(dFdy(position), normal), up = cross(normal, dFdx(position));
     vec2 right_uv = dFdx(uv), up_uv = dFdy(uv);

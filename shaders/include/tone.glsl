@@ -2,8 +2,8 @@
 
 // Khronos PBR Neutral (github.com/KhronosGroup/ToneMapping): colours up to 0.8 stay as they are,
 // brighter ones approach 1 and fade towards white, so that nothing saturates and no hue shifts. The
-// curve's toe is left out: it takes away the 4 % that glossy surfaces reflect of a white room, and
-// would blacken what reflects none.
+// curve's toe is omitted: it removes the 4 % that glossy surfaces reflect in a white room, and
+// would blacken surfaces without that reflection.
 vec3 toned(vec3 color) {
     const float start = 0.8, desaturation = 0.15;
     // At the start of the curve all of this is exactly the colour itself.
@@ -14,7 +14,7 @@ vec3 toned(vec3 color) {
 }
 
 // Linear to sRGB, IEC 61966-2-1. The power 1 / 2.4 is a polynomial of the fourth root, within
-// 0.01 of 255 (fitted to the largest error): powers take a tenth of a frame on drivers in software.
+// 0.01 of 255 (fitted to the largest error): powers take a tenth of a frame on software drivers.
 vec3 encode(vec3 color) {
     vec3 root = sqrt(sqrt(color));
     vec3 high = ((0.0813275 * root - 0.3354952) * root + 1.1226759) * root + 0.1961381;

@@ -42,9 +42,9 @@ Surface surface(vec3 base) {
     float metallic = u_metallic, roughness = u_roughness;
 #ifdef MATERIALS
     if (u_has_metallic_map)
-        metallic *= number(u_metallic_map, METALLIC);
+        metallic *= number(u_metallic_map, METALLIC_MAP);
     if (u_has_roughness_map)
-        roughness *= number(u_roughness_map, ROUGHNESS);
+        roughness *= number(u_roughness_map, ROUGHNESS_MAP);
 #endif
     return Surface(base * (1.0 - metallic), mix(vec3(0.04), base, metallic), roughness);
 }
@@ -88,16 +88,18 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     vec3 color = vec3(0.0);
 #ifdef MATERIALS
     if (u_occlusion_map_strength > 0.0)
-        occlusion = mix(1.0, number(u_occlusion_map, OCCLUSION), u_occlusion_map_strength);
+        occlusion = mix(1.0, number(u_occlusion_map, OCCLUSION_MAP), u_occlusion_map_strength);
     color = u_emissive;
     if (u_has_emissive_map)
-        color *= texture(u_emissive_map, place(EMISSIVE)).rgb;
+        color *= texture(u_emissive_map, place(EMISSIVE_MAP)).rgb;
 #endif
     float ambient = ambient_visibility(position.z);
     occlusion *= ambient;
     for (int i = 0; i < 2; ++i) {
         float cosine = max(dot(normal, u_light_directions[i]), 0.0);
-        float seen = visibility(i, position, normal, cosine, ambient);
+        float seen = visibility(i, position, normal, cosine);
+        // Only the key light has a shadow map; occlusion stands for the rim light's shadow.
+        seen *= i == 1 ? mix(1.0, ambient, 0.7) : 1.0;
         color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
         // The studio's key box hangs about where the key light is, and the same things hide it.
         if (i == 0)

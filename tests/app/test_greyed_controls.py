@@ -113,7 +113,7 @@ def test_inapplicable_display_modes_are_greyed(drive, tooltips):
     for label, why in (
         ("Attached skin", "there is no mesh"),
         ("Skeleton", "there is no skeleton"),
-        ("Skin in binding space", "there is no skin attached to a skeleton"),
+        ("Skin in bind pose", "there is no skin attached to a skeleton"),
         ("Wireframe", "there is no mesh"),
     ):
         hand.click(label)

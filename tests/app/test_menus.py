@@ -161,7 +161,7 @@ def test_pose_shortcuts_are_listed_and_shown(box, texts):
     wanted = {
         "M": "mirror the pose left to right",
         "Ctrl+C": "copy the pose",
-        "Ctrl+Shift+C": "copy the pose as the file's own numbers",
+        "Ctrl+Shift+C": "copy the pose as raw pose values",
         "Ctrl+V": "paste a pose",
     }
     assert wanted.items() <= table.items()
@@ -173,7 +173,7 @@ def test_pose_shortcuts_are_listed_and_shown(box, texts):
 
 def test_edit_menu_copies_pastes_mirrors_and_resets(box):
     box.enter_value("joint_1.x", "45")
-    for entry, n_words in (("Copy pose", 0), ("Copy pose as numbers", 9)):
+    for entry, n_words in (("Copy pose", 0), ("Copy pose as raw values", 9)):
         box.menu("menu Edit", entry)
         copied = imgui.get_clipboard_text()
         assert len(copied.split()) == n_words if n_words else json.loads(copied)
@@ -190,7 +190,7 @@ def test_edit_menu_copies_pastes_mirrors_and_resets(box):
 def test_pose_edits_are_greyed_without_a_pose(drive, rig):
     hand = drive(rig[1])
     imgui.set_clipboard_text("kept")
-    for entry in ("Mirror pose", "Copy pose", "Copy pose as numbers", "Paste pose"):
+    for entry in ("Mirror pose", "Copy pose", "Copy pose as raw values", "Paste pose"):
         hand.menu("menu Edit", entry)
         for _ in range(2):
             hand.key("escape")

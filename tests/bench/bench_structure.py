@@ -15,15 +15,12 @@ import viewer
 from viewer.loading import bundled_body
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.outlined import Outlined
 from viewer.rig.scene import Scene, scene_box
 
 SIZE, ROUNDS = (1280, 720), 30
 
 
-def frames(
-    offscreen: Offscreen, scene: Scene, options: DisplayOptions, outlined: tuple[Outlined, ...]
-) -> Callable[[], object]:
+def frames(offscreen: Offscreen, scene: Scene, options: DisplayOptions) -> Callable[[], object]:
     """Return what poses the scene anew, draws it, and waits for the picture."""
     camera, box = default_camera(scene, SIZE), scene_box(scene)
     rng = np.random.default_rng(0)
@@ -31,7 +28,6 @@ def frames(
     def run() -> None:
         pose = scene.actors[0].require_pose()
         pose.dofs[:] = rng.normal(0.0, 0.15, len(pose.dofs))
-        offscreen.renderer.outlines = outlined
         offscreen.render(scene, SIZE, camera, options, box)
 
     return run
@@ -43,12 +39,12 @@ def main() -> None:
     with Offscreen() as offscreen:
         styles = ("boxes", "octahedra", "sticks", "axes")
         work = {
-            style: frames(offscreen, scene, DisplayOptions(show="both", samples=1, bones=style), ())
+            style: frames(offscreen, scene, DisplayOptions(show="both", samples=1, bones=style))
             for style in styles
         }
-        plain = DisplayOptions(samples=1)
-        work["no outline"] = frames(offscreen, scene, plain, ())
-        work["outline of the body"] = frames(offscreen, scene, plain, (Outlined(0),))
+        for name, outline in (("no outline", False), ("outline of the body", True)):
+            options = DisplayOptions(samples=1, outline=outline)
+            work[name] = frames(offscreen, scene, options)
         times = interleaved(work, ROUNDS)
     report("Styles of skeletons", {style: times[style] for style in styles}, ("octahedra", "boxes"))
     pair = ("outline of the body", "no outline")

@@ -240,7 +240,7 @@ def test_existing_file_is_replaced_only_with_force(tmp_path, capsys):
     out = tmp_path / "out.obj"
     out.write_text("precious")
     assert run(["convert", *rig, "-o", str(out)]) == 5
-    assert capsys.readouterr().err == f"viewer: {out}: exists already (--force replaces it)\n"
+    assert capsys.readouterr().err == f"viewer: {out}: already exists (--force replaces it)\n"
     assert out.read_text() == "precious"
     assert run(["convert", *rig, "-o", str(out), "--force"]) == 0
     assert len(read_obj(out).v) == 3
@@ -252,7 +252,7 @@ def test_either_file_of_a_rig_is_replaced_only_with_force(tmp_path, beside, caps
     (tmp_path / f"out{beside}").write_text("precious")
     assert run(["convert", *rig, "-o", str(tmp_path / "out.skel")]) == 5
     assert capsys.readouterr().err == (
-        f"viewer: {tmp_path / f'out{beside}'}: exists already (--force replaces it)\n"
+        f"viewer: {tmp_path / f'out{beside}'}: already exists (--force replaces it)\n"
     )
     assert (tmp_path / f"out{beside}").read_text() == "precious"
 
@@ -266,7 +266,7 @@ def test_input_is_never_replaced(tmp_path, capsys):
     for out in ("smpl.npz", "link.npz", "pose.npz"):
         arguments = [path, "--pose", str(pose), "-o", str(tmp_path / out), "--force"]
         assert run(["convert", *arguments]) == 5
-        assert "is an input file, which is never replaced" in capsys.readouterr().err
+        assert "input files are never overwritten" in capsys.readouterr().err
     assert (tmp_path / "smpl.npz").read_bytes() == kept
     rig = write_twist(tmp_path)
     assert run(["convert", rig[1], rig[0], "-o", str(tmp_path / "twist.skin"), "--force"]) == 5
@@ -291,7 +291,7 @@ def test_existing_numbered_file_stops_before_any_is_written(tmp_path, capsys):
     (tmp_path / "out-2.obj").write_text("precious")
     rigs = [*write_twist(tmp_path, "a"), *write_twist(tmp_path, "b")]
     assert run(["convert", *rigs, "-o", str(tmp_path / "out.obj")]) == 5
-    assert "out-2.obj: exists already" in capsys.readouterr().err
+    assert "out-2.obj: already exists" in capsys.readouterr().err
     assert not (tmp_path / "out.obj").exists()
     assert (tmp_path / "out-2.obj").read_text() == "precious"
 

@@ -118,9 +118,9 @@ def test_easymocap_folder_is_written_and_inputs_never_replaced(recording, tmp_pa
     assert [path.name for path in frames] == [f"{n:06}.json" for n in range(5)]
     assert [record["id"] for record in json.loads(frames[2].read_text())] == [0]
     assert convert(*recording, "-o", tmp_path / "again") == 5
-    assert "exists already (--force replaces it)" in capsys.readouterr().err
+    assert "already exists (--force replaces it)" in capsys.readouterr().err
     assert convert(*recording, "-o", tmp_path / "take", "--force") == 5
-    assert "is an input folder, which is never replaced" in capsys.readouterr().err
+    assert "input folders are never overwritten" in capsys.readouterr().err
     assert (
         convert(tmp_path / "take" / "smpl", *recording[1:], "-o", tmp_path / "take", "--force") == 5
     )

@@ -28,6 +28,7 @@ def draw(tmp_path):
 
     def draw_with(*options):
         words = ["render", str(skel), "-o", str(out), "--force", "--size", "64x48", *options]
+        words += ["--quality", "normal"]  # as the library draws without options
         assert run(words) == 0
         return np.array(Image.open(out).convert("RGBA"))
 

@@ -56,4 +56,4 @@ def test_missing_joints_are_reported(render, rig):
     assert "warning: --xray: no figure has a skeleton\n" in said
     assert "warning: --joint-names: no figure has a skeleton\n" in said
     _, said = render(*rig, "--joint-axes", "--show", "binding")
-    assert said == "warning: --joint-axes: there are no joints in binding space\n"
+    assert said == "warning: --joint-axes: no joints are shown in the bind pose\n"

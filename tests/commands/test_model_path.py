@@ -219,7 +219,7 @@ def test_named_model_is_an_input_and_never_replaced(folder, capsys):
     first = ["convert", "mano:left", "--model-path", str(folder), "--force", "-o", str(target)]
     for arguments in (first, ["convert", "mano:left", "--force", "-o", str(target)]):
         line = refused(capsys, *arguments, code=5)
-        assert line == f"viewer: {target}: is an input file, which is never replaced"
+        assert line == f"viewer: {target}: input files are never overwritten"
     assert target.read_bytes() == before
 
 

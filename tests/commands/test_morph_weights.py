@@ -91,7 +91,7 @@ def test_names_of_a_body_opened_with_a_morphed_rig(folder):
         (
             ("sharp.morph", "sub/sharp.morph", *RIG[:2]),
             "sharp=1",
-            '2 shapes are called "sharp"; numbers without names set all in order',
+            '2 shapes are called "sharp"; numbers without names set all shapes in order',
         ),
     ],
 )

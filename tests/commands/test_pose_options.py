@@ -126,7 +126,7 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
         ("arms.skel --hands flat", "--hands: no file has hand components"),
         (
             "lopsided.skel --mirror",
-            "--mirror: left has no partner on the other side: the skeleton is not symmetric",
+            "--mirror: left has no mirror counterpart: the skeleton is not symmetric",
         ),
     ],
 )

@@ -327,7 +327,7 @@ def test_image_with_a_wrong_suffix_is_refused(rig, tmp_path, suffix, capsys):
     out.write_text("precious")
     assert run(["render", *map(str, rig), "-o", str(out), "--force"]) == 2
     assert capsys.readouterr().err == (
-        f"viewer: {out}: expected a picture (.png, .jpg, .jpeg, .bmp, .gif, .ppm, .tga, .tif, "
+        f"viewer: {out}: expected an image (.png, .jpg, .jpeg, .bmp, .gif, .ppm, .tga, .tif, "
         f".tiff, .webp) or a video (.mp4, .webm, .gif), found {suffix}\n"
     )
     assert out.read_text() == "precious"

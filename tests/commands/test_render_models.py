@@ -17,6 +17,7 @@ from viewer.rig.scalars import SCALARS
 pytestmark = pytest.mark.slow
 
 PLAIN = ["--background", "transparent", "--no-grid", "--samples", "1", "--size", "96x96"]
+QUICK = ["--quality", "draft", "--force"]
 SIDE = ["--orthographic", "--inclination", "0"]
 
 
@@ -26,7 +27,7 @@ def draw(tmp_path):
 
     def picture(*arguments):
         out = tmp_path / "drawn.png"
-        assert run(["render", *map(str, arguments), *PLAIN, "-o", str(out), "--force"]) == 0
+        assert run(["render", *map(str, arguments), *PLAIN, "-o", str(out), *QUICK]) == 0
         return np.array(Image.open(out).convert("RGBA")).astype(int)
 
     return picture

@@ -132,7 +132,7 @@ def test_gif_at_a_high_rate_reports_its_effective_rate(draw, walk, tmp_path):
 
 def test_transparent_videos(draw, fox, tmp_path):
     said = draw(fox, "x.mp4", "--background", "transparent", "--no-grid")
-    shown = f"{tmp_path / 'x.mp4'}: this format has no transparency; drawn on black"
+    shown = f"{tmp_path / 'x.mp4'}: this format has no transparency; composited on black"
     assert said.err == f"warning: {shown}\n"
     assert frames(tmp_path / "x.mp4")[0][0, 0].max() <= 3
     said = draw(fox, "x.webm", "--background", "transparent", "--no-grid")

@@ -273,9 +273,7 @@ def test_the_target_is_never_replaced(folder, capsys):
     target = folder / "scan.obj"
     before = target.read_bytes()
     assert run(["rig", str(target), "-o", str(folder / "scan.skel"), "--force"]) == 5
-    assert capsys.readouterr().err == (
-        f"viewer: {target}: is an input file, which is never replaced\n"
-    )
+    assert capsys.readouterr().err == (f"viewer: {target}: input files are never overwritten\n")
     assert target.read_bytes() == before
 
 
@@ -283,7 +281,7 @@ def test_existing_files_are_kept_without_force(folder, tmp_path, capsys):
     (tmp_path / "x.json").write_text("mine")
     assert run(["rig", str(folder / "scan.obj"), "-o", str(tmp_path / "x.skel")]) == 5
     assert capsys.readouterr().err == (
-        f"viewer: {tmp_path / 'x.json'}: exists already (--force replaces it)\n"
+        f"viewer: {tmp_path / 'x.json'}: already exists (--force replaces it)\n"
     )
 
 

@@ -68,7 +68,7 @@ def check_command(command: list[str], inputs: Inputs, folder: Path, refuse) -> N
     for name in written_by(command, folder):
         target = folder / name
         target.write_bytes(b"precious")
-        refuse(command, f"{target}: exists already")
+        refuse(command, f"{target}: already exists")
         assert contents(folder) == {name: b"precious"}
         target.unlink()
         target.mkdir()
@@ -107,10 +107,10 @@ def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
     for suffix in (".skel", ".skin", ".obj", ".json"):
         target = folder / f"r{suffix}"
         target.write_bytes(b"precious")
-        refuse(command, f"{target}: exists already")
+        refuse(command, f"{target}: already exists")
         assert contents(folder) == {target.name: b"precious"}
         target.unlink()
-        # The mesh's own picture is read, though nobody named it.
+        # The mesh's own texture is read without being named.
         for path in (*inputs.of_roof[:2], mesh.with_name("mesh_0.png")):
             target.symlink_to(path)
             refuse([*command, "--force"], f"{target}: is an input file")
@@ -147,7 +147,7 @@ def test_missing_folder_is_refused_before_anything(inputs, folder, refuse):
 def test_one_existing_frame_stops_the_whole_sequence(inputs, folder, refuse):
     (folder / "w_002.obj").write_bytes(b"precious")
     command = into(folder, converting(inputs)["a motion as w_{frame:03}.obj"])
-    refuse(command, f"{folder}/w_002.obj: exists already")
+    refuse(command, f"{folder}/w_002.obj: already exists")
     assert contents(folder) == {"w_002.obj": b"precious"}
     assert run([*command, "--force"]) == 0
     assert sorted(contents(folder)) == [f"w_00{frame}.obj" for frame in range(3)]
@@ -173,7 +173,7 @@ def test_folder_of_frames_is_an_input(inputs, folder, refuse):
     (folder / "file").write_bytes(b"precious")
     refuse([*command, f"{folder}/file"], f"{folder}/file: expected a folder")
     assert run([*command, f"{folder}/new"]) == 0
-    refuse([*command, f"{folder}/new"], f"{folder}/new/smpl: exists already")
+    refuse([*command, f"{folder}/new"], f"{folder}/new/smpl: already exists")
 
 
 def test_other_textures_of_a_skin_are_kept(inputs, folder, refuse):

@@ -1,4 +1,4 @@
-"""Progress, tables and colours: what a terminal shows and what a pipe gets."""
+"""Progress, tables and colours at a terminal and in a pipe."""
 
 import io
 

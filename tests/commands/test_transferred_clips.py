@@ -1,4 +1,4 @@
-"""``viewer rig --clip``: the template's motions for the mesh that got its rig."""
+"""``viewer rig --clip``: transfer of the template's motions to the rigged mesh."""
 
 from __future__ import annotations
 
@@ -87,5 +87,5 @@ def test_existing_clip_is_not_replaced(folder, tmp_path, capsys):
     out = tmp_path / "cat.npz"
     (tmp_path / "cat-walk.anim").write_text("mine")
     assert rig(folder, "-o", out, "--clip", folder / "walk.anim") == 5
-    assert "cat-walk.anim: exists already (--force replaces it)" in capsys.readouterr().err
+    assert "cat-walk.anim: already exists (--force replaces it)" in capsys.readouterr().err
     assert not out.exists()

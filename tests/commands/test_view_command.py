@@ -1,4 +1,4 @@
-"""``viewer FILES`` without a display: one line, a picture in the current folder, exit code 0."""
+"""``viewer FILES`` without a display: one line, an image in the current folder, exit code 0."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def test_without_display_the_figure_is_rendered_to_a_new_file(tmp_path, monkeypa
         assert captured.err == ""
         assert len(list(folder.iterdir())) == number + 1
     picture = np.array(Image.open(folder / "tiny.png").convert("RGBA"))
-    assert (picture == viewer.render(viewer.load(*rig), (1280, 720))).all()
+    options = viewer.DisplayOptions(quality="final")
+    assert (picture == viewer.render(viewer.load(*rig), (1280, 720), options=options)).all()
 
 
 def test_without_display_and_files_the_fox_is_rendered(tmp_path, monkeypatch, capsys):

@@ -1,4 +1,4 @@
-"""Every way of writing on a disk that is full: at each write, and at each fill level."""
+"""Every kind of output on a full disk: failing at each write and at each fill level."""
 
 from __future__ import annotations
 

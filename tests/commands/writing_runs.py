@@ -1,4 +1,4 @@
-"""Commands that write files, one for each way of writing, and what they read."""
+"""Commands that write files, one per kind of output, and their inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every message renders, and every call gives the values that its template shows."""
+"""Every message renders, and every call supplies the values of its template."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Animations for BVH exports, and joints of the file as a second reader finds them."""
+"""Animations for BVH exports, and joint positions by an independent reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Animations of made-up bodies of the SMPL family, and the plain formulas for what they show."""
+"""Animations of synthetic bodies of the SMPL family, and direct formulas for their results."""
 
 from __future__ import annotations
 

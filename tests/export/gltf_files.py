@@ -1,4 +1,4 @@
-"""Write glTF files, and hold what a program would draw to the float64 reference."""
+"""Write glTF files, and compare the rendered result with the float64 reference."""
 
 import faults
 import numpy as np

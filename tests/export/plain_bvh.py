@@ -70,7 +70,7 @@ class PlainBvh:
         return [float(number) for number in numbers]
 
     def places(self, frame: int) -> dict[str, list[float]]:
-        """Return where every joint is."""
+        """Return the position of every joint."""
         return {name: place for name, (_, place) in self.joints(frame).items()}
 
     def joints(self, frame: int) -> dict[str, tuple[list[list[float]], list[float]]]:

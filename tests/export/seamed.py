@@ -1,4 +1,4 @@
-"""A figure that has everything an exporter meets: seams, two materials, joints, raw weights."""
+"""A figure with every feature that exporters handle: seams, two materials, joints, raw weights."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small figures as text files for the command line, each with something to work out by hand."""
+"""Small figures as text files for the command line, with hand-calculated results."""
 
 from __future__ import annotations
 

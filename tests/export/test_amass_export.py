@@ -1,4 +1,4 @@
-"""Motions as AMASS: what smplx makes of the file is what the figure showed."""
+"""AMASS export: smplx reproduces the motion of the figure."""
 
 import faults
 import numpy as np

@@ -1,4 +1,4 @@
-"""Motions as .anim: the clip itself, or keys per frame with a measured error."""
+""".anim export: the clip itself, or keys per frame with a measured error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The search for the farthest vertex: bounds that hold, and the result of looking at everything."""
+"""The search for the farthest vertex: valid bounds, and agreement with brute force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What exporters say is lost between frames of keyed curves: the maximum over all times."""
+"""Reported losses between frames of keyed curves: the maximum over all times."""
 
 from __future__ import annotations
 

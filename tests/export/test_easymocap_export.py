@@ -1,4 +1,4 @@
-"""Motions as EasyMocap folders: formulas, round trips through AMASS, gaps, people, faults."""
+"""EasyMocap export: formulas, round trips through AMASS, gaps, people, errors."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The BVH writer against a second reader, for bodies, course rigs and whatever else moves."""
+"""The BVH writer against an independent reader, for bodies, .skel-style rigs and other figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Posed arrays as ``.npz``: what is in them, for a program that knows nothing of the viewer."""
+"""Posed arrays as ``.npz``: contents for programs other than the viewer."""
 
 import zipfile
 

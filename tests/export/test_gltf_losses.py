@@ -1,4 +1,4 @@
-"""Influences in glTF files, and what the exporter says of that which the format cannot hold."""
+"""Influences in glTF files, and reported losses of what the format cannot hold."""
 
 from dataclasses import replace
 

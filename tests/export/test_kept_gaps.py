@@ -1,4 +1,4 @@
-"""Missing frames in formats that can leave them out: they stay missing unless filling is asked."""
+"""Missing frames in formats that can leave them out: they stay missing unless filled on request."""
 
 import json
 

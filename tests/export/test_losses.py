@@ -1,4 +1,4 @@
-"""What exporters say is lost: the true maximum over all frames, joints and vertices, or nothing."""
+"""Reported export losses: the true maximum over all frames, joints and vertices, or nothing."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def test_material_libraries_come_back(tmp_path):
     wanted = replace(everything(), alpha_mode="blend", unlit=False, emissive=(0.0, 3.0, 1.5))
     notes = export(textured(wanted), tmp_path / "out.obj")
     (lost,) = (note for note in notes if note.key == "X003.parts")
-    assert (lost.values["format"], [part.name for part in lost.values["parts"]]) == (
+    assert (lost.values["format"], [part.key for part in lost.values["parts"]]) == (
         ".mtl",
         [
             "part-occlusion",

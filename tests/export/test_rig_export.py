@@ -1,4 +1,4 @@
-"""Any figure as ``.skel`` and ``.skin``: read back, it stands as it stood, or the error is told."""
+"""Any figure as ``.skel`` and ``.skin``: it round-trips, or the error is reported."""
 
 import re
 from dataclasses import replace

@@ -47,7 +47,7 @@ channel { extrapolate constant constant keys 3 {
 def gone_on(
     module: Any, text: str, name: str
 ) -> tuple[Any, list[tuple[Fault, int, str, list[int]]]]:
-    """Return the contents read despite faults, and each fault with its count, part and places."""
+    """Return the contents, and each recovered error with its count, part and locations."""
     source = Source(name, text.encode(), diagnostics=Collector(keeps_errors=True))
     content = module.read(source)
     faults = [

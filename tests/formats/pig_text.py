@@ -40,7 +40,7 @@ GOOD = {**CORE, **MORE}
 
 
 def write(folder, files=GOOD, **changes):
-    """Write a folder anew; a change is a file's new text, bytes, or None to leave it out."""
+    """Rewrite a folder; a change is a file's new text, bytes, or None to leave it out."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for name, text in {**files, **{f"{key}.txt": text for key, text in changes.items()}}.items():

@@ -129,7 +129,7 @@ def test_damage_by_text_mode_transfer_is_named(protocol: int) -> None:
 
 def test_text_that_is_not_a_pickle() -> None:
     line = refused(opened, b"positions 4 {\n", "x.pkl")
-    assert line == ("F002.archive", None, {"found": "something else"})
+    assert line == ("F002.archive", None, {"found": "an unknown format"})
 
 
 def test_single_array(tmp_path: Path) -> None:

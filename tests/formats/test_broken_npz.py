@@ -1,4 +1,4 @@
-"""Archives that lie about themselves or are damaged: refused in one line, in little memory."""
+"""Archives with false headers or damage: refused in one line, in little memory."""
 
 from __future__ import annotations
 

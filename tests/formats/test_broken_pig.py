@@ -305,7 +305,7 @@ def test_truncated_pickle_is_refused(tmp_path, cut):
     [
         (b"\x80\x02]q\x01.", ("a.pkl", "F002.pickle-named", None, {"found": Phrase("noun-other",
          kind="list")})),
-        (b"vertices", ("a.pkl", "F002.archive", None, {"found": "something else"})),
+        (b"vertices", ("a.pkl", "F002.archive", None, {"found": "an unknown format"})),
         (b"", ("a.pkl", "F002.archive", None, {"found": "an empty file"})),
         (b"<!doctype html>", ("a.pkl", "F002.archive", None,
          {"found": "HTML or XML (a failed download?)"})),

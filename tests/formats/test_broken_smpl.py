@@ -229,7 +229,7 @@ def test_broken_extra_is_refused_with_its_key(refusal, change, message):
          {"found": "HTML or XML (a failed download?)"})),
         (b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 39001280\n",
          ("F002.archive-pointer", {})),
-        (b"Please sign the licence first.\n", ("F002.archive", {"found": "something else"})),
+        (b"Please sign the licence first.\n", ("F002.archive", {"found": "an unknown format"})),
         (b"", ("F002.archive", {"found": "an empty file"})),
         (b"\x1f\x8b\x08\0\0\0\0\0", ("F002.archive", {"found": "gzip data"})),
         (b"\0" * 5000, ("F002.archive", {"found": "zeros"})),

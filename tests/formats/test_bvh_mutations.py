@@ -1,4 +1,4 @@
-"""BVH files that are mutated, cut or have a word put in: a motion or one line."""
+"""Mutated or truncated BVH files, or with inserted words: a motion or one line."""
 
 from __future__ import annotations
 

@@ -323,7 +323,7 @@ def test_one_hand_with_a_coco_body(tmp_path):
         (1, 38, 4),
     )
     assert layout.names[17:19] == ("right_hand_wrist", "right_thumb1")
-    # The hand grows from the body's right wrist, number 10 of coco.
+    # The hand attaches to the body's right wrist, COCO keypoint 10.
     assert [10, 18] in layout.limbs.tolist()
 
 

@@ -214,7 +214,7 @@ def test_two_images_are_not_chosen_from(folder):
     for name in ("a.png", "b.jpg"):
         save_image(folder / name, RED)
     scene = viewer.load(folder)
-    assert scene.warnings == (f"{folder}: 2 pictures in the folder: specify the texture to show",)
+    assert scene.warnings == (f"{folder}: 2 images in the folder: specify the texture to show",)
     assert scene.actors[0].figure.mesh.materials == ()
 
 

@@ -122,10 +122,10 @@ def test_same_pose_gives_the_same_bytes(figures, tmp_path):
 
 def test_writer_refuses_invalid_poses(figures, tmp_path):
     with pytest.raises(
-        UnsupportedFormatError, match=r"^\.json holds a pose, not a figure or clip$"
+        UnsupportedFormatError, match=r"^\.json stores a pose, not a figure or clip$"
     ):
         viewer.write(figures["smpl"], tmp_path / "a.json")
-    with pytest.raises(UnsupportedFormatError, match="has no numbers of its own to write"):
+    with pytest.raises(UnsupportedFormatError, match="has no raw pose vector to write"):
         viewer.write(PoseRecord(dofs={"a.x": 1.0}), tmp_path / "a.txt")
     assert not list(tmp_path.iterdir())
 
@@ -206,7 +206,7 @@ def test_body_pose_of_smpl_keeps_the_face_of_smplx(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(parts={"body_pose": waves(69)}), figure, posed)
-    assert lines(notes) == ["2 joints of the pose beyond the body's 21 omitted"]
+    assert lines(notes) == ["2 joints in the pose beyond the body's 21 omitted"]
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
     hands_at_rest = np.where(np.arange(69) < 63, waves(69), 0.0)
     assert apply_record(PoseRecord(parts={"body_pose": hands_at_rest}), figure, posed) == []

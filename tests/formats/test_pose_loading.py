@@ -143,14 +143,14 @@ def test_second_image_is_applied_to_the_second_figure(files):
 def test_image_for_figures_without_texture_coordinates_is_refused(files, names):
     listed = ", ".join(names)
     assert refusal(files["red"], *(files[name] for name in names)) == (
-        f"{files['red']}: cannot apply the picture: {listed} has no texture coordinates"
+        f"{files['red']}: cannot apply the texture image: no texture coordinates in {listed}"
     )
 
 
 def test_image_alone_is_refused(files):
     assert (
         refusal(files["red"])
-        == f"{files['red']}: a picture without a figure: open it together with a figure"
+        == f"{files['red']}: an image without a figure: open it together with a figure"
     )
 
 

@@ -149,8 +149,8 @@ def test_clip_of_a_body_says_why_it_does_not_fit(tmp_path: Path) -> None:
     with pytest.raises(RigError) as caught:
         load(tmp_path / "smpl.npz", tmp_path / "a.anim")
     assert str(caught.value) == (
-        f"{tmp_path / 'a.anim'}: found 72 channels, {tmp_path / 'smpl.npz'} is not a course rig, "
-        "whose clips move the root along x, y, z and rotate each joint about x, y, z: "
+        f"{tmp_path / 'a.anim'}: found 72 channels, {tmp_path / 'smpl.npz'} is not a .skel-style "
+        "rig, in which clips translate the root along x, y, z and rotate each joint about x, y, z: "
         "joint pelvis has DOFs x, y, z"
     )
 

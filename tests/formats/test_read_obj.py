@@ -254,7 +254,7 @@ def test_unsupported_elements_are_reported() -> None:
     text = SQUARE + "f 1 2 3\nl 1 2 3\nl 2 3\np 1\ncstype bezier\ncstype bezier\nvp 0 0\n"
     _, warnings = read(text)
     assert warnings == [
-        'a.obj:9: skipped unknown "cstype"',
+        'a.obj:9: skipped unknown keyword "cstype"',
         "a.obj: 2 lines not drawn",
         "a.obj: 1 point not drawn",
     ]

@@ -95,7 +95,7 @@ def test_mesh_without_skin_round_trips():
 def test_other_images_are_not_replaced(tmp_path):
     (tmp_path / "a.png").write_bytes(b"mine")
     textured = mesh(materials=(Material("", Texture("a.png", np.zeros((1, 1, 4), np.uint8))),))
-    with pytest.raises(OutputError, match=r"a\.png: a different picture exists already"):
+    with pytest.raises(OutputError, match=r"a\.png: a different image already exists"):
         write(Figure("a", textured), tmp_path / "a.skin")
     assert (tmp_path / "a.png").read_bytes() == b"mine"
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]

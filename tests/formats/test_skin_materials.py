@@ -96,7 +96,7 @@ def test_texture_without_texcoords_is_a_warning(folder):
     [
         ("gone.png", "cannot be read: No such file or directory"),
         ("folder", "expected a file, found a folder"),
-        ("text.png", "unsupported or damaged picture"),
+        ("text.png", "unsupported or damaged image"),
         ("new\x1bline.png", "cannot be read: No such file or directory"),
     ],
 )

@@ -34,8 +34,8 @@ def test_missing_files_pass(tmp_path, old):
 
 def test_existing_file_is_refused_even_through_a_link(tmp_path, old):
     (tmp_path / "link").symlink_to("old")
-    assert refused([tmp_path / "a", old]).startswith(f"{old}: exists already")
-    assert refused([tmp_path / "link"]).startswith(f"{tmp_path / 'link'}: exists already")
+    assert refused([tmp_path / "a", old]).startswith(f"{old}: already exists")
+    assert refused([tmp_path / "link"]).startswith(f"{tmp_path / 'link'}: already exists")
 
 
 @pytest.mark.parametrize("make", [Path.symlink_to, Path.hardlink_to])
@@ -43,9 +43,7 @@ def test_input_is_refused_under_any_name(tmp_path, old, make):
     other = tmp_path / "other"
     make(other, old)
     for target, read in ((old, old), (other, old), (old, other)):
-        assert refused([target], [read], True) == (
-            f"{target}: is an input file, which is never replaced"
-        )
+        assert refused([target], [read], True) == (f"{target}: input files are never overwritten")
 
 
 def test_files_in_an_opened_folder_are_inputs(tmp_path):
@@ -110,7 +108,7 @@ def test_existing_folder_needs_force(tmp_path, old):
     target = tmp_path / "out" / "smpl"
     check_folder_target(target, [old], False)
     target.mkdir(parents=True)
-    assert "exists already" in refused(target, [], False, check_folder_target)
+    assert "already exists" in refused(target, [], False, check_folder_target)
     check_folder_target(target, [old], True)
     assert refused(old / "smpl", [], True, check_folder_target).startswith(f"{old}: ")
 

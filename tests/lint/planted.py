@@ -74,7 +74,7 @@ def with_normal(vertex: int, normal: tuple[float, float, float]) -> Figure:
 
 
 def with_island(weights: list[tuple[int, float]]) -> Figure:
-    """Return the column and a tetrahedron beside it, vertices 20 to 23."""
+    """Return the column and a tetrahedron next to it, vertices 20 to 23."""
     figure = column()
     far = np.array([[5.0, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]) + 20

@@ -1,4 +1,4 @@
-"""Sound small figures and motions, for tests that plant one fault in them."""
+"""Small valid figures and motions, for tests that plant one fault in them."""
 
 from __future__ import annotations
 

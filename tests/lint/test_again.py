@@ -1,4 +1,4 @@
-"""An open scene checked with its files: nothing twice, places, and files that are others now."""
+"""Checks of an open scene and its files: no duplicates, locations, and changed files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TEXTS = {
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[Path]:
-    """A rig and a clip with faults that readers mend: they are in no figure any more."""
+    """A rig and a clip with errors that readers repair, so that the figures lack them."""
     for name, text in TEXTS.items():
         (tmp_path / name).write_text(text)
     return [tmp_path / name for name in TEXTS]
@@ -86,7 +86,7 @@ def test_missing_files_are_named(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].unlink()
     again = lint_again(scene, files)
-    assert again.notes == ("a.skin is gone: only what is open was checked",)
+    assert again.notes == ("a.skin is missing: only the open scene was checked",)
     (gone,) = [f for f in again.findings if f.severity == "error" and f.code[0] == "F"]
     assert (gone.code, gone.file) == ("F001", files[1])
     found = {f.code: f for f in again.findings}

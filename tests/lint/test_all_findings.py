@@ -1,4 +1,4 @@
-"""One fault hides no other: files with many faults, each found once and in its line."""
+"""Files with many errors: each is found once, at its line."""
 
 from __future__ import annotations
 

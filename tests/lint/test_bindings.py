@@ -1,4 +1,4 @@
-"""Bind matrices: which are singular, and what is found in spite of one that is."""
+"""Bind matrices: singularity, and other findings despite a singular one."""
 
 from __future__ import annotations
 

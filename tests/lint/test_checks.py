@@ -1,4 +1,4 @@
-"""The registry of checks, their codes, progress, and where findings are in the scene."""
+"""The check registry, lint codes, progress, and scene locations of findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clips of keys are told in the frames of the timeline, however finely they are looked at."""
+"""Findings in keyed clips use timeline frames, whatever the sampling rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cutting influences costs where some joints or vertices cannot be used."""
+"""Influence limit error where some joints or vertices are unusable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What findings are told with: the size of a figure, and the limits that count by default."""
+"""Inputs of findings: figure size and default limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the ground is, and feet that sink into it: made by hand, each with what must be said."""
+"""Ground detection and sinking feet: handmade motions with their expected findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces of which the file lost some triangles: what is not known closes nothing."""
+"""Surfaces with invalid triangles, and whether they count as closed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers in findings, and valid figures close to a fault that have none."""
+"""Values in findings, and valid borderline figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where findings are, as the scene is posed and drawn, and which way what they mark faces."""
+"""Scene locations of findings for posed figures, and their facing directions."""
 
 from __future__ import annotations
 

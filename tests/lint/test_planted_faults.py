@@ -1,4 +1,4 @@
-"""One fault each, planted in a sound figure or motion: its code and its place are found."""
+"""One fault each, planted in a valid figure or motion: its code and location are found."""
 
 from __future__ import annotations
 

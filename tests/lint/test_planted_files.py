@@ -1,4 +1,4 @@
-"""Faults planted in files: those that a reader refuses, and those that it only remarks on."""
+"""Faults planted in files: reader errors and reader warnings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lowest point of a foot, held to the mesh itself, and to joints where there is no mesh."""
+"""The lowest point of a foot, compared with the mesh, or with joints if there is none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sound figures have no errors and no warnings; real faults of real files are listed here."""
+"""Valid figures have no errors or warnings; known faults of real files are listed here."""
 
 from __future__ import annotations
 

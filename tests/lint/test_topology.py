@@ -1,4 +1,4 @@
-"""Components and orientation, held to plain walks over the same graphs."""
+"""Components and orientation, compared with plain graph traversals."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def mouse() -> str:
 
 def codes() -> str:
     rows = [(name, code.severity, code.title, code.hint) for name, code in CODES.items()]
-    return table(("code", "severity", "finding", "cure"), rows)
+    return table(("code", "severity", "finding", "remedy"), rows)
 
 
 def messages() -> str:

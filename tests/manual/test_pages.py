@@ -1,4 +1,4 @@
-"""The manual's pages: complete, up to date, and true in what they tell people to type."""
+"""The manual's pages: complete, up to date, and with working commands."""
 
 from __future__ import annotations
 

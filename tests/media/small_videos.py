@@ -1,4 +1,4 @@
-"""Small pictures for videos, and their frames as another program reads them."""
+"""Small images for videos, and their frames by an independent reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbered pictures and contact sheets."""
+"""Numbered images and contact sheets."""
 
 from __future__ import annotations
 
@@ -57,7 +57,8 @@ def test_finished_images_are_kept_when_the_rest_is_aborted(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("missing/0.png", "does not exist"), ("0.psd", "cannot be written as this")]
+    ("name", "words"),
+    [("missing/0.png", "does not exist"), ("0.psd", "cannot be written in this format")],
 )
 def test_unwritable_image_is_one_line(tmp_path, name, words):
     with pytest.raises(OutputError, match=words):
@@ -124,6 +125,5 @@ def test_cells_that_are_too_small_are_refused(tmp_path):
     with pytest.raises(ViewerError) as caught:
         SheetSink(tmp_path / "sheet.png", (64, 48), range(100))
     assert str(caught.value) == (
-        "contact sheet: 100 frames in 64 x 48 pixels are 5 x 3 each, which is too small to see "
-        "anything"
+        "contact sheet: 100 frames in 64 x 48 pixels are 5 x 3 each, which is too small"
     )

@@ -1,4 +1,4 @@
-"""Videos: colours, sizes, rates and transparency come back; nothing broken is ever left."""
+"""Videos: colours, sizes, rates and transparency round-trip; no partial files remain."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
     pixels[:24, :, 3], pixels[24:, :32, 3] = 0, 128
     wants = suffix == ".mp4"
     sink = VideoSink(path, (64, 48), 25.0, transparent=wants)
-    said = f"{path}: this format has no transparency; drawn on black"
+    said = f"{path}: this format has no transparency; composited on black"
     assert sink.notes == [said] * wants
     write(sink, [pixels])
     frame = decoded(path)[0].astype(int)
@@ -167,15 +167,16 @@ def delays(path: Path) -> list[int]:
     [
         (25.0, [4] * 6, ""),
         (50.0, [2] * 6, ""),
-        (30.0, [3, 4, 3, 3, 4, 3], "frames last 3 or 4 of them, 30 frames per second on average"),
-        (24.0, [4, 4, 4, 5, 4, 4], "frames last 4 or 5 of them, 24 frames per second on average"),
+        (30.0, [3, 4, 3, 3, 4, 3], "frames last 0.03 or 0.04 s, 30 frames per second on average"),
+        (24.0, [4, 4, 4, 5, 4, 4], "frames last 0.04 or 0.05 s, 24 frames per second on average"),
     ],
 )
 def test_gif_delays_are_correct_on_average(tmp_path, rate, wanted, words):
     path = tmp_path / "x.gif"
     sink = VideoSink(path, (64, 48), rate)
     write(sink, [counting(frame) for frame in range(6)])
-    assert sink.notes == ([f"{path}: GIFs count time in 1/100 s; {words}"] if words else [])
+    note = f"{path}: GIF frame delays are multiples of 0.01 s; {words}"
+    assert sink.notes == ([note] if words else [])
     assert delays(path) == wanted
 
 

@@ -1,4 +1,4 @@
-"""Videos that are refused, aborted or do not fit on the disk: nothing broken stays."""
+"""Videos that are refused, aborted or do not fit on the disk: no partial files remain."""
 
 from __future__ import annotations
 

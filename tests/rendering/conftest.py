@@ -1,4 +1,4 @@
-"""Fixtures of the drawing tests."""
+"""Fixtures for rendering tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures made for the drawing tests: random ones with any number of joints, and simple solids."""
+"""Figures for rendering tests: random ones with any number of joints, and simple solids."""
 
 from __future__ import annotations
 

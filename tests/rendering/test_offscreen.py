@@ -33,7 +33,7 @@ def scene() -> Scene:
 
 
 def draw(offscreen: Offscreen, scene: Scene, size=(64, 48), samples=4):
-    options = DisplayOptions(samples=samples)
+    options = DisplayOptions(samples=samples, quality="normal")
     return offscreen.render(scene, size, default_camera(scene, size), options, scene_box(scene))
 
 

@@ -295,6 +295,6 @@ def test_few_frames_are_queued_however_slow_the_sink(offscreen, scene):
 def test_unsupported_size_is_refused(offscreen, scene):
     recording, sink = recording_of(scene), Kept()
     recording.size = (1_000_000, 10)
-    with pytest.raises(ViewerError, match="picture size: expected 1 to"):
+    with pytest.raises(ViewerError, match="image size: expected 1 to"):
         run(offscreen, recording, sink)
     assert sink.ended == ["abort"]

@@ -156,7 +156,7 @@ KEYS = (
     Shortcut(
         (_K.k,),
         "K",
-        "attached skin, or skin in binding space",
+        "posed skin, or skin in bind pose",
         "view.display_actions.toggle_binding",
     ),
     Shortcut((_K.w,), "W", "wireframe", _OPTION, ("wireframe", "Wireframe")),
@@ -206,7 +206,7 @@ KEYS = (
     Shortcut(
         (_CTRL | _SHIFT | _K.c,),
         "Ctrl+Shift+C",
-        "copy the pose as the file's own numbers",
+        "copy the pose as raw pose values",
         "posing.pose_actions.copy_numbers",
     ),
     Shortcut((_CTRL | _K.v,), "Ctrl+V", "paste a pose", "posing.pose_actions.paste_pose"),
@@ -254,7 +254,11 @@ ACTIONS = (
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),
     Action("Pick vertices", "weights.actions.toggle_picking", why="core.reasons.no_mesh"),
-    Action("Vertex under the mouse", "weights.actions.toggle_telling", why="core.reasons.no_mesh"),
+    Action(
+        "Inspect vertex under cursor",
+        "weights.actions.toggle_vertex_info",
+        why="core.reasons.no_mesh",
+    ),
     Action("Reset layout", "shown_panels.reset_layout"),
 )
 """Actions of menus and panels that have no key."""

@@ -38,7 +38,7 @@ from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
 from viewer.app.view.flight import advance_flight
 from viewer.app.view.hovering import draw_hovered_name, hover_joint
-from viewer.app.view.outlines import outlined_parts
+from viewer.app.view.outline_layer import OutlineLayer
 from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
@@ -85,6 +85,7 @@ class Frame:
         self.keeps_recent = keeps_recent
         self.renderer = Renderer(context)
         self.target: Target | None = None
+        self.outlines = OutlineLayer(context)
         self._drawn: object = None
         self._keys = PictureKeys()
         self.pace = Pace()
@@ -201,20 +202,20 @@ class Frame:
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)
-        renderer.outlines = outlined_parts(state)
-        drawn_over = renderer.marks, renderer.ghost, renderer.annotations, renderer.outlines
-        key = self._keys.key(state, size, *drawn_over)
+        key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         self._drawn = key
         # Even if drawing fails, it is retried only after a change.
         step = self.pace.step(key, state.options, time.perf_counter())
         if step is not None:
             self._draw_target(size, step)
         if self.target is not None:
-            picture = imgui.ImTextureRef(self.target.texture.glo)
             corner = (x + size[0] / scale, y + size[1] / scale)
             draw_list = imgui.get_background_draw_list()
-            # Textures have their first row at the bottom.
-            draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
+            outlines = self.outlines.texture(state, renderer, size, key)
+            for texture in filter(None, (self.target.texture, outlines)):
+                picture = imgui.ImTextureRef(texture.glo)
+                # Textures have their first row at the bottom.
+                draw_list.add_image(picture, (x, y), corner, (0.0, 1.0), (1.0, 0.0))
             draw_hovered(state)
             draw_hovered_name(state)
             draw_gizmo(state)
@@ -265,7 +266,7 @@ class Frame:
     def open(self, paths: Sequence[Path]) -> None:
         """Begin to read files; the current scene is shown until they have been read.
 
-        A skin opened while the scene is a lone skeleton, or the reverse, is attached if it fits.
+        A skin opened while the scene is a lone skeleton, or the reverse, is attached if it matches.
         """
         if not paths:
             return
@@ -361,12 +362,12 @@ class Frame:
         state.clock.playing, recording.settings = False, None
 
     def _save_screenshot(self) -> None:
-        """Save a picture of the scene under an unused name in the current folder."""
+        """Save an image of the scene under an unused name in the current folder."""
         try:
             path = free_path(Path.cwd(), self.state.scene.title, ".png")
             save_image(path, self.scene_picture())
             self.state.say(f"Saved {printable(path, 200)}")
-            if "##legend" in self.state.item_rects:  # drawn over the picture, not in it
+            if "##legend" in self.state.item_rects:  # drawn over the image, not in it
                 self.state.say(
                     'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
                 )
@@ -376,12 +377,11 @@ class Frame:
             self.state.error = f"the current folder: {problem.strerror}"
 
     def scene_picture(self) -> Bytes:
-        """Return the last picture of the scene, without panels: (H, W, 4) uint8."""
+        """Return the last image of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
-        if self.renderer.outlines or self.pace.is_unfinished:
-            # Outlines of the window are not part of the scene, and a picture gets all its passes.
-            self.renderer.outlines, options = (), self.state.options
+        if self.pace.is_unfinished:  # a picture gets all its passes
+            options = self.state.options
             self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))
             self.pace.restart()
         return self.target.read()
@@ -393,4 +393,5 @@ class Frame:
                 work.cancel()
         if self.target is not None:
             self.target.release()
+        self.outlines.release()
         self.renderer.release()

@@ -195,7 +195,7 @@ def _draw_edit_menu(state: AppState) -> None:
         new_clip(state)
     if menu_item(state, "Copy pose", "Ctrl+C", why=why):
         copy_pose(state)
-    if menu_item(state, "Copy pose as numbers", "Ctrl+Shift+C", why=why):
+    if menu_item(state, "Copy pose as raw values", "Ctrl+Shift+C", why=why):
         copy_numbers(state)
     if menu_item(state, "Paste pose", "Ctrl+V", why=why):
         paste_pose(state)

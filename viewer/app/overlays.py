@@ -45,7 +45,7 @@ def draw_overlays(state: AppState) -> None:
 def draw_hints(state: AppState) -> None:
     """Draw the hints about the grid's spacing and the list of keys, in a corner of the view.
 
-    Like the picture of the scene they are drawn behind the panels, so they must be drawn after it.
+    Like the image of the scene they are drawn behind the panels, so they must be drawn after it.
     """
     x, y, width, height = state.view_rect
     grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
@@ -154,7 +154,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
 
 
 def _newest(heights: Sequence[float], line: float, room: float) -> int:
-    """Return how many of the last texts fit, leaving room for a line about the hidden ones.
+    """Return how many of the last messages fit, leaving room for a line about the hidden ones.
 
     >>> _newest([10, 10, 10], 10, 30), _newest([10, 10, 10], 10, 29), _newest([10] * 20, 10, 500)
     (3, 1, 8)

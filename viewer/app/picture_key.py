@@ -1,4 +1,4 @@
-"""Key that identifies the picture in the view: the picture is redrawn when the key changes."""
+"""Key that identifies the image in the view: the image is redrawn when the key changes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from viewer.app.core.state import AppState
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.overlay.marks import Marks
 from viewer.rendering.passes.ghost_pass import Ghost
@@ -36,9 +35,8 @@ class PictureKeys:
         marks: Marks | None = None,
         ghost: Ghost | None = None,
         annotations: Sequence[Annotation] = (),
-        outlined: Sequence[Outlined] = (),
     ) -> tuple[object, ...]:
-        """Return everything the picture of the scene depends on.
+        """Return everything the image of the scene depends on.
 
         Parameters
         ----------
@@ -48,8 +46,6 @@ class PictureKeys:
             Width and height in pixels.
         marks, ghost, annotations : Marks or None, Ghost or None, sequence of Annotation
             Drawn over the scene in this frame; compared by identity.
-        outlined : sequence of Outlined
-            Outlined parts of the scene.
         """
         camera, options = state.camera, state.options
         if options != self._options:
@@ -61,7 +57,7 @@ class PictureKeys:
         time = state.scene.time if options.path_joints or shows_images else None
         actors = self._actors(state.scene.actors)
         selected = (state.chosen_actor, state.selected_joint)
-        drawn_over = marks, ghost, *annotations, *(one.key() for one in outlined)
+        drawn_over = marks, ghost, *annotations
         ground = state.box.tobytes()
         return (size, place, lens, ground, self._options, time, actors, selected, drawn_over)
 

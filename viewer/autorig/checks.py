@@ -36,9 +36,9 @@ def newly_outside(
     template : Figure
         With its shape applied.
     pose : Pose
-        Its own.
+        Pose of the template.
     posed : (V, 3)
-        Its posed vertices.
+        Posed vertices of the template.
     target : Mesh
         The mesh that was rigged.
     joints : (J, 3) or None

@@ -40,7 +40,7 @@ def transfer(
     report : callable, optional
         Called with progress; may raise to cancel.
     name : str
-        Of the new figure.
+        Name of the new figure.
 
     Returns
     -------

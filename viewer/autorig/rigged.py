@@ -74,7 +74,7 @@ class Rigged:
 
 
 def with_fields(rigged: Rigged) -> Rigged:
-    """Return the same with scalar fields that show the certainty of each vertex.
+    """Return a copy with scalar fields that show the certainty of each vertex.
 
     ``"confidence"`` is the origin of a vertex's weights, ``"distance"`` its distance from
     the aligned template's surface, ``"guarded"`` whether its rest position is an
@@ -83,7 +83,7 @@ def with_fields(rigged: Rigged) -> Rigged:
     confidence = rigged.confidence.astype(np.float64)
     guarded = rigged.guarded.astype(np.float64)
     fields = (
-        VertexField("confidence", "How weights were found", confidence, names=CONFIDENCE),
+        VertexField("confidence", "Origin of weights", confidence, names=CONFIDENCE),
         VertexField("distance", "Distance to the template", rigged.weights.distances, "length"),
         VertexField("guarded", "Rest position", guarded, names=("exact", "guarded")),
     )

@@ -48,17 +48,17 @@ def robust(
     Parameters
     ----------
     template : Figure
-        Attached, and with its shape applied.
+        Template with bindings, and with its shape applied.
     pose : Pose
-        Without shape weights.
+        Pose without shape weights.
     target : Mesh
         With triangles.
     how : TransferSettings
-        Everything except the method.
+        All settings except the method.
     report : callable
         Called with progress.
     name : str
-        Of the new figure.
+        Name of the new figure.
     """
     met = align_posed(template, pose, target, how.alignment, how.fits, _within(report, 0.0, 0.4))
     alignment, pose, posed = met.alignment, met.pose, met.positions
@@ -234,7 +234,7 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[D
 
 
 def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
-    """Return messages about parts of the template that the new figure lacks."""
+    """Return messages about template data that the new figure lacks."""
     lines = []
     if template.blend_shapes is not None:
         lines.append(Diagnostic("R013.shapes", values={"n": template.n_shapes}))

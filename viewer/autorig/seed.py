@@ -34,15 +34,15 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     Parameters
     ----------
     template : Figure
-        Attached, and with its shape applied.
+        Template with bindings, and with its shape applied.
     pose : Pose
-        Without shape weights.
+        Pose without shape weights.
     target : Mesh
         With triangles.
     report : callable
         Called with progress.
     name : str
-        Of the new figure.
+        Name of the new figure.
     """
     _, skeleton, skin = template.attached()
     posed = deform(template, pose)[0]

@@ -6,12 +6,12 @@ __all__ = ["COMMANDS"]
 
 COMMANDS = {
     "view": "open files in a window (the default)",
-    "render": "render files to a picture, without a window",
+    "render": "render files to an image or video, without a window",
     "convert": "write figures, poses and motions in other formats",
     "rig": "transfer the rig of a figure to an unrigged mesh",
     "info": "describe the contents of files",
     "diff": "compare figures or motions with a reference: how far apart, where, in which pose",
-    "lint": "check rigs and motions: what is wrong, where, and what to do about it",
+    "lint": "check rigs and motions: what is wrong, where, and how to fix it",
     "doctor": "check this machine: packages, OpenGL, display, and how to fix what is missing",
     "help": "show a page of the manual",
     "completion": "print a script that completes commands and options in bash, zsh or tcsh",

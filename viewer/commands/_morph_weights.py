@@ -16,7 +16,7 @@ from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
-_LISTED = 12  # names in a message
+_LISTED = 12  # names listed in a message
 
 
 def is_named(text: str) -> bool:
@@ -41,7 +41,7 @@ def morph_record(figure: Figure, values: Floats) -> PoseRecord:
             f"--shape: {printable(figure.name)} has {len(names)} morphs ({_listed(names)}), "
             f"found {len(values)} numbers"
         )
-    # Weights that are no shape coefficients of a body are recorded as expressions.
+    # Weights that are not shape coefficients of a body are recorded as expressions.
     return PoseRecord(expression=values)
 
 
@@ -77,7 +77,7 @@ def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
         if len(rows) > 1:
             raise ViewerError(
                 f'--shape: {len(rows)} shapes are called "{printable(name, 60)}"; '
-                "numbers without names set all in order"
+                "numbers without names set all shapes in order"
             )
         weights[rows] = value
     is_shape = np.array([group == "shape" for group in actor.figure.blend_shapes.groups])
@@ -85,7 +85,7 @@ def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
 
 
 def _pair(text: str) -> tuple[str, float]:
-    # Names may hold "="; numbers do not.
+    # Names may contain "="; numbers do not.
     name, equals, value = text.rpartition("=")
     try:
         if equals and name.strip():
@@ -100,7 +100,7 @@ def _names(figure: Figure) -> tuple[str, ...]:
 
 
 def _rows(figure: Figure, name: str) -> list[int]:
-    """Return the shapes of this name; ignore case only if none matches exactly."""
+    """Return the shapes with this name; ignore case only if none matches exactly."""
     names = _names(figure)
     exact = [row for row, each in enumerate(names) if each == name]
     return exact or [row for row, each in enumerate(names) if each.lower() == name.lower()]

@@ -323,7 +323,7 @@ def check_kind(arguments: argparse.Namespace, output: Path) -> None:
 
 
 def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
-    """Check the name of numbered files.
+    """Check the name pattern of numbered files.
 
     Raises ViewerError if one file holds the whole motion, or all names would be the same.
     """

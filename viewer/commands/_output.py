@@ -11,7 +11,7 @@ from viewer.models import resolve
 from viewer.rig.scene import Scene
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
-"""Suffixes of writable picture formats."""
+"""Suffixes of writable image formats."""
 
 
 def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list[Path]:

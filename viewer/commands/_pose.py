@@ -30,7 +30,7 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
 
-_FIGURE = "figure."  # label of the DOFs of a figure as a whole
+_FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 
 
 def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +60,7 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
         "30deg) or tx, ty, tz for the root's translation; figure.tx, .ty, .tz, .scale place a "
         "whole figure; may be repeated",
     )
-    group.add_argument("--mirror", action="store_true", help="exchange left and right")
+    group.add_argument("--mirror", action="store_true", help="swap left and right")
 
 
 def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
@@ -144,7 +144,7 @@ def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
-    # A JSON list is detected as people; read as a pose, it is refused for being no object.
+    # A JSON list is detected as people; read as a pose, it is refused as it is not an object.
     is_list = not source.is_folder and detect(source) == "easymocap"
     record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):

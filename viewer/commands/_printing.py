@@ -11,7 +11,7 @@ from typing import TextIO
 def print_line(*parts: str | tuple[str, str], file: TextIO | None = None) -> None:
     """Print one line.
 
-    ``*parts``: consecutive texts, some with a rich style such as ``"red"``.
+    ``*parts``: consecutive strings, some with a rich style such as ``"red"``.
     ``file``: standard output if omitted; plain text if it is not a terminal.
     """
     stream = sys.stdout if file is None else file

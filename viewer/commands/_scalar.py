@@ -53,7 +53,7 @@ def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
         action=argparse.BooleanOptionalAction,
         help="lines at every tenth of the range (default: for weights)",
     )
-    group.add_argument("--legend", action="store_true", help="draw a legend of the colours")
+    group.add_argument("--legend", action="store_true", help="draw a colour legend")
 
 
 def _quantity_name(text: str) -> str:
@@ -99,7 +99,7 @@ def _parse_range(text: str) -> tuple[float, float]:
 
 
 def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Choose a joint or field for a quantity that names none; return a message about the joint.
+    """Choose a joint or field for a quantity without one; return a message about the joint.
 
     The choice is the joint with the most influence, or the first field that is not 0 everywhere.
     """
@@ -110,7 +110,7 @@ def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
     if not SCALARS[key].takes_joint or options.scalar == key:
         return []
     joint = printable(split_name(options.scalar)[1], 60)
-    return [f"--scalar {key}: shows {joint}, which has the most influence; {key}:JOINT names one"]
+    return [f"--scalar {key}: shows {joint}, which has the most influence; {key}:JOINT selects one"]
 
 
 def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
@@ -156,7 +156,7 @@ def _refuse_name(figures: list[Figure], name: str) -> None:
 
 
 def scalar_text(scene: Scene, options: DisplayOptions) -> str:
-    """Return the name and range of the displayed numbers, for the line about the picture."""
+    """Return the name and range of the displayed values, for the line about the image."""
     if options.shading != "scalar" or options.show == "skeleton":
         return ""
     name, view = options.scalar, find_quantity(options.scalar)

@@ -31,7 +31,7 @@ LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # names in a message
-_SLOW_BYTES = 60e6  # about a second of reading
+_SLOW_BYTES = 60e6  # bytes; takes about a second to read
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
@@ -80,7 +80,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="the axis that points up in captures and BVH"
     )
-    group.add_argument("--unit", choices=METRES, help="unit of lengths in BVH (default: estimated)")
+    group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
     group.add_argument(
         "--layout",
         choices=LAYOUTS,
@@ -103,12 +103,12 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         help="show a BVH next to the figures instead of driving one",
     )
     group.add_argument(
-        "--interpolate-gaps", action="store_true", help="interpolate over the gaps of captures"
+        "--interpolate-gaps", action="store_true", help="interpolate gaps in captures"
     )
 
 
 def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
-    """Return the requested options of reading motions."""
+    """Return the requested settings for reading motions."""
     model = None if arguments.model is None else resolve(arguments.model)
     return MotionSettings(
         model=None if model is None else Path(model),
@@ -166,7 +166,7 @@ def finish(builder: Builder, scene: Scene) -> None:
 
 
 def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
-    """Load what is needed for a first picture, not posed yet, and print warnings."""
+    """Load what is needed for a first image, without posing it, and print warnings."""
     if arguments.model_path is not None:
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)

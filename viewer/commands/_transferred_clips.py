@@ -29,7 +29,7 @@ class TransferredClip:
     clip : Clip or SampledClip
         The template's motion.
     path : Path
-        ``.anim`` for course rigs, ``.bvh`` for other figures.
+        ``.anim`` for .skel-style rigs, ``.bvh`` for other figures.
     """
 
     clip: Clip | SampledClip
@@ -45,8 +45,8 @@ def add_clip_argument(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FILE",
         help="a motion of the template; transferred to the target, with its path scaled to the "
-        "figure, it is written next to the result as NAME-FILE.anim (course rigs) or .bvh; may be "
-        "repeated",
+        "figure, it is written next to the result as NAME-FILE.anim (.skel-style rigs) "
+        "or .bvh; may be repeated",
     )
 
 

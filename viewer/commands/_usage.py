@@ -19,8 +19,8 @@ from viewer.phrases import printable
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
-_NUMBER = re.compile(r"-\.?\d")  # begins a value or the name of a file, not an option
-_WORD = re.compile(r"[^\W\d_]+")  # like a command; files mostly have a suffix or a folder
+_NUMBER = re.compile(r"-\.?\d")  # start of a value or file name, not of an option
+_WORD = re.compile(r"[^\W\d_]+")  # looks like a command; files mostly have a suffix or a folder
 _LONGEST = 60  # characters of a name in a message
 
 
@@ -101,7 +101,7 @@ def check_command(word: str) -> None:
 
 
 def require_files(arguments: argparse.Namespace, command: str) -> None:
-    """Raise if a command for which the bundled figure is no useful default has no files.
+    """Raise if no files are given to a command that does not default to the bundled figure.
 
     Raises ViewerError if there are neither files nor ``--body``.
     """

@@ -245,7 +245,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
 def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> list[str]:
     """Return messages about calibrated cameras: their images, and lens distortion.
 
-    Raises ViewerError if there is no such camera, or its files lack the size of its pictures.
+    Raises ViewerError if there is no such camera, or its files lack the size of its images.
     """
     seen = None if arguments.view is None else _find_view(scene, arguments.view)
     drawn = scene.views if options.cameras else [view for view in [seen] if view is not None]
@@ -291,11 +291,11 @@ def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:
 
 
 def _joint_notes(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Return messages about requested joint marks that are not visible."""
+    """Return messages about requested joint markers that are not visible."""
     has_one = any(actor.figure.skeleton is not None for actor in scene.actors)
     if has_one and options.show != "binding":
         return []
-    why = "there are no joints in binding space" if has_one else "no figure has a skeleton"
+    why = "no joints are shown in the bind pose" if has_one else "no figure has a skeleton"
     names = "xray", "joint_names", "joint_axes"
     requested = [name for name in names if getattr(options, name)]
     return [f"--{name.replace('_', '-')}: {why}" for name in requested]

@@ -1,4 +1,4 @@
-"""Conversion of figures, poses and motions to other formats."""
+"""Converts figures, poses and motions to other formats."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also open this file with every input, such as the .skel of .anim files",
     )
     files.add_argument("--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH")
-    files.add_argument("--unit", choices=METRES, help="unit of lengths in BVH")
+    files.add_argument("--unit", choices=METRES, help="length unit of BVH")
     _add_poses(parser)
     _add_results(parser)
     add_skinning_arguments(parser)
@@ -94,10 +94,10 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         metavar="FILE",
-        help="picture of the reference, coloured by distance, in the worst pose; several "
-        "comparisons make a sheet with a common scale",
+        help="image of the reference, coloured by distance, in the worst pose; several "
+        "comparisons give a sheet with a common scale",
     )
-    group.add_argument("--force", action="store_true", help="replace an existing picture")
+    group.add_argument("--force", action="store_true", help="replace an existing image")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -139,14 +139,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _checked_output(arguments: argparse.Namespace) -> Path | None:
-    """Check the output picture before anything is compared."""
+    """Check the output image before anything is compared."""
     if arguments.output is None:
         return None
     output = Path(arguments.output)
     require_stdout(output)
     if output.suffix.lower() not in PICTURES:
         raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}), "
+            f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}), "
             f'found "{output.suffix}"'
         )
     check_targets([output], _inputs(arguments), arguments.force)
@@ -211,7 +211,7 @@ def _compared(
 
 
 def _lone(name: str, pairing: Pairing) -> tuple[Diagnostic, ...]:
-    """Return messages about actors and motions on one side only."""
+    """Return messages about actors and motions present on one side only."""
     sides = ((Phrase("the-reference"), pairing.first), (name, pairing.second))
     return tuple(
         Diagnostic("D001.actor", values={"side": side, "actor": one})

@@ -108,7 +108,7 @@ def _examine_devices() -> Iterator[Finding]:
     for node in unreadable_devices():
         cure = f"sudo usermod -aG render {os.environ.get('USER', '$USER')}, then log in again"
         yield Finding(
-            "graphics", "note", f"{node} exists but you lack the permission to open it", cure
+            "graphics", "note", f"{node} exists but you have no permission to open it", cure
         )
 
 
@@ -125,13 +125,13 @@ def _examine_drawing() -> Iterator[Finding]:
     yield Finding(
         "limits",
         "ok",
-        f"textures {info['GL_MAX_TEXTURE_SIZE']}, pictures "
+        f"textures {info['GL_MAX_TEXTURE_SIZE']}, images "
         f"{min(info['GL_MAX_VIEWPORT_DIMS'])} pixels per side, "
         f"{context.max_samples} samples per pixel",
     )
     if is_software(context):
         cure = "install the graphics driver, and give containers access to /dev/dri"
-        yield Finding("graphics", "note", "rendering is done in software", cure)
+        yield Finding("graphics", "note", "rendering uses software", cure)
     context.release()
 
 
@@ -143,7 +143,7 @@ def _examine_display() -> Iterator[Finding]:
     try:
         find_display()
     except NoDisplay as problem:
-        cure = "for pictures without a window: viewer render FILES -o out.png; over ssh: ssh -X"
+        cure = "to render without a window: viewer render FILES -o out.png; over ssh: ssh -X"
         yield Finding("display", "note", str(problem), cure)
         return
     yield Finding("display", "ok", values or "found")

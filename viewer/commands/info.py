@@ -72,7 +72,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
 
 
 def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
-    """Return the description of an actor; its box is in scene space, with up axis ``up``."""
+    """Return the description of an actor; its box is in world space, with up axis ``up``."""
     figure = actor.figure
     points = actor_points(actor) if actor.is_present else np.zeros((0, 3))
     box = bounding_box(points) if len(points) else None
@@ -260,8 +260,23 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
         pixels = material["pixels"]
         state = f"{pixels[0]} x {pixels[1]} pixels" if pixels else "not drawn"
         name = printable(material["name"] or "without a name")
-        lines.append(f"    material {name}: {printable(material['texture'])}, {state}")
+        picture = [f"{printable(material['texture'])}, {state}"] if material["texture"] else []
+        shown = "; ".join([*picture, *_surface_words(material)]) or "no picture"
+        lines.append(f"    material {name}: {shown}")
     return lines
+
+
+def _surface_words(material: dict[str, Any]) -> list[str]:
+    """Return what a material has besides a picture, in words."""
+    if "maps" not in material:
+        return []
+    words = []
+    if material["base_color"] is not None:
+        words.append(f"colour {' '.join(f'{channel:.3g}' for channel in material['base_color'])}")
+    if "metallic" in material:
+        words.append(f"metallic {material['metallic']:.3g}, roughness {material['roughness']:.3g}")
+    words += [f"{kind} {printable(file)}" for kind, file in material["maps"].items()]
+    return words if material["alpha"] == "opaque" else [*words, f"alpha {material['alpha']}"]
 
 
 def _skin_lines(skin: dict[str, Any]) -> list[str]:

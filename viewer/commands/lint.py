@@ -1,4 +1,4 @@
-"""Checks of rigs and motions: what is wrong, where, and what to do about it."""
+"""Checks of rigs and motions: what is wrong, where, and how to fix it."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
         metavar="N",
         help="frames per second of captures, and for sampling keyframed clips (default: 30)",
     )
-    group.add_argument("--hands", choices=("mean", "flat"), help="the hands at pose parameters 0")
+    group.add_argument("--hands", choices=("mean", "flat"), help="hand pose at pose parameters 0")
 
 
 def run(arguments: argparse.Namespace) -> int:

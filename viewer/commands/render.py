@@ -1,4 +1,4 @@
-"""Rendering to pictures and videos, without display or window."""
+"""Rendering to images and videos, without a display or window."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help="a picture (.png, .jpg, …), a video (.mp4, .webm, .gif), or numbered pictures, "
-        "such as frame_{frame:05}.png",
+        help="an image (.png, .jpg, …), a video (.mp4, .webm, .gif), or numbered images, such "
+        "as frame_{frame:05}.png",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
     group.add_argument(
@@ -78,7 +78,7 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw the pictures, write them, and print their names."""
+    """Render the images, write them, and print their names."""
     size = parse_size(arguments.size)
     output = Path(arguments.output)
     _check_suffix(arguments, output)
@@ -164,7 +164,7 @@ def _draw_onion(
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
-    """Check that the suffix is that of a picture or video."""
+    """Check that the suffix is that of an image or video."""
     suffix = output.suffix.lower()
     try:
         is_ours = output.is_file() or not output.exists()
@@ -174,7 +174,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         # Overwriting an input is worse, so it is reported first.
         check_targets([output], inputs_of(arguments), force=True)
         raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) or a video "
+            f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) or a video "
             f"({', '.join(VIDEOS)}), found {suffix}"
         )
 

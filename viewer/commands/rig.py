@@ -41,7 +41,7 @@ from viewer.streams import require_stdout, summary_stream
 __all__ = ["add_arguments", "run"]
 
 _BUNDLED = ("body", "fox")
-_SMOOTHING = 10  # iterations, if --smooth has no number
+_SMOOTHING = 10  # iterations if --smooth has no value
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -276,7 +276,7 @@ def _check_numbers(arguments: argparse.Namespace) -> None:
 def _settings(
     arguments: argparse.Namespace, template: Actor, output: Path | None
 ) -> TransferSettings:
-    """Return the requested settings; the course rig's format cannot hold correctives."""
+    """Return the requested settings; the .skel format cannot store correctives."""
     landmarks = None
     if arguments.landmarks is not None:
         source = Source.open(arguments.landmarks)

@@ -1,4 +1,4 @@
-"""Display of files in a window, or in a picture if there is no display."""
+"""Shows files in a window, or renders an image if there is no display."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from viewer.rig.scene import Scene, scene_points
 __all__ = ["add_arguments", "run"]
 
 SIZE = (1280, 720)
-"""Size of the picture that is drawn if no window can be opened."""
+"""Size of the image that is rendered if no window can be opened."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,7 +64,7 @@ def _scale(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Open the window, or write the picture that it would show."""
+    """Open the window, or write the image that it would show."""
     options = display_of(arguments)
     scene, builders = begin_scene(arguments)
     if arguments.time is not None or arguments.frame is not None:

@@ -1,4 +1,4 @@
-"""Codes of faults: severity, title and cure."""
+"""Diagnostic codes: severity, title and remedy."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Code:
     title : str
         Short description, for lists of codes.
     hint : str
-        Suggested cure.
+        Suggested remedy.
     other_hint : str
-        Suggested cure if no line is known; empty if it is the same.
+        Suggested remedy if no line is known; empty if it is the same.
     """
 
     severity: str

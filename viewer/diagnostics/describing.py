@@ -15,7 +15,7 @@ from viewer.phrases import printable
 
 __all__ = ["described", "plain"]
 
-_LISTED = 100  # places and names of one diagnostic; their total is always given
+_LISTED = 100  # indices and names listed per diagnostic; their total is always given
 
 
 def described(found: Diagnostic) -> dict[str, Any]:
@@ -24,13 +24,13 @@ def described(found: Diagnostic) -> dict[str, Any]:
     Parameters
     ----------
     found : Diagnostic
-        Of any kind.
+        The diagnostic to describe.
 
     Returns
     -------
     dict
         Code, key, severity, message, file and line (or None), part, count, values as returned by
-        ``plain``, the first 100 places, and the number of places.
+        ``plain``, the first 100 indices, and the number of indices.
     """
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     return {
@@ -49,9 +49,9 @@ def described(found: Diagnostic) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value of a message as JSON data.
+    """Return a message value as JSON data.
 
-    Bytes of a file and non-finite numbers become text, phrases become their text and values, and
+    File bytes and non-finite numbers become strings, phrases become their text and values, and
     lists are truncated after 100 items.
     """
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""A single fault or remark: message key, place, and values of the message."""
+"""A single error, warning or note: message key, location and values."""
 
 from __future__ import annotations
 
@@ -26,38 +26,38 @@ Part = Literal[
     "channels",
     "frames",
 ]
-"""Part of a figure or motion that contains a fault."""
+"""Part of a figure or motion that a diagnostic refers to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Diagnostic:
-    """A fault or remark of a reader, check or operation.
+    """An error, warning or note from a reader, check or operation.
 
     Attributes
     ----------
     key : str
         A key of ``MESSAGES``: code, dot, name of the message, as in ``"W004.vertices"``.
     path : Path or None
-        The file that contains the fault.
+        The file that the message is about.
     line : int or None
         Line in that file, from 1.
     part : str
-        Part of the figure or motion that ``places`` index. Readers replace faulty data with neutral
-        values.
+        Part of the figure or motion that ``places`` indexes. Readers replace faulty data with
+        neutral values.
     places : (N,) int32 or None
         Indices, ascending: vertices (positions, weights), triangles, joints (bindings, joints, and
         items: boxes, limits and poses), channels of a clip, or rows of frames.
     values : mapping of str to object
-        Values of the template.
+        Values for the template.
     count : int
-        Number of faults that it represents; 0 if it only adds places to a fault reported by another
-        diagnostic.
+        Number of errors that it represents; 0 if it only adds indices to an error reported by
+        another diagnostic.
     level : str
-        Severity, if it differs from that of the code.
+        Severity, if different from that of the code.
     is_refusal : bool
         Whether ``load`` refuses the file because of it.
     is_final : bool
-        Whether reading of the file stopped at it.
+        Whether it stopped parsing of the file.
     """
 
     key: str
@@ -83,12 +83,12 @@ class Diagnostic:
 
     @property
     def message(self) -> str:
-        """The message on one line, without the place."""
+        """The message on one line, without the location."""
         return rendered(MESSAGES[self.key], self.values)
 
     @property
     def full_message(self) -> str:
-        """The message with the number of faults, and whether reading ended there."""
+        """The message with the number of errors, and whether it stopped parsing."""
         text = self.message
         if self.count > 1:
             text += FURTHER.format(self.count)
@@ -108,9 +108,9 @@ class Diagnostic:
 
     @property
     def labelled(self) -> str:
-        """Place and message, prefixed with the severity unless it is a note."""
+        """Location and message, prefixed with the severity unless it is a note."""
         return str(self) if self.severity == "note" else f"{self.severity}: {self}"
 
     def __str__(self) -> str:
-        """Return place and message on one line."""
+        """Return location and message on one line."""
         return ": ".join(filter(None, (self.place, self.message)))

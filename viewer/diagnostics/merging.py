@@ -1,4 +1,4 @@
-"""Merging of diagnostics that differ only in their places."""
+"""Merges diagnostics that differ only in their locations."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from viewer.diagnostics.phrase import Phrase
 
 
 def merged(found: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """Return diagnostics in order, each kind merged into its first.
+    """Return diagnostics in order, with similar ones merged into the first of them.
 
-    Two are of the same kind if message, file, part and names are equal: values of type ``str``
-    are names, while numbers and text of a file (``bytes``) may differ.
+    Two are similar if message, file, part and names are equal: values of type ``str`` are names,
+    while numbers and text from a file (``bytes``) may differ.
     """
     kinds: dict[tuple[object, ...], list[Diagnostic]] = {}
     for one in found:

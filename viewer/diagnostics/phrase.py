@@ -9,14 +9,14 @@ from viewer.diagnostics.wording import PHRASES
 
 
 class Phrase:
-    """A value of a message that is itself a template with values.
+    """A message value that is itself a template with values.
 
     Parameters
     ----------
     key : str
         A key of ``PHRASES``.
     **values : object
-        Values of the template.
+        Values for the template.
     """
 
     __slots__ = ("key", "values")

@@ -1,4 +1,4 @@
-"""Templates of messages: ``str.format`` with additional specifications.
+"""Message templates: ``str.format`` with additional format specifications.
 
 =====================  ===========================================================================
 ``{word:quoted}``      text in quotes; None is the end of the file

@@ -40,7 +40,7 @@ class Exporter:
     title : str
         Label in menus.
     suffixes : tuple of str
-        With leading dots; ``"/"`` stands for a folder.
+        With leading dots; ``"/"`` represents a folder.
     writes_pose : bool
         Whether its module has ``export(actor, path, skinning)``.
     writes_motion : bool

@@ -15,7 +15,7 @@ _CUBE = 0.01  # half the side of default boxes, relative to the skeleton's size
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
-    """Return the skeleton in the form of the course files, with the pose as its rest pose.
+    """Return the skeleton in the form of ``.skel`` files, with the pose as its rest pose.
 
     ``skeleton``: without rest rotations and scales; its lengths already include the figure's
       scale.

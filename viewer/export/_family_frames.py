@@ -19,7 +19,7 @@ from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, UNIT_NAMES
 
-_OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's are numbered
+_OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's blend shapes are numbered
 _NEGLIGIBLE = 1e-6  # metres, and relative deviation of a scale from 1
 
 
@@ -50,7 +50,7 @@ class FamilyFrames:
 
     @property
     def has_expression(self) -> bool:
-        """Whether any coefficient of the expression is not 0."""
+        """Whether any expression coefficient is nonzero."""
         return bool(self.expression.any())
 
     def about_origin(self) -> Floats:
@@ -120,7 +120,7 @@ def family_frames(
     ``animation``: an animation of a figure whose unit is known.
     ``frames``: its frames; rows of missing frames are undefined.
     ``member``: from ``member_of_figure``.
-    ``options``: options, of which only the up axes are used.
+    ``options``: only the up axes are used.
     Returns ``frames``: one row per frame.
     Returns ``notes``: notes about data without a parameter in the family, with its size.
     Raises RigError if a value of a present frame is not finite.

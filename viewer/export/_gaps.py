@@ -66,8 +66,8 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
 
     ``frames``: at least one of them present.
     ``interpolate``: if true, interpolate between the frames around a gap, rotations along the
-      shorter arc and all else linearly; if false, hold the frame before it. Gaps at the ends hold
-      the first or last frame.
+      shorter arc and everything else linearly; if false, hold the frame before it. Gaps at the ends
+      hold the first or last frame.
     """
     if frames.present.all():
         return frames

@@ -1,4 +1,4 @@
-"""Files of a newly rigged mesh: a course rig with mesh and pose, or one ``.npz``."""
+"""Files of a newly rigged mesh: a .skel-style rig with mesh and pose, or one ``.npz``."""
 
 from __future__ import annotations
 

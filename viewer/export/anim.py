@@ -1,4 +1,4 @@
-"""Exporter of ``.anim`` files: motions of course rigs, with original keys or a key per frame."""
+"""Exporter of ``.anim`` files: motions of .skel-style rigs, as original keys or a key per frame."""
 
 from __future__ import annotations
 

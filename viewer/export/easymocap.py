@@ -134,7 +134,7 @@ def _of_person(person: int, note: Diagnostic) -> Diagnostic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """One written person: original animation, animation with closed gaps, records, read-back."""
+    """One written person: original animation, animation with filled gaps, records, read-back."""
 
     original: SampledAnimation
     animation: SampledAnimation

@@ -98,13 +98,13 @@ class Format:
     signature : bytes
         Regular expression that the head of every such text file contains; empty for none.
     keys : tuple of str
-        Keys that identify an archive (``.pkl``, ``.npz``) of this kind: any of them is enough.
+        Keys that identify an archive (``.pkl``, ``.npz``) of this format: any of them is enough.
     files : tuple of str
-        Files that identify a folder of this kind: any of them is enough.
+        Files that identify a folder of this format: any of them is enough.
     writes : bool
         Whether there is a writer.
     is_bare_mesh : bool
-        Whether such files hold a mesh alone, without skeleton and skin.
+        Whether files of this format hold only a mesh, without skeleton and skin.
     """
 
     title: str
@@ -179,7 +179,7 @@ FORMATS = {
 
 
 def detect(source: Source) -> str:
-    """Return the key in ``FORMATS`` of a file, judged by its content, then by its suffix.
+    """Return a file's key in ``FORMATS``, determined by its content, then by its suffix.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def detect(source: Source) -> str:
     Raises
     ------
     FormatError
-        If no format claims it; the message says what it looks like.
+        If no format matches; the message says what the file looks like.
     """
     if source.is_folder:
         return _detect_folder(source)
@@ -199,7 +199,7 @@ def detect(source: Source) -> str:
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
     if _is_archive(source):
-        # A broken archive with a text format's suffix: the fault is the suffix.
+        # A broken archive with a text format's suffix: the suffix is wrong.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
             return _detect_archive(source)
     head = source.head(_HEAD)
@@ -225,7 +225,7 @@ def detect(source: Source) -> str:
 
 
 SUFFIXES = tuple(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in kind.suffixes))
-"""All suffixes, each once."""
+"""All suffixes, without duplicates."""
 
 KNOWN = " or ".join(SUFFIXES)
 """All suffixes, for messages."""

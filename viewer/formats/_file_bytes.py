@@ -1,4 +1,4 @@
-"""Reading of files: size limits, kinds of files, and errors about unreadable ones."""
+"""File reading: size limits, file types, and errors about unreadable files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_SIZE = 2 << 30
 FOLDER = "a folder"
 """Name of a folder in the result of ``kind_of``."""
 
-_MOST_FILES = 2000  # files in a folder that are compared with the name of a missing file
+_MOST_FILES = 2000  # files in a folder whose names are compared with that of a missing file
 _ALIKE = 0.8  # similarity; high, because file names share suffixes and often more
 _KINDS = {
     stat.S_IFDIR: FOLDER,
@@ -52,13 +52,13 @@ def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
 
 
 def kind_of(path: Path, max_size: int) -> str | None:
-    """Return the kind of a path, None for a file; opening a pipe to find out would block."""
+    """Return what a path is, None for a regular file; opening a pipe to find out would block."""
     try:
         status = path.stat()
     except (OSError, ValueError) as problem:
         raise _unreadable(path, problem) from None
     if not stat.S_ISREG(status.st_mode):
-        return _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+        return _KINDS.get(stat.S_IFMT(status.st_mode), "an unknown kind of file")
     if status.st_size > max_size:
         values = {"most": max_size, "size": status.st_size}
         raise FormatError(Diagnostic("F001.too-large", path, values=values))
@@ -80,7 +80,7 @@ def _unreadable(path: Path, problem: Exception) -> FormatError:
 
 
 def unreadable(path: Path, reason: object, near: str = "") -> FormatError:
-    """Return the error of a file that cannot be read."""
+    """Return the error for a file that cannot be read."""
     return FormatError(
         Diagnostic("F001.unreadable", path, values={"reason": str(reason), "near": near})
     )

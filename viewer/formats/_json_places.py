@@ -1,8 +1,8 @@
 """Offsets of values in a JSON text, searched for only when an error needs one.
 
 Python's parser is fast, but it keeps no offsets. The text is scanned a second time, token by token,
-once a fault in it is known. Apart from its nesting it is then known to be valid JSON, except that
-NaN and infinities may stand for numbers.
+once an error in it is known. By then it is known to be valid JSON apart from its nesting, except
+that NaN and infinities may occur as numbers.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def constant_place(text: str) -> tuple[str, int] | None:
 
 
 def nesting_place(text: str, depth: int) -> int:
-    """Return the offset of the first bracket at a depth; the end of the text if there is none.
+    """Return the offset of the first bracket at a given depth; the end of the text if none.
 
     The text need not be valid JSON.
     """

@@ -1,4 +1,4 @@
-"""Faults found where the file is not known, and remarks derived from faults."""
+"""Errors found where the file is not known, and notes derived from errors."""
 
 from __future__ import annotations
 
@@ -24,6 +24,6 @@ class MisfitError(Exception):
 
 
 def remark_on(key: str, fault: Diagnostic) -> Diagnostic:
-    """Return a remark at the place of a fault whose message shows the fault as ``problem``."""
+    """Return a note at the location of an error, which its message includes as ``problem``."""
     problem = replace(fault, path=None, line=None)
     return Diagnostic(key, fault.path, fault.line, values={"problem": problem})

@@ -1,4 +1,4 @@
-"""Neutral values in place of invalid ones, so that a figure with faults can be shown."""
+"""Neutral values in place of invalid ones, so that a figure with errors can be shown."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def held_rows(rows: Floats, bad: Bools) -> Floats:
 
 
 def neutral_corners(corners: NDArray[np.integer], fits: Bools) -> Ints:
-    """Return triangles with each invalid corner replaced by a valid one, which leaves no area.
+    """Return triangles with each invalid corner replaced by a valid one, which gives it zero area.
 
     Parameters
     ----------

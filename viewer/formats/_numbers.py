@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 LARGEST = float(np.finfo(np.float32).max)
-"""Numbers beyond this become infinite on the GPU, so no file may hold them."""
+"""Numbers beyond this become infinite on the GPU, so they are refused."""
 
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[fF]?")
 # NaN and infinity as written by Python, C and Microsoft's C library.
@@ -262,7 +262,8 @@ def _parse_long(
     in_high = (high_dot != 0) & ~in_low
     decimals = np.where(in_low, _letters_after(low_dot), 0)
     decimals = np.where(in_high, _letters_after(high_dot) + 8, decimals)
-    # The low word's gap takes the last character of the high word, which moves up by one.
+    # The free byte of the low word takes the last character of the high word, which moves up by
+    # one.
     low = np.where(in_low, _close(low, low_dot) | (high >> _U(56)), low)
     gapless = np.where(in_high, _close(high, high_dot) | _U(0x30), high)
     high = np.where(in_low, (high << _U(8)) | _U(0x30), gapless)
@@ -272,13 +273,13 @@ def _parse_long(
 
 
 def _digits_only(words: Words, lengths: NDArray[np.intp]) -> Words:
-    """Replace the characters before the last ``lengths`` by zeros."""
+    """Replace the characters before the last ``lengths`` with zeros."""
     keep = _KEEP.take(lengths)
     return ((words ^ _ZEROS) & keep) ^ _ZEROS
 
 
 def _dot_bit(words: Words) -> Words:
-    """Return the top bit of the first character that is a point, or 0."""
+    """Return the top bit of the first character that is a decimal point, or 0."""
     x = words ^ _DOTS
     zero = ~(((x & _LOW7) + _LOW7) | x | _LOW7)
     return zero & (~zero + _U(1))
@@ -290,7 +291,7 @@ def _letters_after(dot: Words) -> NDArray[np.intp]:
 
 
 def _close(words: Words, dot: Words) -> Words:
-    """Move the characters before the point one place towards it."""
+    """Move the characters before the point one position towards it."""
     below = (dot >> _U(7)) - _U(1)
     above = ~((dot << _U(1)) - _U(1))
     return (words & above) | ((words & below) << _U(8))

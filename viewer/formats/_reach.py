@@ -2,7 +2,7 @@
 
 Single precision has 24 bits: at 1e9 units any body is drawn as a single point, and beyond 1e19 the
 squares in lengths overflow. Recordings stay within kilometres, which are 1e6 millimetres; a larger
-translation is a fault of the file. The same limit applies to calibrated cameras and to the
+translation is an error in the file. The same limit applies to calibrated cameras and to the
 translation of a pose. It does not limit the size of a mesh or skeleton.
 """
 

@@ -1,7 +1,7 @@
-"""Location rule for files that are referenced by other files.
+"""Rule for the location of files that are referenced by other files.
 
 A file may reference only files below its own folder, with links resolved: opening or converting a
-downloaded model must not show or copy pictures from elsewhere on the disk. A refusal is reported:
+downloaded model must not show or copy images from elsewhere on the disk. A refusal is reported:
 the figure is drawn without the texture, and a ``.rig`` that references such a file is refused.
 
 The folder is that of the path as it was opened. If the path is a link, names are looked up next to
@@ -45,7 +45,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
 
 
 def refused_text(name: str) -> Phrase:
-    """Return the reason why ``referenced_path`` gives no path, to follow the file's name.
+    """Return the reason why ``referenced_path`` returns None, phrased to follow the file name.
 
     >>> str(refused_text("../a.png")), str(refused_text("/home/a.png"))
     ('is outside the folder: not read', 'is an absolute path: not read')

@@ -4,7 +4,7 @@
 
     material_names (M,)   material_textures (M,)   image_0 (H, W, 4) …            base colours
     material_records (M,): JSON, the other fields of each material that are not at their default
-    picture_0 (H, W, 4) …                          pictures of the other textures, each once
+    picture_0 (H, W, 4) …                          images of the other textures, each once
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def read_materials(archive: Archive) -> tuple[Material, ...]:
     Raises
     ------
     FormatError
-        If arrays do not fit each other, or a record is not one of a material.
+        If arrays do not match each other, or a record does not describe a material.
     """
     if not archive.has("material_names"):
         return ()
@@ -134,7 +134,7 @@ def _completed(
 
 
 def _tuples(value: Any) -> Any:
-    """Return a value of JSON with tuples in place of lists."""
+    """Return a JSON value with tuples in place of lists."""
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 

@@ -29,10 +29,10 @@ _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
     (b"\x1f\x8b", "gzip data"),
     (b"\x7fELF", "a program (ELF)"),
-    (b"\x89PNG", "a PNG picture"),
-    (b"\xff\xd8\xff", "a JPEG picture"),
-    (b"BM", "a BMP picture"),
-    (b"GIF8", "a GIF picture"),
+    (b"\x89PNG", "a PNG image"),
+    (b"\xff\xd8\xff", "a JPEG image"),
+    (b"BM", "a BMP image"),
+    (b"GIF8", "a GIF image"),
     (b"PK\x03\x04", "a ZIP archive"),
     (b"%PDF", "a PDF document"),
     (b"glTF", "a binary glTF file"),
@@ -49,7 +49,7 @@ class Source:
     Attributes
     ----------
     path : Path
-        Path of the file; texture names are relative to its folder.
+        Path of the file; texture file names are relative to its folder.
     is_folder : bool
         Whether it is a folder, which has no bytes.
     max_size : int
@@ -57,7 +57,7 @@ class Source:
     diagnostics : Collector
         Diagnostics that its reader records, shared with the files that it references.
     also_read : list of Path
-        Other files that its reader opened: pictures, material libraries.
+        Other files that its reader opened: images, material libraries.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Source:
         return read_head(self.path, size) if self._data is None else self._data[:size]
 
     def once(self, opened: Callable[[Source], Content]) -> Content:
-        """Return what a function makes of this file; called on first use only."""
+        """Return the result of a function of this file, which is called on first use only."""
         if opened not in self._opened:
             self._opened[opened] = opened(self)
         return cast("Content", self._opened[opened])
@@ -159,11 +159,11 @@ class Source:
 
     @property
     def end(self) -> int:
-        """Offset after the last word: the place of anything that is missing."""
+        """Offset after the last word, where anything missing is reported."""
         return len(self.data.rstrip())
 
     def fault(self, key: str, offset: int | None = None, **values: Any) -> FormatError:
-        """Return the error of a fault after which the reader cannot continue.
+        """Return the exception for an error after which the reader cannot continue.
 
         Parameters
         ----------
@@ -185,16 +185,16 @@ class Source:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record a fault that makes the file invalid, but lets the reader continue.
+        """Record an error that makes the file invalid, but lets the reader continue.
 
         Parameters
         ----------
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, if known; of several faults, that of the first.
+            Position in the file, if known; that of the first of several errors.
         count : int
-            Number of faults.
+            Number of errors.
         part, places : str, (N,)
             The data that the reader replaces with neutral values, see ``Diagnostic``.
         **values : object
@@ -220,7 +220,7 @@ class Source:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record a fault or remark that leaves the file valid.
+        """Record a warning or note that leaves the file valid.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Source:
         offset : int, optional
             Position in the file, if known.
         count, part, places : int, str, (N,)
-            Number of faults, and their places; see ``Diagnostic``.
+            Number of errors, and their indices; see ``Diagnostic``.
         **values : object
             Values in the message.
         """
@@ -278,7 +278,7 @@ class Source:
         return source.path, source.line(offset_of(index))
 
     def head(self, size: int) -> bytes:
-        """Return up to ``size`` bytes from the first word on."""
+        """Return up to ``size`` bytes, starting at the first word."""
         first = self.next_word(0)
         return b"" if first is None else self.data[first.start() : first.start() + size]
 

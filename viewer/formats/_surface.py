@@ -1,4 +1,4 @@
-"""Helpers for readers of plain meshes: normals of all vertices, the up axis, the unit."""
+"""Helpers for readers of plain meshes: vertex normals, up axis and unit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def filled_normals(
     Parameters
     ----------
     source : Source
-        Source for warnings about normals of length 0.
+        The file, which records warnings about zero-length normals.
     normals : (V, 3) or None
         Normals of the file; NaN where it has none.
     positions, triangles : (V, 3), (T, 3)
@@ -58,10 +58,10 @@ def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:
-    """Return the up axis stated by a comment, as in files of this program; y by default."""
+    """Return the up axis stated by a comment, as this program writes it; y by default."""
     return "z" if re.search(r"\bz up\b", comment) else "y"
 
 
 def stated_unit(comment: str) -> str:
-    """Return ``"m"`` if a comment of this program states metres."""
+    """Return ``"m"`` if a comment written by this program states metres."""
     return "m" if re.search(r"\b[yz] up, metres\b", comment) else ""

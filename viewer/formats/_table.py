@@ -70,7 +70,7 @@ def read_numbers(source: Source) -> Floats:
 
 
 def _is_regular(source: Source, columns: int, count: int) -> bool:
-    """Return whether every line has this many words, or none; lines end with LF, CR or both."""
+    """Return whether every line has this many words or is blank; lines end with LF, CR or both."""
     if count % columns:
         return False
     letters = np.frombuffer(source.data, dtype=np.uint8)
@@ -83,7 +83,7 @@ def _is_regular(source: Source, columns: int, count: int) -> bool:
 
 
 def _read_rows(source: Source, columns: int, part: Part) -> tuple[Floats, Places]:
-    """Read a table with faults word by word, and record the faults."""
+    """Read an invalid table word by word, and record the errors."""
     words = read_words(source.data, 0, len(source.data))
     if len(words.offsets) == 0:
         raise source.fault("F002.table-empty", columns=columns, found=source.looks_like())

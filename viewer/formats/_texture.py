@@ -1,4 +1,4 @@
-"""Loading of pictures: textures referenced by other files, and picture files themselves."""
+"""Image loading: textures referenced by other files, and image files themselves."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     Parameters
     ----------
     source : Source
-        File that references the picture.
+        File that references the image.
     name : str
-        Name of the picture, which must lie below that file's folder, see ``referenced_path``.
+        Name of the image, which must lie below that file's folder, see ``referenced_path``.
     offset : int
         Offset of the name in the file.
 
@@ -41,11 +41,11 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
 
 
 def read_picture(source: Source) -> Bytes:
-    """Return the pixels of a picture file: (H, W, 4) uint8, first row at the top.
+    """Return the pixels of an image file: (H, W, 4) uint8, first row at the top.
 
     Raises
     ------
     FormatError
-        If it is not a readable picture.
+        If it is not a readable image.
     """
     return decode_picture(source.path, source.data)

@@ -1,4 +1,4 @@
-"""Words of a text that should be numbers, their positions, and faults of those that are not."""
+"""Words of a text that should be numbers, their positions, and errors for invalid words."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def refuse_words(
     part: Part,
     places: NDArray[np.integer],
 ) -> None:
-    """Record infinite numbers as one fault, and words that are not numbers as another.
+    """Record infinite numbers as one error, and words that are not numbers as another.
 
     Parameters
     ----------
@@ -113,6 +113,6 @@ def number_key(word: bytes, part: Part = "") -> str:
     """Return the key of the message about a word that is not a finite number."""
     if not is_infinite(word):
         return "F002.number"
-    # A number that is too large is well-formed, so the message gives the limit.
+    # A number that is too large is well-formed, so the message states the limit.
     name = "too-large" if is_too_large(word) else "number"
     return f"{'W003' if part == 'weights' else 'F003'}.{name}"

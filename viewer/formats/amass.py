@@ -54,7 +54,7 @@ _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
     (("right_hand_pose",), {45: _SMPLX[40:]}),
 )
 _HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
-# Most columns of principal components of a hand, fewer than its angles.
+# Most principal components of a hand; fewer than its angles.
 _MOST_COMPONENTS = 44
 _FLAGS = ("flat_hand_mean", "use_pca")
 _OWN = ("present", "up")
@@ -105,8 +105,8 @@ def read(source: Source) -> BodyMotion:
     Raises
     ------
     FormatError
-        If there are no poses, arrays differ in their number of frames, or a translation is
-        beyond the limit.
+        If there are no poses, arrays differ in their number of frames, or a translation
+        exceeds the limit.
     """
     archive = archive_of(source)
     found = _first_key(source, archive, _POSES)
@@ -172,7 +172,7 @@ def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
 
 
 def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str | None:
-    """Return the first existing spelling of a key; warn if another has different values."""
+    """Return the first spelling of a key that exists; warn if another has different values."""
     there = [key for key in keys if archive.has(key)]
     for key in there[1:]:
         if not _are_same(_numbers(archive, there[0]), _numbers(archive, key)):
@@ -195,7 +195,7 @@ def _are_same(first: Floats, second: Floats) -> bool:
 def _compare_parts(
     source: Source, archive: Archive, key: str, names: tuple[str, ...], vectors: Floats
 ) -> None:
-    """Warn of parts that contradict the whole poses."""
+    """Warn of parts that contradict the complete poses."""
     has_angles = not _flag(archive, "use_pca")
     has_angles &= not archive.has("flat_hand_mean") or _flag(archive, "flat_hand_mean")
     odd = []

@@ -55,7 +55,7 @@ def read(source: Source) -> Clip:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults are added to its warnings.
+        The file; recoverable errors are added to its warnings.
 
     Returns
     -------
@@ -138,7 +138,7 @@ class _Parser:
         self.channel = index
         self.starts.append(self.word.start() if self.word else 0)
         self._advance()
-        # Some files number their channels; only the order matters.
+        # Some files label channels with numbers; only their order matters.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
             self._advance()
         self._expect(b"{")
@@ -221,7 +221,7 @@ class _Parser:
         return Phrase("anim-key", channel=self.channel, index=self.key)
 
     def _begins(self) -> Phrase | None:
-        """Return the place of the last channel if the file ends inside it, else None."""
+        """Return the location of the last channel if the file ends inside it, else None."""
         if self.word is not None:
             return None
         if self.channel is None:
@@ -236,12 +236,12 @@ class _Parser:
         return {"where": self._where(), "found": found, "begins": self._begins(), **own}
 
     def _fault(self, key: str, **values: Any) -> FormatError:
-        """Return the error of a fault at the current word that ends the parse."""
+        """Return the exception for an error at the current word that stops parsing."""
         where = self.source.end if self.word is None else self.word.start()
         return self.source.fault(key, where, **self._values(values))
 
     def _refuse(self, key: str, word: Word | None = None, **values: Any) -> None:
-        """Record a fault of a word, by default the current one, and continue."""
+        """Record an error at a word, by default the current one, and continue."""
         word = self.word if word is None else word
         where = self.source.end if word is None else word.start()
         part: Part = "" if self.channel is None else "channels"
@@ -255,7 +255,7 @@ class _Parser:
         self._advance()
 
     def _number(self, item: str, of_key: bool = False) -> float:
-        """Read a number; NaN if a number of a key is invalid."""
+        """Read a number; NaN if it belongs to a key and is invalid."""
         if self.word is None:
             raise self._fault("F002.anim-end", item=self._item(item))
         word = self.word.group()
@@ -307,7 +307,7 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
     Parameters
     ----------
     clip : Clip
-        With one channel per DOF, in the order of the table.
+        Clip with one channel per DOF, in the order of the DOF table.
     path : str or Path
         Replaced only when the whole text has been written.
 

@@ -13,7 +13,7 @@ Words are separated by any white space, including line ends, and keywords are ca
 frame has one number per channel, joints in the order of the file. Angles are degrees; a joint's
 rotation channels multiply from left to right, ``Zrotation Yrotation Xrotation`` is R = Rz Ry Rx.
 Position channels replace the joint's OFFSET. Unit and up axis are not in the file: both are
-estimated, unless the user states them, and the motion records how.
+estimated, unless the user specifies them, and the motion records how.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def read(source: Source) -> SkeletonMotion:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults are added to its warnings.
+        The file; recoverable errors are added to its warnings.
 
     Returns
     -------
@@ -258,7 +258,7 @@ def _translations(source: Source, table: _Table, values: Floats) -> Floats | Non
 
 
 def _within_reach(source: Source, shifts: Floats, names: list[tuple[str, str]]) -> Floats:
-    """Refuse frames that translate a joint beyond the limit, and repeat the frame before them.
+    """Refuse frames that translate a joint beyond the limit, and repeat the previous frame.
 
     ``names`` are the axis and joint of each column.
     """

@@ -80,7 +80,8 @@ def open_capture(
     up : "y", "z", "-y", "-z" or ""
         Up axis of the world; empty to estimate it from the people.
     legacy_expression : bool
-        Use the expression as shape components 10 to 19, as EasyMocap does with files of 300 shapes.
+        Use the expression as shape components 10 to 19, as EasyMocap does for models with 300
+        shapes.
     layout : str
         Layout of keypoints, see ``keypoint_layout``, to choose between layouts with the same
         number of points: ``"h36m"``, ``"panoptic"``.
@@ -90,8 +91,8 @@ def open_capture(
     Returns
     -------
     Capture
-        Recording of which only the first people have been read. Faults of the files
-        as a whole are in the source's warnings.
+        Recording of which only the first people have been read. Errors that concern
+        the files as a whole are in the source's warnings.
 
     Raises
     ------
@@ -126,7 +127,7 @@ def open_capture(
 
 
 def _name(source: Source) -> str:
-    """Return a recording's name: not that of its folder ``smpl``, as every recording has one."""
+    """Return a recording's name: not that of its ``smpl`` folder, which every recording has."""
     return folder_name(source.path) if source.is_folder else source.path.stem
 
 

@@ -44,7 +44,7 @@ def read(source: Source) -> MorphTarget:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults are added to its warnings.
+        The file; recoverable errors are added to its warnings.
 
     Returns
     -------

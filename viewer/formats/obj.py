@@ -32,7 +32,7 @@ from viewer.rig.mesh import Mesh
 
 __all__ = ["read"]
 
-_HEAD = 4096  # bytes in which files of this program state the up axis
+_HEAD = 4096  # bytes within which files written by this program state the up axis
 _SHORTEST = 1e-9  # length of a mean of unit normals that cancel each other
 
 
@@ -42,7 +42,7 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults and ignored data are added to its warnings.
+        The file; recoverable errors and ignored data are added to its warnings.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, s
 
 def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None, Ints | None]:
     """Return the table of texture coordinates, and their index for each triangle corner."""
-    # Faults are NaN, and a single sum shows whether there is one.
+    # Invalid values are NaN, which a single sum detects.
     uvs = np.nan_to_num(parts.uvs) if np.isnan(parts.uvs.sum()) else parts.uvs
     if len(uvs) == 0:
         return None, None

@@ -11,8 +11,9 @@
     body_parts.txt V x 1, body_part_defs.txt, sym.txt V x 1                 optional
     reduced_ids.txt R x 1, reduced_faces.txt N x 3                          optional
 
-A pose is 190 numbers: translation (3), 62 x 3 rotations, scale. The root's are angles about z, y
-and x, all others are rotation vectors. Scale and translation come last, about the origin.
+A pose is 190 numbers: translation (3), 62 x 3 rotations, scale. The root's rotation is angles
+about z, y and x, all others are rotation vectors. Scale and translation come last, about the
+origin.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The folder, pickle or ``.npz``; recoverable faults are added to its warnings.
+        The folder, pickle or ``.npz``; recoverable errors are added to its warnings.
 
     Returns
     -------
@@ -100,7 +101,7 @@ def read(source: Source) -> Figure:
 
 
 def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
-    """Return the error of a part whose number of rows differs from another part's."""
+    """Return the error for a part whose number of rows differs from another part's."""
     return part.source.fault(
         "F002.pig-rows-as",
         part.odd_offset(wanted),
@@ -214,7 +215,7 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
     usable = (columns >= 0) & (vertices >= 0) & ~np.isnan(weights)
     lost = vertices[~usable & (vertices >= 0)]
     if not usable.all():
-        # The faults of these rows are recorded; this marks the vertices with incomplete weights.
+        # Errors in these rows are recorded already; this marks vertices with incomplete weights.
         part.source.refuse("F002.pig-lost", None, 0, "weights", lost, item=part.item())
         columns, vertices, weights = columns[usable], vertices[usable], weights[usable]
     rows = np.flatnonzero(usable)
@@ -240,13 +241,13 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
 
 
 def _row_of(rows: Indices, vertices: Ints, vertex: int) -> int:
-    """Return the first row with a weight of a vertex; the first row of all if it has none."""
+    """Return the first row with a weight of a vertex; row 0 if it has none."""
     found = np.flatnonzero(vertices == vertex)
     return int(rows[found[0]]) if len(found) else 0
 
 
 def _check_weights(source: Source, name: str, skin: Skin, known: Bools) -> None:
-    """Report odd weight sums of the vertices whose rows are all valid."""
+    """Report wrong weight sums of vertices whose rows are all valid."""
     moved = has_influence(skin)
     bare = np.flatnonzero(~moved & known)
     if len(bare):

@@ -1,4 +1,4 @@
-"""Reader of ``.ply`` meshes (Stanford polygons) as text and binary of either byte order; no rig.
+"""Reader of ``.ply`` meshes (Stanford polygons), text or binary of either byte order; no rig.
 
 ::
 
@@ -8,8 +8,8 @@
 
 Used are x y z, nx ny nz, and s t (or u v, texture_u texture_v) of ``vertex``; the corners
 (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers per corner, of ``face``. A
-comment ``TextureFile`` names a picture. Polygons are triangulated; other data is ignored with a
-warning that names it.
+comment ``TextureFile`` names a texture image. Polygons are triangulated; other data is ignored with
+a warning that names it.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults and ignored data are added to its warnings.
+        The file; recoverable errors and ignored data are added to its warnings.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def read(source: Source) -> Figure:
 
 
 def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None:
-    """Register the places of vertices and triangles in a text."""
+    """Register the offsets of vertices and triangles in a text file."""
     vertices, faces = tables["vertex"].offsets, tables["face"].offsets if "face" in tables else None
     if vertices is not None:
         source.remember("positions", lambda vertex: int(vertices[vertex]))
@@ -128,7 +128,7 @@ def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple
 def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
     """Return properties side by side, (N, len(names)); None if one is missing.
 
-    Invalid rows are recorded as faults and become NaN; in a text they are NaN already.
+    Invalid rows are recorded as errors and become NaN; in a text file they are NaN already.
     """
     if any(name not in table.columns for name in names):
         return None
@@ -248,7 +248,7 @@ def _uvs(
 
 
 def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material, ...]:
-    """Return a material with the picture that a comment names, for all faces."""
+    """Return a material with the image that a comment names, for all faces."""
     named = [
         (text.split(None, 1)[1].strip(), offset)
         for text, offset in header.comments
@@ -263,7 +263,7 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
 
 
 def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:
-    """Warn, once, of all data in the file that the mesh does not use."""
+    """Issue a single warning about all data in the file that the mesh does not use."""
     used = {
         "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
         "face": {*CORNERS, *(("texcoord",) if uses_wedges else ())},

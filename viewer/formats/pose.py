@@ -17,7 +17,7 @@ their parents, written only if not at rest.
 
 Both kinds of named values may instead contain one frame of smplx's parameters: ``global_orient``,
 ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,
-``poses``, ``betas``, ``expression``, ``transl`` or ``trans``; beside them ``use_pca`` and
+``poses``, ``betas``, ``expression``, ``transl`` or ``trans``; in addition ``use_pca`` and
 ``flat_hand_mean``.
 """
 
@@ -68,7 +68,7 @@ _BESIDES = (
     "markers_latent latent_labels markers_latent_vids"
 )
 _NOT_NEEDED = _BESIDES.split()  # keys of pose and motion files that posing does not need
-# Keys whose J x 3 numbers are one pose rather than J frames.
+# Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _VERSION = 1
 
@@ -104,7 +104,7 @@ def read(source: Source) -> PoseRecord:
 
 
 def _archive_values(source: Source) -> NamedValues:
-    """Return the values that a pose needs; other keys, which may be large, are not read."""
+    """Return the values needed for a pose; other keys, which may be large, are not read."""
     archive = archive_of(source)
     values: dict[str, Any] = dict.fromkeys(archive.keys)
     wanted = (*_KNOWN, *KEYS) if KEYS[0] in archive.keys else _KNOWN
@@ -194,7 +194,7 @@ def _check_keys(named: NamedValues, record: PoseRecord) -> None:
 
 
 def _with_hint(key: str) -> Phrase | str:
-    """Return an unknown key, with the most similar known one."""
+    """Return a description of an unknown key, with the most similar known key."""
     near = [] if key in KEYS else near_names(key, (*_KNOWN, *KEYS))[:1]
     shown = printable(key, 40)
     return Phrase("pose-key-near", name=shown, near=question(near)) if near else shown
@@ -247,7 +247,7 @@ def _dofs(named: NamedValues) -> dict[str, float]:
 
 
 def pose_error(path: Path, record: PoseRecord, problem: RigError) -> FormatError:
-    """Return the error about a pose that does not fit the figure, with its line if known."""
+    """Return the error for a pose that does not match the figure, with its line if known."""
     line = None
     if isinstance(problem, PosePartError) and record.line_of is not None:
         line = record.line_of(problem.part, problem.name)
@@ -305,12 +305,12 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     """
     suffix = Path(path).suffix.lower()
     if not isinstance(content, PoseRecord):
-        raise UnsupportedFormatError(f"{suffix} holds a pose, not a figure or clip")
+        raise UnsupportedFormatError(f"{suffix} stores a pose, not a figure or clip")
     if suffix == ".json":
         save_text(path, pose_text(content))
     elif suffix == ".txt":
         if content.vector is None:
-            raise UnsupportedFormatError("the pose has no numbers of its own to write as .txt")
+            raise UnsupportedFormatError("the pose has no raw pose vector to write as .txt")
         save_text(path, "".join(f"{number!r}\n" for number in content.vector.tolist()))
     else:
         named = _named(content)

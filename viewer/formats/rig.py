@@ -48,7 +48,7 @@ def read(source: Source) -> NamedFiles:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults are added to its warnings.
+        The file; recoverable errors are added to its warnings.
 
     Raises
     ------

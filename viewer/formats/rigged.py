@@ -71,7 +71,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        If an array is missing or has a wrong shape, or the parts do not fit each other.
+        If an array is missing or has a wrong shape, or the parts do not match each other.
     """
     archive = archive_of(source)
     version = int(_finite(archive, "viewer_rig", ()))
@@ -288,7 +288,7 @@ def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | No
     path : str or Path
         Replaced in one step.
     more : mapping of str to array, optional
-        Further arrays, for other programs.
+        Additional arrays, for other programs.
 
     Raises
     ------

@@ -42,7 +42,7 @@ Word = re.Match[bytes]
 
 @dataclass(slots=True)
 class _Joint:
-    """A joint being read; items come in any order, and the last of each kind counts."""
+    """A joint being read; items come in any order, and the last of each kind is used."""
 
     name: str
     parent: int
@@ -61,7 +61,7 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults are added to its warnings.
+        The file; recoverable errors are added to its warnings.
 
     Returns
     -------
@@ -165,7 +165,7 @@ class _Parser:
     def _numbers(self, count: int) -> list[float]:
         """Read the numbers of an item; the current word is its keyword.
 
-        Empty if a fault was recorded; the item is then ignored.
+        Empty if an error was recorded; the item is then ignored.
         """
         assert self.word is not None  # the caller checked it
         keyword = self.word
@@ -184,7 +184,7 @@ class _Parser:
         return values
 
     def _refuse(self, keyword: Word, expected: int, found: int) -> None:
-        """Record a fault of an item with a wrong number of values, and skip the item."""
+        """Record an error in an item with a wrong number of values, and skip the item."""
         refuse, word, places = self.source.refuse, _text(self.word), [self.open[-1]]
         part: Part = "joints" if keyword.group() == b"offset" else "items"
         owner = _called(self.found[self.open[-1]])

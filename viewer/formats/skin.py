@@ -59,7 +59,7 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The file; recoverable faults are added to its warnings.
+        The file; recoverable errors are added to its warnings.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar or its sections do not fit.
+        With file and line, if the text breaks the grammar or its sections do not match.
     """
     sections = read_sections(source)
     mesh = _mesh(source, sections)
@@ -96,7 +96,7 @@ def _mesh(source: Source, sections: Sections) -> Mesh:
         positions=positions,
         normals=_normals(source, sections, positions, triangles),
         triangles=triangles,
-        # Faults are NaN, and a single sum shows whether there is one.
+        # Invalid values are NaN, which a single sum detects.
         uvs=uvs if uvs is None or not np.isnan(uvs.sum()) else np.nan_to_num(uvs),
         materials=tuple(sections.materials),
         triangle_materials=materials.astype(np.int32),
@@ -166,7 +166,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
 
 
 def write(figure: Figure, path: str | Path) -> None:
-    """Write a figure's mesh, weights and bindings, and its texture pictures if they are missing.
+    """Write a figure's mesh, weights and bindings, and any of its texture images that are missing.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def write(figure: Figure, path: str | Path) -> None:
     Raises
     ------
     UnsupportedFormatError
-        If there is no mesh, or a name or number does not fit the grammar.
+        If there is no mesh, or a name or number does not conform to the grammar.
     OutputError
         If a file cannot be written.
     """
@@ -272,7 +272,7 @@ def _matrix_text(rows: Floats) -> str:
 
 
 def _save_texture(material: Material, folder: Path) -> None:
-    """Save a picture under the name in the file, unless the same picture is there already."""
+    """Save an image under its name in the file, unless the same image is already there."""
     if material.texture is None or material.image is None:
         return
     name = Path(material.texture.replace("\\", "/"))  # as the reader interprets it
@@ -280,7 +280,7 @@ def _save_texture(material: Material, folder: Path) -> None:
     if path.exists():
         there = load_image(Source(folder / "x.skin", b""), material.texture, 0)
         if there is None or not np.array_equal(there, material.image):
-            raise OutputError(f"{printable(path, 300)}: a different picture exists already")
+            raise OutputError(f"{printable(path, 300)}: a different image already exists")
         return
     if name.is_absolute() or ".." in name.parts:
         why = "is an absolute path" if name.is_absolute() else "lies outside the folder"

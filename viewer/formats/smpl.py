@@ -58,7 +58,7 @@ def read(source: Source) -> Figure:
     Parameters
     ----------
     source : Source
-        The archive; recoverable faults are added to its warnings.
+        The archive; recoverable errors are added to its warnings.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Checks of rigs and motions: every fault has a code, a place, and a hint for fixing it."""
+"""Checks of rigs and motions: every finding has a code, a location and a suggested remedy."""
 
 from __future__ import annotations
 
@@ -55,15 +55,15 @@ def lint_files(
 ) -> tuple[Scene, list[Finding]]:
     """Open files together and run all checks; files that cannot be opened become findings too.
 
-    All faults for which the viewer would reject a file are recorded, and the rest of the file is
-    checked as far as they allow.
+    All errors for which the viewer would reject a file are recorded, and the rest of the file is
+    checked as far as possible.
 
     Parameters
     ----------
     paths : sequence of str or Path
         As for ``viewer.loading.load``.
     options : LintOptions, optional
-        Thresholds of faults.
+        Thresholds of the checks.
     settings : MotionSettings, optional
         How motions are interpreted.
     max_size : int, optional

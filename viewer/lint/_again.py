@@ -1,4 +1,4 @@
-"""Repeated checks of an open scene, together with the files that it came from."""
+"""Repeated checks of an open scene, together with its source files."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def lint_again(
     paths : sequence of Path
         The files that it was opened from.
     options : LintOptions, optional
-        Thresholds of faults.
+        Thresholds of the checks.
     settings : MotionSettings, optional
         How its motions were interpreted.
     since : float, optional
@@ -86,8 +86,8 @@ def lint_again(
     notes = []
     gone = [path for path in paths if not _is_there(path)]
     if gone:
-        notes.append(f"{_names(gone, 'is', 'are')} gone: only what is open was checked")
-        # The remaining files need not fit together.
+        notes.append(f"{_names(gone, 'is', 'are')} missing: only the open scene was checked")
+        # The remaining files need not match each other.
         opened.findings = [found for found in opened.findings if found.code != "F004"]
     changed = [path for path in opened.sources if since is not None and _changed(path) > since]
     if changed:

@@ -23,9 +23,9 @@ class Places:
     Attributes
     ----------
     vertices : (N, 3)
-        The worst first.
+        Positions, the worst first.
     triangles : (T, 3, 3)
-        Their corners; the worst triangle first.
+        Corners of triangles; the worst triangle first.
     joints : (J, 3)
         Joints, or captured points that are seen; for findings about a whole motion, its actor.
     facing : (3,)
@@ -55,7 +55,7 @@ def places_of(
     skinning : Skinning, optional
         Skinning method of the displayed mesh.
     binding : bool
-        Whether the mesh is displayed in its bind space.
+        Whether the mesh is displayed in its bind pose.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return Places()
@@ -107,7 +107,7 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
 
 
 def _middle(actor: Actor) -> Floats:
-    """Return the position of a whole actor: its roots, or the mean of its points. (N, 3)."""
+    """Return the position of a whole actor: its roots, or the mean of its points: (N, 3)."""
     figure, points = actor.figure, actor.points
     if isinstance(actor.clip, PointClip):
         seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]
@@ -135,8 +135,8 @@ def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> F
     -------
     (N, 3)
         Scene space: the vertices, else the corners of triangles, else the joints;
-        the whole actor if the finding names none, or none is present; empty without an
-        actor.
+        the actor's position if the finding names none of these, or none is present;
+        empty without an actor.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return np.zeros((0, 3))

@@ -57,6 +57,6 @@ def counting_of(scene: Scene, keyed_rate: float) -> Counting:
         return Counting(keyed_rate, time_span(moving)[0])
     longest = max(captured, key=lambda actor: np.subtract(*time_span([actor])[::-1]))
     clip = longest.clip
-    assert isinstance(clip, SampledClip | PointClip)  # only these were collected
+    assert isinstance(clip, SampledClip | PointClip)  # only sampled motions were collected
     timing = clip.timing
     return Counting(frame_rate(clip), timing.start + longest.offset, timing.first_frame)

@@ -1,4 +1,4 @@
-"""Findings of checks, and the subject that checks are given."""
+"""Findings of checks, and the subject passed to checks."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from viewer.rig.units import METRES
 __all__ = ["MAX_ROTATION", "Finding", "LintOptions", "Subject"]
 
 MAX_ROTATION = 3400.0
-"""Default limit of a joint's rotation relative to its parent, degrees per second."""
+"""Default limit of the rotation rate of a joint relative to its parent, degrees per second."""
 
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
 _STRAYS = 0.02  # fraction of vertices that may be strays, at each end of an axis
-_FAR = 10.0  # ratio of bounding boxes, with and without strays, from which these are ignored
+_FAR = 10.0  # ratio of bounding boxes with and without strays above which strays are ignored
 
 Indices = NDArray[np.int64] | Ints | list[int]
 
 
 @dataclass(frozen=True, slots=True)
 class LintOptions:
-    """Thresholds of faults that depend on the user's purpose.
+    """Check thresholds that depend on the user's purpose.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Finding:
     Attributes
     ----------
     diagnostic : Diagnostic
-        The fault, with file and line if known.
+        The diagnostic, with file and line if known.
     actor : int or None
         Index in the scene.
     name : str
@@ -86,7 +86,7 @@ class Finding:
     seek : float or None
         Best time for viewing it, in seconds; None for the first of ``times``.
     at : (str, int) or None
-        The first item in the message, by which readers remember its position in a file:
+        The first item in the message, for which the reader recorded a position in its file:
         ``("weights", 5)`` is the line of vertex 5's weights.
     """
 
@@ -114,12 +114,12 @@ class Finding:
 
     @property
     def message(self) -> str:
-        """The message, one line with numbers."""
+        """The message, one line with its values."""
         return self.diagnostic.full_message
 
     @property
     def file(self) -> Path | None:
-        """The file at fault, if known."""
+        """The file that it is about, if known."""
         return self.diagnostic.path
 
     @property
@@ -129,12 +129,12 @@ class Finding:
 
     @property
     def title(self) -> str:
-        """Title of its code."""
+        """Title of the code."""
         return CODES[self.code].title
 
     @property
     def hint(self) -> str:
-        """Hint for fixing it."""
+        """Suggested remedy."""
         code = CODES[self.code]
         return code.other_hint if code.other_hint and self.line is None else code.hint
 
@@ -159,9 +159,9 @@ class Subject:
     up : "y" or "z"
         The scene's up axis.
     options : LintOptions
-        Thresholds of faults.
+        Thresholds of the checks.
     counting : Counting or None
-        Frame numbering of keyed clips; None for one of their own.
+        Frame numbering of keyed clips; None to number each clip separately.
     invalid : mapping of str to (N,)
         Data that a reader replaced because the file's own is invalid: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and

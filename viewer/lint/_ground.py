@@ -21,9 +21,9 @@ _NEAR = 0.03  # the same, for the lowest feet if they never rest
 _LONG = 0.1  # minimum seconds for which a foot rests
 _CALM = 0.006  # maximum vertical motion meanwhile; at the top of a jump a foot falls by 12 mm
 _MOST = 0.5  # fraction of these frames that must be this close to their mean
-_RESTS = 0.2  # fraction of all frames: with fewer at rest, equal heights may be chance
+_RESTS = 0.2  # fraction of all frames: with fewer at rest, equal heights may be coincidence
 _FRACTION = 0.1  # fraction of the frames at rest that makes a level
-_TIE = 0.5  # fraction of the longest level's frames above which a likely level wins
+_TIE = 0.5  # fraction of the longest level's frames above which a likely level is chosen
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
 _ROLLS = 0.02  # from the longest level: a rolling foot makes others this close
 _STEP = 0.06  # below the longest level: the ground may be this far below a step or a seat
@@ -31,7 +31,7 @@ _STEP = 0.06  # below the longest level: the ground may be this far below a step
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Height of the ground, or the evidence that leaves it unknown.
+    """Height of the ground, or the evidence for why it is unknown.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Ground:
 def ground_of(
     lowest: Floats, present: Bools, step: float, size: float, likely: Sequence[float] = (0.0,)
 ) -> Ground:
-    """Return the height on which feet rest, if the motion determines it.
+    """Return the height at which feet rest, if the motion determines it.
 
     This is the level on which they rest longest, or a likely one with a similar duration. It is
     unknown if they rest nearly as long on another level, or on a likely one that is a step away,

@@ -1,4 +1,4 @@
-"""Conversion of diagnostics of readers and loaders to findings."""
+"""Converts diagnostics of readers and loaders to findings."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
 
 
 def of_error(problem: ViewerError, path: Path | None = None) -> Finding:
-    """Return an error as a finding; ``path`` is the file at fault, if the error has none."""
+    """Return an error as a finding; ``path`` is the file that failed, if the error has none."""
     found = problem.diagnostic
-    if found is None:  # parts that do not fit together, as worded by the figure's classes
+    if found is None:  # parts that do not match, as reported by the figure's classes
         found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
     return of_diagnostic(found)
 
 
 def of_refusal(problem: ViewerError, path: Path) -> Finding:
-    """Return the error that stopped the reading of a file as a finding."""
+    """Return the error that stopped parsing a file as a finding."""
     finding = of_error(problem, path)
     return replace(finding, diagnostic=replace(finding.diagnostic, is_final=True))
 

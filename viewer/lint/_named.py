@@ -1,4 +1,4 @@
-"""Locations in an actor of the parts that a reader's diagnostic names."""
+"""Locates the elements named by a reader's diagnostic in an actor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
     Parameters
     ----------
     remark : Finding
-        Of the file that this part was read from.
+        Finding about the file that this part was read from.
     actor : Actor
         The actor with this part.
     part : "mesh", "skeleton" or "clip"

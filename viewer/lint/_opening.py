@@ -1,4 +1,4 @@
-"""Opening of files for checks: files that fail become findings, the rest is assembled."""
+"""Opens files for checks: files that fail become findings, the rest is assembled."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ class Opened:
     Attributes
     ----------
     scene : Scene
-        Figures that fit nothing are separate actors.
+        Figures that match nothing are separate actors.
     contents : Contents
         Contents of all files that were read.
     findings : list of Finding
         Files that cannot be read or assembled, and messages of readers.
     sources : dict of Path to Source
-        All files that were read, with their faults and the positions of their data.
+        All files that were read, with their errors and the positions of their data.
     """
 
     scene: Scene = field(default_factory=lambda: Scene([]))
@@ -111,7 +111,7 @@ def _resolved(path: Path) -> Path:
 
 
 def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
-    """Read one file, recording all recoverable faults; return files that it names."""
+    """Read one file, recording all recoverable errors; return files that it names."""
     contents, recorded = Contents(), Collector(keeps_errors=True)
     named: tuple[Path, ...] = ()
     refusals: list[Finding] = []
@@ -130,7 +130,7 @@ def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -
 
 
 def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
-    """Read the parts of a file that load lazily, so that their faults are known now.
+    """Read the parts of a file that load lazily, so that their errors are known now.
 
     Parts that cannot be read are reported, and dropped from the figure.
     """
@@ -150,7 +150,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
 
 
 def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
-    """Make a scene; parts that do not fit are removed, reported, and checked separately."""
+    """Make a scene; parts that do not match are removed, reported, and checked separately."""
     contents = replace(opened.contents)
     alone: list[Figure] = []
     for path, figure in opened.contents.figures:
@@ -169,7 +169,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         culprit = _culprit(problem, contents)
         opened.findings.append(of_error(problem, culprit))
         if culprit is None:
-            # The model is missing from the files: whatever needs it cannot be checked.
+            # The model is not among the files: motions that need it cannot be checked.
             contents = Contents(figures=contents.figures, clips=contents.clips)
         else:
             alone += _take_out(contents, culprit)
@@ -183,7 +183,7 @@ def _read_on(
     """Read captures completely; return the error that stopped one."""
     for builder in builders:
         while not builder.is_done:
-            if progress is not None:  # an exception from it is not a file's fault
+            if progress is not None:  # an exception from it is not a file error
                 progress(builder.n_read, builder.capture.n_frames, "reading frames")
             try:
                 new, notes = builder.read_some()
@@ -331,7 +331,7 @@ def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
 
 _INVALID = {"mesh": ("positions", "weights", "triangles", "bindings"),
             "skeleton": ("joints",), "clip": ("frames",)}  # fmt: skip
-"""Parts of a fault for each part of an actor."""
+"""Diagnostic parts for each part of an actor."""
 
 
 def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:

@@ -1,4 +1,4 @@
-"""Representative poses of an actor, in which faults of a rig are visible."""
+"""Representative poses of an actor, in which rig errors are visible."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from viewer.rig.skeleton import clamp_dofs
 
 __all__ = ["some_poses"]
 
-_COUNT = 4  # number of poses besides rest and the present one
+_COUNT = 4  # number of poses besides the rest pose and the current pose
 _SWING = 0.6  # radians: about the largest rotation of most joints in a walk
 _SEED = 5  # fixed, so that the same file gives the same numbers
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def some_poses(actor: Actor) -> list[Pose]:
-    """Return the rest pose, the present one, and some from the clip, or else random ones.
+    """Return the rest pose, the current pose, and some from the clip, or else random poses.
 
     Parameters
     ----------
     actor : Actor
-        With a skeleton.
+        Actor with a skeleton.
     """
     figure, clip = actor.figure, actor.clip
     assert figure.skeleton is not None and actor.pose is not None  # checked by the callers

@@ -1,4 +1,4 @@
-"""Reports of findings: one line each for people and editors, all data for programs."""
+"""Finding reports: one line each for people and editors, all data for programs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def finding_text(finding: Finding) -> str:
     if finding.file is not None and finding.file != Path():
         place = printable(finding.file, 300)
         place += f":{finding.line}" if finding.line is not None else ""
-        # A folder's figure has the folder's name, its findings name the file inside.
+        # A folder's figure has the folder's name, whereas its findings name the file inside.
         folders = finding.file.parent.name, folder_name(finding.file.parent)
         known = (finding.file.stem, finding.file.name, *folders, "")
         who = "" if finding.name in known else f"{printable(finding.name, 100)}: "
@@ -99,7 +99,7 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
 
 
 def _data(found: Diagnostic) -> dict[str, Any]:
-    """Return a diagnostic's data besides its code, severity, message and file location."""
+    """Return a diagnostic's data except its code, severity, message and file location."""
     data = described(found)
     return {key: data[key] for key in ("key", "part", "places", "n_places", "count", "values")}
 

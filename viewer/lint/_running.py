@@ -16,7 +16,7 @@ from viewer.rig.scene import Scene
 __all__ = ["CHECKS", "Check", "Progress", "lint_scene"]
 
 Progress = Callable[[int, int, str], None]
-"""Called with the completed steps, all steps, and the next step; may raise to cancel."""
+"""Called with the number of completed steps, the total, and the next step; may raise to cancel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Check:
 CHECKS = {
     "weights": Check("weights"),
     "bindings": Check("bind matrices"),
-    "skeletons": Check("skeleton", of_motion=True),  # the pose is the actor's own
+    "skeletons": Check("skeleton", of_motion=True),  # each actor has its own pose
     "meshes": Check("mesh"),
     "symmetry": Check("symmetry"),
     "clips": Check("clip", of_motion=True),
@@ -61,7 +61,7 @@ def lint_scene(
     scene : Scene
         Not changed.
     options : LintOptions, optional
-        Thresholds of faults.
+        Thresholds of the checks.
     progress : callable, optional
         Called before every step with the completed steps, their number, and the next step; may
         raise to cancel.
@@ -87,9 +87,9 @@ def lint_scene(
     for number, (subject, name) in enumerate(steps):
         if progress is not None:
             progress(number, len(steps), f"{subject.actor.name}: {CHECKS[name].title}")
-        # Products of huge numbers overflow; such vertices are distant, and reported.
+        # Products of huge numbers overflow; vertices that far away are reported as strays.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             findings += import_module(f"viewer.lint.{name}").check(subject)
         if name == next(reversed(CHECKS)):
-            subject.tracks.clear()  # a long track takes much memory, and is not needed again
+            subject.tracks.clear()  # a long track takes a lot of memory, and is not needed again
     return findings

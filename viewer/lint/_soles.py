@@ -1,4 +1,4 @@
-"""Soles of a body: points of the mesh that may touch the ground, for any rotation of a foot."""
+"""Soles of the feet: mesh points that may touch the ground, for any foot rotation."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
     Parameters
     ----------
     figure : Figure
-        With the shape in which it moves.
+        Figure in the shape in which it is animated.
     is_bound : bool
         Whether its bindings are valid; else joints are used instead of the mesh.
     """
@@ -147,7 +147,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 
 def _directions(axis: int) -> Floats:
-    """Return directions down and tilted from there to all sides: (D, 3)."""
+    """Return the down direction, and directions tilted from it to all sides: (D, 3)."""
     angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
     sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]

@@ -20,7 +20,7 @@ def welded(positions: Floats, triangles: Ints) -> Indices:
     Parameters
     ----------
     positions : (V, 3)
-        Of exactly equal ones the first represents all.
+        Exactly equal positions are represented by the first of them.
     triangles : (T, 3)
         Vertex indices.
     """

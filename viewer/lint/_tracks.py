@@ -23,7 +23,7 @@ __all__ = ["frame_numbers", "key_times", "track_of"]
 
 _TOGETHER = 1000  # frames per batch, whose matrices are in memory together
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
-_ON_STEP = 1e-6  # of a step
+_ON_STEP = 1e-6  # fraction of a step
 
 
 def track_of(subject: Subject) -> Track | None:

@@ -16,8 +16,9 @@ __all__ = ["are_singular", "check"]
 
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
 _NEARLY = 1e6  # condition number
-_AFFINE = 1e-6  # of the last row
-_ELSEWHERE = 0.01  # of the figure's size: smaller differences are rounding in old files
+_AFFINE = 1e-6  # absolute error of the last row
+# Fraction of the figure's size: smaller differences are rounding errors of old files.
+_ELSEWHERE = 0.01
 
 
 def are_singular(matrices: Floats) -> Bools:
@@ -62,7 +63,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _about(subject: Subject, key: str, wrong: Bools, values: Floats) -> list[Finding]:
-    """Report joints with faulty bind matrices, with the value of the first."""
+    """Report joints with invalid bind matrices, with the value of the first."""
     joints = np.flatnonzero(wrong)
     if len(joints) == 0:
         return []

@@ -16,13 +16,13 @@ __all__ = ["LOW_FRACTION", "LOW_FRAMES", "check"]
 Indices = NDArray[np.int64]
 
 LOW_FRACTION = 0.05
-"""Fraction of the frames that see a keypoint: this much low confidence is usual."""
+"""Fraction of a keypoint's visible frames: this much low confidence is usual."""
 
 LOW_FRAMES = 2
 """Minimum number of frames of low confidence."""
 
 _SINGLE = 6  # maximum number of keypoints of low confidence listed individually
-_SIZES = 15.0  # sizes of the points' box that a point may move per second
+_SIZES = 15.0  # maximum speed of a point, in sizes of the points' bounding box per second
 
 
 def check(subject: Subject) -> list[Finding]:

@@ -22,7 +22,7 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["check", "missing_frames"]
 
-_SIZES = 15.0  # figure sizes that a joint may move per second: about 30 m/s for a person
+_SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # radians or lengths beyond a limit
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
@@ -52,7 +52,7 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     there = np.flatnonzero(present)
     if len(there) == 0:
         return []
-    # Appearing later or leaving earlier than others is not a fault.
+    # Appearing later or leaving earlier than others is not an error.
     gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
     if len(gaps) == 0:
         return []

@@ -18,7 +18,7 @@ __all__ = ["check"]
 
 # Below the ground, in heights of the figure at rest: 17 mm for a person, 51 mm for a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03
-_FACTOR = 3.0  # at this multiple of the limit even a single frame counts
+_FACTOR = 3.0  # at this multiple of the limit even a single frame is reported
 # Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
 _TOUCHES = 0.02  # above the ground
 _SLIDES = 0.15  # per second
@@ -28,7 +28,7 @@ _WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames ar
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Check the feet of a moving body, a skeleton with two ankles by name."""
+    """Check the feet of a moving body: a skeleton whose joint names include two ankles."""
     figure = subject.actor.figure
     track = None if figure.skeleton is None else _moving(subject, figure)
     if track is None or figure.skeleton is None or subject.options.ground == "none":

@@ -19,7 +19,8 @@ _FLAT = 1e-7  # height of a triangle relative to the mesh: float32 rounding
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # a normal of this length counts as zero
 _AGAINST = -0.1  # cosine to a triangle's own normal: perpendicular ones are smoothed over an edge
-_CLOSED = 0.25  # squared border edges over triangles: with smaller holes a volume keeps its sign
+# Squared number of border edges per triangle: with smaller holes a volume keeps its sign.
+_CLOSED = 0.25
 # Times the median distance of vertices from their median: feet are 16 times as far in models
 # with half of their vertices in the face.
 _FAR = 40.0
@@ -236,7 +237,7 @@ def _inside_out(
 def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
     """Return each component's number of edges of valid triangles without a valid neighbour: (T,).
 
-    Missing triangles close nothing: the surface may have ended there.
+    Missing triangles do not close a surface: it may have ended there.
     """
     alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
     beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]

@@ -19,7 +19,7 @@ _ROUNDING = 1e-9  # radians or lengths beyond a limit
 
 
 def check(subject: Subject) -> list[Finding]:
-    """Check the skeleton and the present pose of an actor."""
+    """Check the skeleton and the current pose of an actor."""
     skeleton, pose = subject.actor.figure.skeleton, subject.actor.pose
     if skeleton is None:
         return []

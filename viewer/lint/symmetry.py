@@ -14,8 +14,8 @@ from viewer.rig.skin import Skin, normalized, owners, row_norms
 
 __all__ = ["check"]
 
-_MOVED = 1e-3  # of the figure's size: reported as a note
-_ASKEW = 1e-2  # of the figure's size: visible
+_MOVED = 1e-3  # fraction of the figure's size: reported as a note
+_ASKEW = 1e-2  # fraction of the figure's size: visible
 _SHIFTED = 0.02  # total difference of a vertex's weights
 _UNEQUAL = 0.2
 
@@ -37,7 +37,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _known(subject: Subject, figure: Figure, part: str) -> Bools:
-    """Return the vertices that can be compared: they and their partners are valid. (V,)."""
+    """Return the vertices that can be compared: they and their counterparts are valid. (V,)."""
     assert figure.symmetry is not None  # checked by the caller
     valid = subject.valid(part, len(figure.symmetry))
     known: Bools = valid & valid[figure.symmetry]
@@ -88,18 +88,19 @@ def _weights(
 
 
 def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
-    """Return the difference of each vertex's weights from its partner's, sides exchanged.
+    """Return the difference of each vertex's weights from its counterpart's, with sides swapped.
 
-    The sum over joints of |w(v, j) - w(partner of v, partner of j)|, weights scaled to a sum of 1.
+    The sum over joints of |w(v, j) - w(counterpart of v, counterpart of j)|, for weights normalised
+    to a sum of 1.
 
     Parameters
     ----------
     skin : Skin
         V vertices, J joints.
     symmetry : (V,)
-        Each vertex's partner.
+        Mirror counterpart of each vertex.
     partners : (J,)
-        Each joint's partner.
+        Mirror counterpart of each joint.
 
     Returns
     -------
@@ -108,7 +109,7 @@ def weight_differences(skin: Skin, symmetry: Ints, partners: Ints) -> Floats:
     """
     whole = normalized(skin)
     vertices, joints = owners(whole), whole.joints
-    # Each influence, and the reflected influence of the partner with a minus sign.
+    # Each influence, and the reflected influence of the counterpart with a minus sign.
     return row_norms(
         skin.n_vertices,
         np.concatenate([vertices, symmetry[vertices]]),

@@ -27,7 +27,7 @@ def check(subject: Subject) -> list[Finding]:
     figure = subject.actor.figure
     if figure.skin is None or figure.mesh is None:
         return []
-    # Weights missing from the file are neither too few nor too many.
+    # Weights missing from the file cannot be judged.
     known = subject.valid("weights", figure.skin.n_vertices)
     moved = has_influence(figure.skin)
     return [

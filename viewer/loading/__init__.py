@@ -1,4 +1,4 @@
-"""Loading of files as one scene: figures with their motions, poses and pictures."""
+"""Loads files as one scene: figures with their motions, poses and images."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ def load(
     """Open files as one scene; without files, the bundled figure.
 
     Files are recognised by content. A skeleton is combined with the first skin that has its number
-    of joints, preferably one of the same name. A figure without a partner opens alone; several
-    actors are placed side by side. A clip is assigned to the first actor without a clip that has
-    its number of channels. A BVH drives the requested model if given, else the first figure whose
-    joints it names; otherwise it is a separate skeleton, in metres if there are other actors, else
-    in its file's unit.
+    of joints, preferably one with the same name. A skeleton or skin without a match opens alone;
+    several actors are placed side by side. A clip is assigned to the first actor without a clip
+    that has its number of channels. A BVH drives the requested model if given, else the first
+    figure whose joints it names; otherwise it is a separate skeleton, in metres if there are other
+    actors, else in its file's unit.
     Captured bodies are drawn with the first body model among the files, or the bundled body. All
     actors are posed at the start of their motions. A pose is applied to the first actor that it
-    fits, a picture to the first one with texture coordinates but no texture.
+    matches, an image to the first one with texture coordinates but no texture.
 
     Parameters
     ----------
     *paths : str or Path
         ``.skel``, ``.skin``, ``.anim``, ``.bvh``, body models, PIG folders, AMASS files,
-        EasyMocap folders, poses and pictures, in any order.
+        EasyMocap folders, poses and images, in any order.
     max_size : int
         Larger files, in bytes, are rejected before they are read.
     motion : MotionSettings, optional
@@ -61,7 +61,7 @@ def load(
     FormatError
         If a file cannot be read; includes the line if known.
     RigError
-        If a skin, clip or pose does not fit; the message has the files and numbers.
+        If a skin, clip or pose does not match; the message names the files and counts.
 
     >>> scene = load()
     >>> scene.actors[0].figure.name

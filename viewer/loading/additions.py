@@ -1,4 +1,4 @@
-"""Application of poses and pictures to an actor."""
+"""Applies poses and texture images to an actor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["add_to_actor", "apply_pose"]
 
 
 def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnostic]]:
-    """Apply poses and pictures to an actor that is already open.
+    """Apply poses and images to an actor that is already open.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
     Raises
     ------
     FormatError
-        If a pose does not fit; the actor is then unchanged.
+        If a pose does not match; the actor is then unchanged.
     RigError
-        If a picture does not fit, or there is nothing to pose.
+        If a texture image cannot be applied, or there is nothing to pose.
     """
     notes: list[Diagnostic] = []
     trial = actor.copy()
@@ -64,7 +64,7 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]
     Raises
     ------
     FormatError
-        If it does not fit; the actor is then unchanged.
+        If it does not match; the actor is then unchanged.
     """
     assert actor.pose is not None  # checked by the callers
     try:

@@ -1,4 +1,4 @@
-"""Assembly of a scene: skeletons with skins, then clips, poses and pictures for the actors."""
+"""Assembly of a scene: skeletons with skins, then clips, poses and images for the actors."""
 
 from __future__ import annotations
 
@@ -61,7 +61,8 @@ def begin(
     scene : Scene
         Posed at the start of its motions.
     builders : list of Builder
-        Captures whose first frames are in the scene; people who appear later are not yet.
+        Captures whose first frames are in the scene; people who appear later are added during
+        reading.
 
     Raises
     ------
@@ -156,7 +157,7 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
 
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
-    """Apply a pose to the first actor that it fits."""
+    """Apply a pose to the first actor that it matches."""
     problem: FormatError | None = None
     for actor in actors:
         if actor.pose is not None:
@@ -185,7 +186,7 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
 
 
 def _join(parts: list[tuple[Path, Figure]]) -> Figure:
-    """Attach a skin to its skeleton, or return a figure without a partner."""
+    """Attach a skin to its skeleton, or return an unmatched figure as it is."""
     if len(parts) == 1:
         return parts[0][1]
     paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
@@ -202,7 +203,7 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
 
 
 def _stand_up(cast: Cast, world_up: str) -> None:
-    """Rotate actors whose files have another up axis than the scene."""
+    """Rotate actors whose files have a different up axis from the scene."""
     for actor, up in zip(cast.actors, cast.ups, strict=True):
         if up != world_up:
             quarter = np.pi / 2 if world_up == "z" else -np.pi / 2

@@ -51,11 +51,11 @@ class Builder:
     model : Figure
         The figure that its bodies are drawn with.
     called : str
-        Base name of all its people; the capture's if empty.
+        Base name of all people; the capture's name if empty.
     keeps_shape : bool
         Whether the capture's shape coefficients are valid for the model.
     placement : (4, 4)
-        Of every actor.
+        Placement of every actor.
     up : "y" or "z"
         The axis along which people stand before placement.
     n_read : int
@@ -115,7 +115,7 @@ class Builder:
         Raises
         ------
         RigError
-            If the bodies do not fit the model.
+            If the bodies do not match the model.
         """
         new: list[Actor] = []
         notes = [*part.warnings]
@@ -132,7 +132,7 @@ class Builder:
         return new, [*reversed(fresh.values())]
 
     def _shape_notes(self) -> list[Diagnostic]:
-        """Return, at the end, a message if bodies have the mean shape for lack of another."""
+        """Return, at the end, a message if bodies have the mean shape because none was given."""
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         if not (self.is_done and self.keeps_shape and lacks):
             return []
@@ -207,7 +207,7 @@ class Builder:
                 actor.placement = self.placement.copy()
 
     def refusal(self, problem: RigError) -> RigError:
-        """Return an error extended by the model that would fit."""
+        """Return an error that also names the model that would match."""
         values = {"problem": problem.cause, "member": self.capture.model}
         key = "F004.capture-of-member" if self.capture.model else "F004.capture"
         return RigError(Diagnostic(key, self.path, values=values))

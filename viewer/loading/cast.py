@@ -36,7 +36,7 @@ class Cast:
     images : CameraImages or None
         Their images: those of the first capture that has some.
     diagnostics : list of Diagnostic
-        Messages from the construction.
+        Messages from assembling the scene.
     """
 
     actors: list[Actor]

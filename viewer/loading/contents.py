@@ -1,4 +1,4 @@
-"""Contents of files by kind, before they are assembled."""
+"""Contents of files by type, before they are assembled."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ if TYPE_CHECKING:
 __all__ = ["Contents", "read_files", "read_source"]
 
 
-_PEEK = 16  # bytes that identify a picture
+_PEEK = 16  # bytes that identify an image
 
 
 @dataclass(slots=True)
 class Contents:
-    """Contents of several files by kind, with the path of each.
+    """Contents of several files by type, with the path of each.
 
     Attributes
     ----------
     called : dict
-        Names of figures by resolved file, if another file gave one.
+        Figure names by resolved file, where another file specifies one.
     diagnostics : tuple of Diagnostic
         Messages from the readers.
     files : tuple of Path
@@ -90,7 +90,7 @@ class Contents:
 
     @property
     def is_addition(self) -> bool:
-        """Whether there are only poses and pictures, for a figure that is already open."""
+        """Whether there are only poses and images, for a figure that is already open."""
         others = self.figures or self.has_motion or self.morphs
         return not others and bool(self.poses or self.pictures)
 
@@ -153,7 +153,7 @@ _LISTS = {
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read a file and add its contents by kind; return files that it names."""
+    """Read a file and add its contents by type; return files that it names."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind == "NamedFiles":
@@ -190,7 +190,7 @@ def _is_picture(source: Source) -> bool:
 
 
 def _with_own_picture(source: Source, figure: Figure) -> Figure:
-    """Apply the picture in a figure's folder as its texture, if there is exactly one."""
+    """Apply the image in a figure's folder as its texture, if there is exactly one."""
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None or mesh.materials:
         return figure

@@ -1,4 +1,4 @@
-"""Pictures as textures of figures."""
+"""Applies images as textures of figures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["with_texture"]
 
 
 def with_texture(figure: Figure, path: Path, pixels: Bytes) -> Figure:
-    """Return a figure textured with one picture.
+    """Return a figure textured with one image.
 
     Raises
     ------

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["drive", "is_body"]
 
-_ROOTS = ("pelvis", "wrist", "global")  # of members of the SMPL family
+_ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
 
 
 def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
@@ -40,7 +40,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     FormatError
         If the model cannot be read.
     RigError
-        If a clip fits no skeleton, or bodies or a BVH do not fit the model.
+        If a clip matches no skeleton, or bodies or a BVH do not match the model.
     """
     for path, clip in contents.clips:
         _give_clip(path, clip, cast, contents)
@@ -78,7 +78,7 @@ def _give_skeleton_motions(
 
 
 def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
-    """Assign a clip to the first actor that it fits."""
+    """Assign a clip to the first actor that it matches."""
     skeletons = [actor.figure.skeleton for actor in cast.actors]
     for actor, skeleton in zip(cast.actors, skeletons, strict=True):
         if (
@@ -134,7 +134,7 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
 
 
 def _is_bundled(figure: Figure) -> bool:
-    # Only the bundled body names its shapes by their effect.
+    # Only the bundled body names its shapes after their effects.
     return figure.blend_shapes is not None and "stature" in figure.blend_shapes.names
 
 
@@ -178,7 +178,7 @@ def _give_body_motion(
 
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
-    """Return the up axis judged by the people, and record it unless it is the usual one."""
+    """Return the up axis estimated from the people, and record it unless it is the usual one."""
     from viewer.rig.motion.up_axis import guess_up
 
     up = guess_up(actors)

@@ -10,7 +10,7 @@ __all__ = ["MotionSettings"]
 
 @dataclass(frozen=True, slots=True)
 class MotionSettings:
-    """How motions are read and assigned; by default as their files say.
+    """Settings for reading and assigning motions; by default as stated in the files.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ __all__ = ["Lone", "agree_on_units", "give_skeleton_motion"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lone:
-    """A motion that drives no figure.
+    """A motion that does not drive a figure.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Lone:
     motion : SkeletonMotion
         With the requested settings applied.
     actor : Actor
-        Its skeleton in the scene.
+        The motion's skeleton in the scene.
     """
 
     path: Path
@@ -49,7 +49,7 @@ def give_skeleton_motion(
     settings: MotionSettings,
     model: Figure | None,
 ) -> Lone | None:
-    """Let a motion drive the model, else the first figure whose joints it names, or none.
+    """Apply a motion to the model, else to the first figure whose joints it names, else to none.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def give_skeleton_motion(
     Raises
     ------
     RigError
-        If it does not fit the model.
+        If it does not match the model.
     """
     motion = _as_asked(motion, settings)
     for note in motion.up_notes:
@@ -121,7 +121,7 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 
 
 def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
-    """Assign a motion to the first figure with a mesh and no clip that it fits, if any."""
+    """Assign a motion to the first matching figure with a mesh and no clip, if any."""
     refusal: str | Diagnostic = ""
     for actor in cast.actors:
         if actor.clip is not None or not actor.figure.is_attached:
@@ -140,9 +140,9 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: 
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale separate skeletons to metres if other actors have another unit; record the guesses.
+    """Scale separate skeletons to metres if other actors have a different unit; record the guesses.
 
-    A lone skeleton, or one among others in its own unit, keeps the numbers of its file.
+    A lone skeleton, or one among others in the same unit, keeps the values of its file.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:
-    """Return whether a skeleton's unit is known, not metres, and not that of all other actors."""
+    """Return whether a unit is known, not metres, and not that of all other actors."""
     unit = one.motion.figure.unit
     if unit == "m" or unit not in METRES:
         return False

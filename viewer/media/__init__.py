@@ -1,1 +1,1 @@
-"""Pictures, videos and atomic saving."""
+"""Images, videos and atomic saving."""

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PaletteChooser", "PaletteUser"]
 
-_HUNDREDTH = Fraction(1, 100)  # of a second, the time unit of GIF
-_PALETTE_SIDE = 16  # FFmpeg stores a palette as a picture of 16 x 16
+_HUNDREDTH = Fraction(1, 100)  # seconds, the time unit of GIF
+_PALETTE_SIDE = 16  # FFmpeg stores a palette as an image of 16 x 16
 
 
 class PaletteChooser:

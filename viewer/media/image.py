@@ -1,4 +1,4 @@
-"""Decoding and writing of pictures; Pillow is imported only when it is needed."""
+"""Image reading and writing; Pillow is imported only when it is needed."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins like this is a picture in a supported format."""
+    """Return whether a file that begins like this is an image in a supported format."""
     return head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*")) or (
         head[:4] == b"RIFF" and head[8:12] == b"WEBP"
     )
 
 
 def decode_picture(path: Path, data: bytes) -> Bytes:
-    """Return the pixels of a picture: (H, W, 4) uint8, first row at the top.
+    """Return the pixels of an image: (H, W, 4) uint8, first row at the top.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
     Raises
     ------
     FormatError
-        If it is not a readable picture.
+        If it is not a readable image.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -79,7 +79,7 @@ def picture_dimensions(path: Path) -> tuple[int, int] | None:
 
 
 def _open(data: bytes) -> Image.Image:
-    """Open a picture; for a PNG, Pillow's other plugins are not loaded, which takes 15 ms."""
+    """Open an image; for a PNG, Pillow's other plugins are not loaded, which takes 15 ms."""
     from PIL import Image, PngImagePlugin
 
     if data.startswith(b"\x89PNG"):
@@ -88,7 +88,7 @@ def _open(data: bytes) -> Image.Image:
 
 
 def save_image(path: Path, pixels: Bytes) -> int:
-    """Write a picture in the format of its suffix, PNG if there is no suffix.
+    """Write an image in the format of its suffix, PNG if there is no suffix.
 
     Parameters
     ----------
@@ -129,5 +129,5 @@ def _encoded(path: Path, pixels: Bytes) -> bytes:
         picture.save(stream, kind)
     except (KeyError, ValueError, OSError):  # raised by Pillow
         name = printable(path, 300)
-        raise OutputError(f"{name}: pictures cannot be written as this") from None
+        raise OutputError(f"{name}: images cannot be written in this format") from None
     return stream.getvalue()

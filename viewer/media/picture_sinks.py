@@ -1,4 +1,4 @@
-"""Sinks that write frames as pictures: one file for each, or one contact sheet of all."""
+"""Sinks that write frames as images: one file per frame, or one contact sheet of all."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["PictureSink", "SheetSink", "sheet_layout"]
 
-_MOST_WORKERS = 4  # pictures that are compressed at the same time
+_MOST_WORKERS = 4  # images that are compressed at the same time
 _SMALLEST_CELL = 16  # pixels
 _CELL_ASPECT = 4.0 / 3.0
 _GUTTER = 0.006  # between cells, relative to the picture's shorter side
@@ -24,9 +24,9 @@ _WHITE = (255, 255, 255, 255)
 
 
 class PictureSink:
-    """Writes a picture for every frame, each atomically.
+    """Writes an image for every frame, each atomically.
 
-    Finished pictures are kept if the run is aborted.
+    Finished images are kept if the run is aborted.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class PictureSink:
     Attributes
     ----------
     workers : int
-        Number of pictures that may be written at the same time.
+        Number of images that may be written at the same time.
     n_bytes : int
         Total size of the files written so far.
     """
@@ -53,10 +53,10 @@ class PictureSink:
         return sum(path.stat().st_size for path in self.paths if path.is_file())
 
     def look(self, pixels: Bytes) -> None:
-        """Do nothing: pictures are independent of each other."""
+        """Do nothing: images are independent of each other."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Write one picture; see ``viewer.rendering.recorder.Sink``.
+        """Write one image; see ``viewer.rendering.recorder.Sink``.
 
         Raises
         ------
@@ -66,14 +66,14 @@ class PictureSink:
         save_image(self.paths[frame], pixels)
 
     def close(self) -> None:
-        """Do nothing: every picture is complete."""
+        """Do nothing: every image is complete."""
 
     def abort(self) -> None:
-        """Do nothing: no picture is ever incomplete."""
+        """Do nothing: no image is ever incomplete."""
 
 
 class SheetSink:
-    """Writes one picture of all frames, row by row, with gutters and a number in each cell.
+    """Writes one image of all frames, row by row, with gutters and a number in each cell.
 
     Gutters and unused cells are white, or transparent if the frames are.
 
@@ -82,7 +82,7 @@ class SheetSink:
     path : Path
         Its suffix chooses the format.
     size : (int, int)
-        Largest width and height of the picture, in pixels.
+        Largest width and height of the image, in pixels.
     numbers : sequence of int
         Number of each frame, written into its cell.
     aspect : float
@@ -97,7 +97,7 @@ class SheetSink:
     cell : (int, int)
         Width and height of a cell: the size of the frames.
     size : (int, int)
-        Width and height of the whole picture.
+        Width and height of the whole image.
     n_bytes : int
         Size of the written file.
 
@@ -124,7 +124,7 @@ class SheetSink:
         if min(self.cell) < _SMALLEST_CELL:
             raise ViewerError(
                 f"contact sheet: {len(numbers)} frames in {size[0]} x {size[1]} pixels are "
-                f"{self.cell[0]} x {self.cell[1]} each, which is too small to see anything"
+                f"{self.cell[0]} x {self.cell[1]} each, which is too small"
             )
         self._sheet: Bytes | None = None
 
@@ -144,7 +144,7 @@ class SheetSink:
         write_label(cell, str(self.numbers[frame]))
 
     def close(self) -> None:
-        """Write the picture.
+        """Write the image.
 
         Raises
         ------

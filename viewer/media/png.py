@@ -1,6 +1,6 @@
 """PNG encoder (W3C PNG, third edition), about three times faster than Pillow.
 
-Pillow tries five filters on every row of a picture. Here each row is filtered by "Sub", which
+Pillow tries five filters on every row of an image. Here each row is filtered by "Sub", which
 suits rendered surfaces and gradients, in numpy, and compressed at zlib's level 1.
 """
 
@@ -21,7 +21,7 @@ _RGB, _RGBA = 2, 6  # colour types
 
 
 def encode_png(pixels: Bytes) -> bytes:
-    """Return a picture as the bytes of a PNG file, without alpha if all of it is opaque.
+    """Return an image as the bytes of a PNG file, without alpha if all of it is opaque.
 
     Parameters
     ----------

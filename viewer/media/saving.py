@@ -1,4 +1,4 @@
-"""Atomic writing of files: a temporary file first, then a rename."""
+"""Atomic file writing: a temporary file first, then a rename."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
 
 
 def as_words(name: str) -> list[bytes] | None:
-    """Return the words of a name, or None if joining them would not give the same name.
+    """Return the words of a name as bytes, or None if joining them would not give the same name.
 
     >>> as_words("left leg"), as_words(" leg")
     ([b'left', b'leg'], None)
@@ -180,7 +180,7 @@ class Replacement:
             raise self.error(problem) from None
 
     def error(self, problem: Exception) -> OutputError:
-        """Return an error of one line, with the path."""
+        """Return a one-line error with the path."""
         reason = getattr(problem, "strerror", None) or problem
         return OutputError(f"{printable(self.path, 300)}: {printable(reason)}")
 

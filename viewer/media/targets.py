@@ -36,7 +36,7 @@ def check_targets(
     Raises
     ------
     OutputError
-        For the first file that is a folder or an input, exists already, is written twice, lies in
+        For the first file that is a folder or an input, already exists, is written twice, lies in
         a folder that is missing or read-only, or is a closed standard output. Links are resolved.
     """
     opened = _Inputs(inputs)
@@ -54,7 +54,7 @@ def check_targets(
 
 
 def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> None:
-    """Refuse to write a folder that exists already or that input was read from.
+    """Refuse to write a folder that already exists or that input was read from.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
         for path in inputs:
             opened = path.resolve()
             if opened == place.parent and not os.path.lexists(folder):
-                raise _refusal(folder.parent, "is an input folder: nothing is written into it")
+                raise _refusal(folder.parent, "nothing is written into input folders")
             if opened in (place, place.parent) or place in opened.parents:
-                raise _refusal(folder, "is an input folder, which is never replaced")
+                raise _refusal(folder, "input folders are never overwritten")
         if os.path.lexists(folder) and not force:
-            raise _refusal(folder, f"exists already ({_FORCE})")
+            raise _refusal(folder, f"already exists ({_FORCE})")
         there = next(parent for parent in place.parents if os.path.lexists(parent))
         if not there.is_dir():
             raise _refusal(there, "expected a folder, found a file")
@@ -104,9 +104,9 @@ def _checked(
     if not stat.S_ISREG(status.st_mode):
         return None
     if inputs.hold(target, status):
-        raise _refusal(file, "is an input file, which is never replaced")
+        raise _refusal(file, "input files are never overwritten")
     if not force:
-        raise _refusal(file, f"exists already ({hint})")
+        raise _refusal(file, f"already exists ({hint})")
     _check_folder(file, target.parent, folders)
     return status.st_dev, status.st_ino
 

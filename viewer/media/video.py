@@ -1,7 +1,7 @@
-"""Writing of videos with PyAV (FFmpeg's libraries), which is imported only when needed.
+"""Video output with PyAV (FFmpeg's libraries), which is imported only when needed.
 
-``.mp4`` holds H.264, ``.webm`` VP9, ``.gif`` pictures of 256 colours. Colours of the first two are
-those of BT.709 in limited range, converted and tagged as such (ITU-T H.273, table 2 to 4, code
+``.mp4`` holds H.264, ``.webm`` VP9, ``.gif`` 256-colour images. Colours of the first two are
+those of BT.709 in limited range, converted and tagged as such (ITU-T H.273, tables 2 to 4, code
 point 1), so that players show the rendered colours.
 """
 
@@ -44,24 +44,25 @@ class VideoSink:
     Parameters
     ----------
     path : Path
-        Target; its suffix chooses the kind.
+        Output file; its suffix determines the format.
     size : (int, int)
         Width and height of the frames. If they must be even and are not, the last column or row is
         repeated.
     rate : float
-        Frames per second. A GIF counts time in 1/100 s; the delays are rounded so that their mean
-        is exact.
+        Frames per second. GIF frame delays are multiples of 1/100 s; they are rounded so that their
+        mean is exact.
     quality : float
         0 to 100; GIFs have one quality.
     transparent : bool
-        Whether frames have transparent pixels. If the format has no alpha, they are drawn on black.
+        Whether frames have transparent pixels. If the format has no alpha, frames are composited on
+        black.
 
     Attributes
     ----------
     workers : int
         1: frames are needed in order.
     n_samples : int
-        Number of frames that should be given to ``look`` first.
+        Number of frames that should be passed to ``look`` first.
     notes : list of str
         Deviations from the request, one line each.
     n_bytes : int
@@ -108,7 +109,7 @@ class VideoSink:
     def _note(self, transparent: bool) -> None:
         name, rate = printable(self.path), float(self.rate)
         if transparent and not self._has_alpha:
-            self.notes.append(f"{name}: this format has no transparency; drawn on black")
+            self.notes.append(f"{name}: this format has no transparency; composited on black")
         if self._coded != self.size:
             (width, height), (wide, high) = self.size, self._coded
             self.notes.append(
@@ -118,7 +119,8 @@ class VideoSink:
         if self.encoder == "gif" and 100 % rate:
             low = int(100 / rate)
             self.notes.append(
-                f"{name}: GIFs count time in 1/100 s; frames last {low} or {low + 1} of them, "
+                f"{name}: GIF frame delays are multiples of 0.01 s; frames last "
+                f"{low / 100:g} or {(low + 1) / 100:g} s, "
                 f"{rate:g} frames per second on average"
             )
 
@@ -129,7 +131,7 @@ class VideoSink:
         self._chooser.look(self._picture(pixels))
 
     def write(self, frame: int, pixels: Bytes) -> None:
-        """Encode one frame; frames must be given in order.
+        """Encode one frame; frames must be passed in order.
 
         Raises
         ------
@@ -176,7 +178,7 @@ class VideoSink:
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:
-        """Turn the first error into one line, and repeat it: the encoder is not called again."""
+        """Convert the first error to one line, and re-raise it instead of calling the encoder."""
         if self._problem is not None:
             raise self._problem
         try:
@@ -184,7 +186,7 @@ class VideoSink:
             if self._output is not None and self._output.problem is not None:
                 raise self._output.problem
         except (OSError, ValueError, self._av.FFmpegError) as problem:
-            # The library's error is often only a consequence of an earlier error of the file.
+            # The library's error is often only a consequence of an earlier file error.
             first = self._output.problem if self._output is not None else None
             self._problem = self._file.error(first or problem)
             raise self._problem from None

@@ -1,4 +1,4 @@
-"""Table of the kinds of video, available without importing an encoder."""
+"""Table of video formats, available without importing an encoder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_GIF_RATE = 50.0
 
 @dataclass(frozen=True, slots=True)
 class VideoKind:
-    """Properties of a kind of video.
+    """Properties of a video format.
 
     Attributes
     ----------
@@ -47,16 +47,16 @@ VIDEOS = {
     ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
     ".gif": VideoKind("animated GIF", ("gif",), True, False),
 }
-"""Kinds of video by suffix."""
+"""Video formats by suffix."""
 
 
 def video_kind(path: Path) -> VideoKind:
-    """Return the kind of video that a file's suffix names.
+    """Return the video format of a file's suffix.
 
     Raises
     ------
     UnsupportedFormatError
-        If there is no such kind; the message lists all kinds.
+        If there is no such format; the message lists all formats.
     """
     suffix = path.suffix.lower()
     if suffix not in VIDEOS:

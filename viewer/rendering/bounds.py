@@ -26,15 +26,15 @@ _BONE = 0.05  # greatest half width of a bone, in sizes of the skeleton
 class Bounds:
     """Spheres that contain the drawn surfaces of actors, at the cost of their joints.
 
-    A vertex skinned linearly is a weighted mean of what each joint does to it, so it lies in the
-    convex hull of spheres about the joints that reach to their farthest vertices.
+    A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
+    it lies in the convex hull of spheres about the joints that reach to their farthest vertices.
     """
 
     def __init__(self) -> None:
         self._reaches: WeakKeyDictionary[Figure, tuple[Floats, Floats]] = WeakKeyDictionary()
 
     def spheres(self, actor: Actor, options: DisplayOptions) -> Floats:
-        """Return spheres around what is drawn of an actor.
+        """Return spheres around the drawn parts of an actor.
 
         Parameters
         ----------

@@ -205,14 +205,14 @@ def camera_from_view(
     """Return a camera that looks through a calibrated one.
 
     With ``fixed`` reset to None it is an upright orbit camera at the same position, with the same
-    viewing direction and about the same field of view; its principal point is the picture's centre.
+    viewing direction and about the same field of view; its principal point is the image's centre.
 
     Parameters
     ----------
     view : CameraView
         In scene space.
     size : (int, int)
-        Width and height of the drawn picture, pixels.
+        Width and height of the drawn image, pixels.
     up : "y" or "z"
         The scene's up axis.
     box : (2, 3), optional
@@ -221,11 +221,11 @@ def camera_from_view(
     Raises
     ------
     RigError
-        If the size of the camera's pictures is unknown.
+        If the size of the camera's images is unknown.
     """
     width, height = picture_size(view)
     aspect = size[0] / size[1]
-    seen = max(height, width / aspect)  # rows of the picture and the margins above and below
+    seen = max(height, width / aspect)  # rows of the image and the margins above and below
     backward = -view.rotation[2]
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
@@ -255,9 +255,9 @@ def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0)
     points : (N, 3)
         Points to frame, scene space.
     aspect : float
-        Width / height of the picture.
+        Width / height of the image.
     free_height : float
-        Fraction of the picture's height to use, about its centre; 0 to 1.
+        Fraction of the image's height to use, about its centre; 0 to 1.
     """
     camera.target = bounding_box(points).mean(axis=0)
     across, upward, near = ((points - camera.target) @ np.stack(camera_axes(camera)).T).T
@@ -276,7 +276,7 @@ def orbit(camera: Camera, azimuth: float, inclination: float) -> None:
 
 
 def pan(camera: Camera, across: float, upward: float) -> None:
-    """Move the target in the picture's plane, in units of the picture's height."""
+    """Move the target in the image's plane, in units of the image's height."""
     right, up, _ = camera_axes(camera)
     height = 2.0 * camera.half_height
     camera.target = camera.target + height * (across * right + upward * up)
@@ -292,7 +292,7 @@ def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
     factor : float
         New distance over old distance.
     x, y : float
-        Offset of the pointer from the picture's centre, right and up, in picture heights.
+        Offset of the pointer from the image's centre, right and up, in image heights.
     """
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
     factor = distance / camera.distance  # 1, hence no panning, at the ends of the range

@@ -25,12 +25,12 @@ __all__ = ["Casters"]
 
 @dataclass(frozen=True, slots=True)
 class Casters:
-    """What casts shadows and occludes light in one picture; all its buffers are updated.
+    """Shadow casters and occluders of one image; all their buffers are up to date.
 
     Attributes
     ----------
     programs, mesh_pass, late, buffers : Programs, MeshPass, LatePasses, ActorBuffers
-        What draws, and what is drawn.
+        Programs and passes for drawing, and the drawn buffers.
     meshes : Meshes
         Surfaces.
     actors : sequence of Actor

@@ -1,4 +1,4 @@
-"""Colour maps of scalar quantities: perceptually uniform and safe for colour blindness."""
+"""Colour maps of scalar quantities: perceptually uniform and colour-blind safe."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ANCHORS = np.array(
     ]
 )
 # From blue through white to red: lightness falls symmetrically towards both ends, and the two hues
-# differ even for red-green colour blindness.
+# remain distinguishable with red-green colour blindness.
 _DIVERGING = np.array(
     [
         [0.36, -0.020, -0.130],
@@ -58,7 +58,7 @@ def colormap(count: int = 256) -> Bytes:
 
 
 def diverging_map(count: int = 256) -> Bytes:
-    """Return the map of differences as pixels: (count, 4) sRGB with alpha, white in the middle.
+    """Return the diverging map as pixels: (count, 4) sRGB with alpha, white in the middle.
 
     >>> diverging_map(3)[1].tolist()
     [245, 245, 245, 255]

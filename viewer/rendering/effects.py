@@ -60,9 +60,9 @@ class Occlusion:
     Attributes
     ----------
     texture : moderngl.Texture
-        Fraction of the light, and depth in camera space, at half of the picture's resolution.
+        Fraction of the light, and depth in camera space, at half of the image's resolution.
     strength : float
-        0 to 1: how much of it counts.
+        Strength of the occlusion, 0 to 1.
     """
 
     texture: moderngl.Texture
@@ -71,7 +71,7 @@ class Occlusion:
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """What changes the light on surfaces besides the lights themselves."""
+    """Effects on the light at surfaces: shadows and occlusion."""
 
     shadow: Shadow | None = None
     occlusion: Occlusion | None = None

@@ -30,7 +30,7 @@ _BLUR = 0.011  # radius of the filter on the ground in sizes of a figure, where 
 
 
 class Lighting:
-    """Draws what the light on a scene depends on, before each pass of a picture.
+    """Draws the maps that the lighting depends on, before each pass of an image.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ class Lighting:
         return made
 
     def begin(self, casters: Casters, up: str, box: Floats) -> None:
-        """Draw what all passes of a picture share.
+        """Draw the maps shared by all passes of an image.
 
         Parameters
         ----------
         casters : Casters
-            What casts shadows.
+            The shadow casters.
         up : str
             The scene's up axis.
         box : (2, 3)
@@ -99,7 +99,7 @@ class Lighting:
         Parameters
         ----------
         casters : Casters
-            What casts shadows.
+            The shadow casters.
         view : View
             The camera's matrices.
         size : (int, int)
@@ -107,7 +107,7 @@ class Lighting:
         sample : Sample
             The pass.
         strength : float
-            0 to 1: how much of shadows and occlusion counts.
+            Strength of shadows and occlusion, 0 to 1.
         """
         options, shadow, occlusion = casters.options, None, None
         casters = replace(casters, threshold=sample.threshold)

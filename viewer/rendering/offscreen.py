@@ -44,7 +44,7 @@ class Offscreen:
             self.context.info  # noqa: B018 - cached, so that it is available without a current context
         if is_software(self.context):
             self.renderer.notes += [
-                f"rendering in software: {node} exists but you lack the permission to open it "
+                f"rendering in software: {node} exists but you have no permission to open it "
                 "(group render)"
                 for node in unreadable_devices()
             ]
@@ -111,7 +111,7 @@ def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> C
     scene : Scene
         The scene to frame; defines the up axis.
     size : (int, int)
-        Width and height of the picture.
+        Width and height of the image.
     show : str
         Drawn parts of the figures, a key of ``SHOWN``.
     """
@@ -150,7 +150,7 @@ def render(
     Raises
     ------
     ViewerError
-        If the driver cannot draw a picture of this size.
+        If the driver cannot draw an image of this size.
     RenderError
         If there is no usable OpenGL.
 

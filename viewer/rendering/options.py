@@ -25,7 +25,7 @@ SHOWN = {
     "skin": "Attached skin",
     "skeleton": "Skeleton",
     "both": "Skin and skeleton",
-    "binding": "Skin in binding space",
+    "binding": "Skin in bind pose",
 }
 """Parts of a figure that are drawn, with labels for menus."""
 
@@ -53,7 +53,7 @@ QUALITIES = {
     "normal": "Normal",
     "final": "Final",
 }
-"""Qualities of a picture, with labels for menus."""
+"""Render quality presets, with menu labels."""
 
 
 @dataclass(slots=True)
@@ -68,7 +68,7 @@ class Light:
     color : (r, g, b)
         Linear, 0 to 1.
     strength : float
-        Factor on the colour.
+        Multiplier of the colour.
     """
 
     azimuth: float
@@ -110,7 +110,7 @@ class Lights:
 
 @dataclass(slots=True)
 class DisplayOptions:
-    """All properties of a picture except scene and camera.
+    """All render settings except scene and camera.
 
     Attributes
     ----------
@@ -139,11 +139,11 @@ class DisplayOptions:
         Samples per pixel, limited by the driver's maximum.
     quality : str
         A key of ``QUALITIES``: draft is fastest; normal draws shadows; final averages ``passes``
-        pictures, for soft shadows, ambient occlusion and smooth edges.
+        images, for soft shadows, ambient occlusion and smooth edges.
     shadows : bool
         Draw shadows, unless the quality is draft.
     passes : int
-        Pictures that are averaged in final quality.
+        Images that are averaged in final quality.
     lights : Lights
         The two lights.
     skinning : Skinning
@@ -158,7 +158,7 @@ class DisplayOptions:
     isolines : bool or None
         Draw lines at every tenth of the range; None for the quantity's default.
     legend : bool
-        Draw the legend of the colours into the picture.
+        Draw the legend of the colours into the image.
     reduced : bool
         Draw the coarser mesh of figures that have one.
     keypoints : bool

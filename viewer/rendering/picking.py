@@ -115,9 +115,9 @@ class PickPass:
         options : DisplayOptions
             Display options.
         size : (int, int)
-            Width and height of the picture.
+            Width and height of the image.
         pixel : (float, float)
-            From the picture's left and upper edge.
+            From the image's left and upper edge.
         """
         if has_joint_marks(options):
             # Dots, and bones in X-ray mode, are drawn over everything else.

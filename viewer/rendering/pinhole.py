@@ -18,7 +18,7 @@ _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's c
 
 
 def picture_size(view: CameraView) -> tuple[float, float]:
-    """Return the width and height of a camera's pictures, pixels.
+    """Return the width and height of a camera's images, pixels.
 
     If the size is not in the files, the principal point is taken as the centre.
 
@@ -47,18 +47,18 @@ def pinhole_view(view: CameraView) -> Floats:
 
 
 def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
-    """Return the matrix from camera to clip space that reproduces the camera's picture.
+    """Return the matrix from camera to clip space that reproduces the camera's image.
 
     OpenCV's pixel coordinates start at the centre of the first pixel, OpenGL's at its corner. So
-    with u from K and the picture's width W, x in -1..1 is 2 (u + 1/2) / W - 1. A picture of another
-    aspect ratio shows all of the camera's picture in its centre, with margins on two sides.
+    with u from K and the image's width W, x in -1..1 is 2 (u + 1/2) / W - 1. An image of another
+    aspect ratio shows all of the camera's image in its centre, with margins on two sides.
 
     Parameters
     ----------
     view : CameraView
         The camera; its distortion is ignored, see ``distortion_error``.
     aspect : float
-        Width / height of the drawn picture.
+        Width / height of the drawn image.
     box : (2, 3)
         Bounds that must lie between the near and the far plane, scene space.
 
@@ -92,12 +92,12 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
 
 
 def _offset(principal: float, side: float) -> float:
-    """Return the offset from the principal point to the centre, in half picture sizes."""
+    """Return the offset from the principal point to the centre, in half image sizes."""
     return 1.0 - 2.0 * (principal + 0.5) / side
 
 
 def distortion_error(view: CameraView) -> float:
-    """Return the largest displacement of a picture corner by lens distortion, pixels.
+    """Return the largest displacement of an image corner by lens distortion, pixels.
 
     It is the error of looking through the camera without distortion. OpenCV's model is, with
     r^2 = x^2 + y^2: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)

@@ -1,4 +1,4 @@
-"""Projection of scene points into the picture, computed on the CPU."""
+"""Projection of scene points into the image, computed on the CPU."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["Projected", "picture_scale", "project", "project_segments", "unproject"]
 
-_USUAL_HEIGHT = 720.0  # height of a picture in which marks have their standard size, pixels
+_USUAL_HEIGHT = 720.0  # height of an image in which marks have their standard size, pixels
 _SCALES = 0.8, 4.0
 
 
@@ -22,11 +22,11 @@ class Projected:
     Attributes
     ----------
     pixels : (N, 2)
-        From the picture's left and upper edge; arbitrary where the point is not visible.
+        From the image's left and upper edge; arbitrary where the point is not visible.
     depths : (N,)
         Normalized depth, -1 at the near plane to 1 at the far plane.
     seen : (N,) bool
-        Whether the point is in front of the eye and within the picture.
+        Whether the point is in front of the eye and within the image.
     """
 
     pixels: Floats
@@ -35,14 +35,14 @@ class Projected:
 
 
 def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
-    """Project points into the picture: x = c_x / c_w with c = P V [p 1].
+    """Project points into the image: x = c_x / c_w with c = P V [p 1].
 
     Parameters
     ----------
     view : View
         The camera's matrices.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     points : (N, 3)
         Scene space.
     """
@@ -57,21 +57,21 @@ def project(view: View, size: tuple[int, int], points: Floats) -> Projected:
 def project_segments(
     view: View, size: tuple[int, int], starts: Floats, ends: Floats
 ) -> tuple[Floats, Bools]:
-    """Project segments into the picture, clipped at the near plane: -c_w <= c_z.
+    """Project segments into the image, clipped at the near plane: -c_w <= c_z.
 
     Parameters
     ----------
     view : View
         The camera's matrices.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     starts, ends : (N, 3)
         Scene space.
 
     Returns
     -------
     pixels : (N, 2, 2)
-        Both ends, from the picture's left and upper edge; they may lie outside the picture.
+        Both ends, from the image's left and upper edge; they may lie outside the image.
     seen : (N,) bool
         Whether any part of the segment is beyond the near plane.
     """
@@ -96,11 +96,11 @@ def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats)
     view : View
         The camera's matrices.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     points : (N, 3)
         Scene space, in front of the eye.
     pixels : (N, 2)
-        From the picture's left and upper edge.
+        From the image's left and upper edge.
 
     Returns
     -------
@@ -115,12 +115,12 @@ def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats)
 
 
 def picture_scale(size: tuple[int, int]) -> float:
-    """Return the scale of marks in a picture, 1 at a height of 720 pixels.
+    """Return the scale of marks in an image, 1 at a height of 720 pixels.
 
     Parameters
     ----------
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
     return float(np.clip(min(size[1], 0.75 * size[0]) / _USUAL_HEIGHT, *_SCALES))
 

@@ -45,7 +45,7 @@ _PATIENCE = 0.05  # seconds between steps while the sink finishes
 
 
 class Sink(Protocol):
-    """Receiver of frames; ``viewer.media`` has sinks for pictures, contact sheets and videos.
+    """Receiver of frames; ``viewer.media`` has sinks for images, contact sheets and videos.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Recording:
     selected : (int, int)
         Index of an actor and of its highlighted joint, as in ``Renderer.draw``.
     annotations : callable or None
-        Returns the annotations of a frame, given the posed scene and the picture's size.
+        Returns the annotations of a frame, given the posed scene and the image's size.
     """
 
     scene: Scene
@@ -221,7 +221,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
     Raises
     ------
     ViewerError
-        If the driver cannot draw a picture of this size.
+        If the driver cannot draw an image of this size.
     OutputError
         If the sink cannot write.
     """

@@ -1,4 +1,4 @@
-"""Renderer of a scene into a framebuffer, used for the window and for picture files."""
+"""Renderer of a scene into a framebuffer, used for the window and for image files."""
 
 from __future__ import annotations
 
@@ -82,10 +82,8 @@ class Renderer:
         Annotations, drawn over everything except legends.
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
-    outlines : sequence of Outlined
-        Parts of the scene to outline; if empty, the selection with ``DisplayOptions.outline``.
     names_left_out : (int, int)
-        Number of joint names omitted from the last picture for lack of room, and number of
+        Number of joint names omitted from the last image for lack of room, and number of
         joints within it.
     """
 
@@ -103,7 +101,6 @@ class Renderer:
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
-        self.outlines: Sequence[Outlined] = ()
         self.names_left_out = 0, 0
         self.lighting = Lighting(context, self.programs)
         self.late = LatePasses(
@@ -181,9 +178,8 @@ class Renderer:
         self.names_left_out = draw_overlays(
             self.late, over, scene, view, options, target.size, selected
         )
-        if self.outlines or options.outline:
-            outlined = self.outlines or [Outlined(*selected)]
-            self.late.outline_pass.draw(outlined, scene, view, options, target)
+        if options.outline:
+            self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
 
@@ -262,14 +258,28 @@ class Renderer:
         options : DisplayOptions
             Display options.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         x, y : float
-            Pixels from the picture's left and upper edge.
+            Pixels from the image's left and upper edge.
         box : (2, 3)
             Bounds, as in ``draw``.
         """
         self.buffers.keep_only(scene.actors)
         return self.late.pick_pass.pick(scene, view_of(camera, size, box), options, size, (x, y))
+
+    def draw_outlines(
+        self,
+        outlined: Sequence[Outlined],
+        scene: Scene,
+        camera: Camera,
+        options: DisplayOptions,
+        target: Target,
+        box: Floats,
+    ) -> None:
+        """Draw outlines alone, with straight alpha; parameters are those of ``draw``."""
+        self._prepare(target)
+        view = view_of(camera, target.size, box)
+        self.late.outline_pass.draw(outlined, scene, view, options, target, is_layer=True)
 
     def prepare(self, scene: Scene) -> None:
         """Upload a scene's buffers in advance, so that failure leaves the previous scene intact.
@@ -347,7 +357,7 @@ class Renderer:
 
     def _draw_legend(self, size: tuple[int, int]) -> None:
         assert self.legend is not None  # meshes were drawn with their numbers
-        note = f"a picture of {size[0]} x {size[1]} pixels has no room for a legend"
+        note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
         if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)
 

@@ -1,4 +1,4 @@
-"""Passes of a picture: what moves by fractions between them, and averages out."""
+"""Passes of an image: what moves by fractions between them, and averages out."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One pass of a picture.
+    """One pass of an image.
 
     Attributes
     ----------
     shift : (float, float)
-        Of the picture, pixels: -0.5 to 0.5.
+        Of the image, pixels: -0.5 to 0.5.
     light : (float, float)
         A point of the key light's disc, of radius 1.
     phase : float
@@ -40,7 +40,7 @@ class Sample:
 
 
 def n_passes(options: DisplayOptions) -> int:
-    """Return the number of passes that are averaged in a picture."""
+    """Return the number of passes that are averaged in an image."""
     return max(options.passes, 1) if options.quality == "final" else 1
 
 
@@ -62,7 +62,7 @@ def sample(index: int, count: int) -> Sample:
 
 
 def jittered(view: View, shift: tuple[float, float], size: tuple[int, int]) -> View:
-    """Return a view whose picture is shifted by fractions of pixels."""
+    """Return a view whose image is shifted by fractions of pixels."""
     moved = np.eye(4)
     moved[:2, 3] = 2.0 * shift[0] / size[0], 2.0 * shift[1] / size[1]
     return replace(view, projection=moved @ view.projection)

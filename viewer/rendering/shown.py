@@ -39,7 +39,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Meshes:
-    """The meshes of a picture: those drawn singly, and those drawn as instances."""
+    """The meshes of an image: those drawn singly, and those drawn as instances."""
 
     singles: list[tuple[Actor, PosedMesh]] = field(default_factory=list)
     instanced: list[tuple[list[Actor], InstanceBuffers]] = field(default_factory=list)

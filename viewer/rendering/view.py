@@ -21,7 +21,7 @@ __all__ = ["View", "in_front", "key_direction", "set_lights", "set_model", "view
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A camera's matrices for one picture, (4, 4) for column vectors, and the camera itself.
+    """A camera's matrices for one image, (4, 4) for column vectors, and the camera itself.
 
     Effects change the light on what is drawn with this view.
     """
@@ -33,7 +33,7 @@ class View:
 
 
 def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
-    """Return the matrices of a camera for a picture of ``size`` that shows ``box``."""
+    """Return the matrices of a camera for an image of ``size`` that shows ``box``."""
     return View(camera.view_matrix(), camera.projection_matrix(size[0] / size[1], box), camera)
 
 

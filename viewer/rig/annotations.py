@@ -95,7 +95,7 @@ class ReducedMesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexField:
-    """A precomputed number per vertex, such as a distance or a confidence.
+    """A precomputed value per vertex, such as a distance or a confidence.
 
     Attributes
     ----------

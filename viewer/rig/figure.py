@@ -43,9 +43,9 @@ class Figure:
     name : str
         Label in menus.
     mesh : Mesh or None
-        In binding space.
+        In bind pose.
     skeleton : Skeleton or None
-        Without one the mesh stays in its binding space.
+        Without one the mesh stays in the bind pose.
     skin : Skin or None
         Without one the mesh does not follow the skeleton.
     up : "y" or "z"

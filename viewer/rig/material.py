@@ -15,17 +15,17 @@ ALPHA_MODES = ("opaque", "mask", "blend")
 """Alpha ignored; below the cutoff cut out; mixed with what is behind."""
 
 WRAPS = ("clamp", "repeat", "mirror")
-"""Texture coordinates outside 0 to 1: the edge, the picture again, or mirrored every other time."""
+"""Texture coordinates outside 0 to 1: the edge, the image again, or mirrored every other time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
-    """A picture, and how it is placed and sampled.
+    """A image, and how it is placed and sampled.
 
     Attributes
     ----------
     name : str
-        File name of the picture, relative to the figure's folder.
+        File name of the image, relative to the figure's folder.
     image : (H, W, 4) uint8 or None
         Pixels with alpha, first row at v = 1; sRGB in textures of colours, linear in others;
         None if it could not be read.
@@ -34,7 +34,7 @@ class Texture:
     uv_set : int
         0 for ``Mesh.uvs``, 1 for ``Mesh.second_uvs``.
     transform : (2, 3)
-        From texture coordinates to those of the picture, v = 0 at its bottom row.
+        From texture coordinates to those of the image, v = 0 at its bottom row.
     wrap : (str, str)
         Entry of ``WRAPS`` along u and v.
     is_smooth : bool
@@ -70,7 +70,7 @@ class Texture:
 
     @property
     def is_placed_plainly(self) -> bool:
-        """Whether the picture covers texture coordinates from 0 to 1."""
+        """Whether the image covers texture coordinates from 0 to 1."""
         return np.array_equal(self.matrix, np.eye(2, 3))
 
 
@@ -92,7 +92,7 @@ class Material:
     metallic, roughness : float
         0 to 1; roughness is perceptual, the square root of the GGX width.
     metallic_texture, roughness_texture : Texture or None
-        One number each, often two channels of one picture.
+        One number each, often two channels of one image.
     normal_texture : Texture or None
         Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1.
     normal_scale : float
@@ -168,7 +168,7 @@ class Material:
 
     @property
     def texture(self) -> str | None:
-        """File name of the base colour's picture, if there is one."""
+        """File name of the base colour's image, if there is one."""
         return None if self.base_texture is None else self.base_texture.name
 
     @property

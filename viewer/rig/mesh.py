@@ -25,7 +25,7 @@ _ROW = 64  # points per row of a reduction, see bounding_box
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """An indexed triangle mesh, in binding space.
+    """An indexed triangle mesh, in the bind pose.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Mesh:
     triangles : (T, 3) int32
         Vertex indices; counter-clockwise from outside in most files, never relied upon.
     uvs : (U, 2) or None
-        Texture coordinates, v = 0 at the bottom row of the picture.
+        Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None
         Indices into ``uvs`` where they differ from ``triangles``: along a seam one vertex has
         several texture coordinates. None if every vertex has one, and U = V.

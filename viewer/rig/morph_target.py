@@ -106,7 +106,7 @@ def on_one_joint(figure: Figure) -> Figure:
     """Bind a mesh without a skeleton to a single fixed joint.
 
     Weights of blend shapes belong to a pose, and a pose needs a skeleton. The mesh stays in its
-    binding space.
+    bind pose.
 
     Parameters
     ----------

@@ -183,7 +183,7 @@ class Scene:
     time : float or None
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
-        All files that it was read from, pictures included; no output may overwrite them.
+        All files that it was read from, images included; no output may overwrite them.
     """
 
     actors: list[Actor]
@@ -201,7 +201,7 @@ class Scene:
 
     @property
     def title(self) -> str:
-        """Default name of its pictures and videos: the title of its first actor."""
+        """Default name of its images and videos: the title of its first actor."""
         return self.actors[0].title if self.actors else ""
 
     @property

@@ -119,7 +119,7 @@ def skin_from_lists(
 
 
 def bind_positions(skin: Skin) -> Floats:
-    """Return the bind positions of the joints: (J, 3), binding space."""
+    """Return the bind positions of the joints: (J, 3), bind pose."""
     positions: Floats = np.linalg.inv(skin.inverse_bind)[:, :3, 3].astype(np.float64, copy=False)
     return positions
 

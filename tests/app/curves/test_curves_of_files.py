@@ -71,7 +71,7 @@ def test_opened_clip_is_never_replaced(curves, tmp_path):
     from viewer.app.curves.clip_actions import save_clip
 
     save_clip(curves.state, tmp_path / "wave.anim")
-    assert "is an input file, which is never replaced" in curves.state.error
+    assert "input files are never overwritten" in curves.state.error
     assert (tmp_path / "wave.anim").read_text() == clip_text()
 
 

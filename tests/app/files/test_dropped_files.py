@@ -75,7 +75,8 @@ def test_dropped_textures_replace_each_other(textured, tmp_path):
 def test_dropped_texture_needs_texture_coordinates(box, tmp_path):
     figure, before = box.state.actor.figure, _key(box)
     box.open(_picture(tmp_path))
-    assert "red.png: cannot apply the picture: box has no texture coordinates" in box.state.error
+    wanted = "red.png: cannot apply the texture image: no texture coordinates in box"
+    assert wanted in box.state.error
     assert box.state.actor.figure is figure and _key(box) == before
 
 
@@ -131,4 +132,4 @@ def test_dropped_folder_of_unknown_files_is_refused(hand, tmp_path):
     (tmp_path / "photos").mkdir()
     scene = hand.state.scene
     hand.open(tmp_path / "photos")
-    assert "found another folder" in hand.state.error and hand.state.scene is scene
+    assert "found an unrecognised folder" in hand.state.error and hand.state.scene is scene

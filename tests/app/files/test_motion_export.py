@@ -62,7 +62,7 @@ def test_files_that_are_open_are_never_replaced(moving, tmp_path):
     path.write_text("precious")
     moving.state.paths = (*moving.state.paths, path)
     save_motion(moving.state, path)
-    assert moving.state.error == f"{path}: is an input file, which is never replaced"
+    assert moving.state.error == f"{path}: input files are never overwritten"
     assert path.read_text() == "precious"
 
 
@@ -150,7 +150,7 @@ def test_open_files_are_never_replaced_when_exporting_everyone(crowd, tmp_path):
     path.write_text("precious")
     crowd.state.paths = (path,)
     save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
-    assert crowd.state.error == f"{path}: is an input file, which is never replaced"
+    assert crowd.state.error == f"{path}: input files are never overwritten"
     assert path.read_text() == "precious" and crowd.state.job is None
 
 

@@ -97,7 +97,7 @@ def test_missing_or_changed_files_are_reported(lint, files, texts):
     texts.clear()
     hand.click("Recheck")
     finish(hand)
-    assert "a.skin is gone: only what is open was checked" in texts
+    assert "a.skin is missing: only the open scene was checked" in texts
     assert "a.skel was changed after opening: readers' messages are about the new contents" in texts
 
 

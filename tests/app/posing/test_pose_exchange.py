@@ -130,7 +130,7 @@ RUBBISH = {
     '{"dofs": {"tail.x": 1}}': "tail",
     '{"dofs": {"joint_1.x": "far"}}': "joint_1.x: expected a number",
     '{"shape": [1, 2, 3]}': "2 shape coefficients, found 3",
-    '{"a":' * 50_000: "too many nested levels",
+    '{"a":' * 50_000: "JSON nested too deeply",
 }
 
 
@@ -166,7 +166,7 @@ def test_figure_without_skeleton_has_no_pose_to_copy(drive, rig):
 def test_pose_menu_of_the_panel_copies_pastes_and_mirrors(box):
     box.enter_value("joint_1.x", "45")
     before = _key(box)
-    for entry in ("Copy as JSON", "Copy as the file's numbers"):
+    for entry in ("Copy as JSON", "Copy as raw pose values"):
         box.click("Pose…")
         box.click(entry)
         box.key("r")
@@ -361,7 +361,7 @@ def test_open_files_are_never_overwritten(drive_body, tmp_path):
         for save in (save_export, save_pose):
             hand.state.error = ""
             save(hand.state, model)
-            assert hand.state.error == f"{model}: is an input file, which is never replaced"
+            assert hand.state.error == f"{model}: input files are never overwritten"
     assert model.read_bytes() == b"precious"
 
 

@@ -251,4 +251,4 @@ def test_actor_without_a_common_joint_refuses_the_pose(drive):
     hand.key("c", "ctrl")
     hand.state.choose_actor(1)
     hand.key("v", "ctrl")
-    assert hand.state.error == "first and second have no joint name in common"
+    assert hand.state.error == "first and second have no joint names in common"

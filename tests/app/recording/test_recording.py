@@ -218,7 +218,7 @@ def test_existing_images_are_not_replaced(moving, tmp_path):
     (tmp_path / "f_2.png").write_bytes(b"precious")
     start(moving, tmp_path / "f_{frame}.png", kind="pictures", rate=4.0)
     moving.step(2)
-    assert moving.state.error.startswith(f"{tmp_path / 'f_2.png'}: exists already")
+    assert moving.state.error.startswith(f"{tmp_path / 'f_2.png'}: already exists")
     assert (tmp_path / "f_2.png").read_bytes() == b"precious"
 
 
@@ -229,5 +229,5 @@ def test_input_images_are_not_replaced(moving, tmp_path):
     moving.state.scene.files = (texture,)
     start(moving, texture, kind="sheet")
     moving.step(2)
-    assert moving.state.error == f"{texture}: is an input file, which is never replaced"
+    assert moving.state.error == f"{texture}: input files are never overwritten"
     assert texture.read_bytes() == b"precious" and moving.state.job is None

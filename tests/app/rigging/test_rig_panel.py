@@ -86,7 +86,7 @@ def test_align_button_describes_what_it_does(rigging, monkeypatch, fits):
     hand.state.of(Rigging).choices.fits = fits
     also = "; joints are rotated and limbs resized{} where that fits much better" if fits else ""
     for label, words in (
-        ("Align", "searched for by closest points" + also.format(", or all of it stretched,")),
+        ("Align", "found by matching closest points" + also.format(", or all of it stretched,")),
         ("Refine", "from its current placement, by closest points" + also.format("")),
     ):
         hand.move(label)

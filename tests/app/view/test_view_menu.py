@@ -51,7 +51,7 @@ def test_menu_picks_vertices(hand):
 
 def test_skin_alone_has_no_joints_to_show(drive, rig):
     hand = drive(rig[1])
-    for text in ("X-ray", "Joint names", "Joint axes", "Unpin the vertex"):
+    for text in ("X-ray", "Joint names", "Joint axes", "Unpin vertex"):
         hand.menu("menu View", text)
         hand.key("escape")
     assert not hand.state.options.xray and not hand.state.options.joint_names
@@ -59,7 +59,7 @@ def test_skin_alone_has_no_joints_to_show(drive, rig):
 
 def test_skeleton_alone_has_no_vertices_to_show(drive, rig):
     lone = drive(rig[0])
-    for text in ("Weights of the selected joint", "Pick vertices", "Vertex under the mouse"):
+    for text in ("Weights of the selected joint", "Pick vertices", "Inspect vertex under cursor"):
         lone.menu("menu View", text)
         lone.key("escape")
     assert lone.state.options.shading == "auto" and not lone.state.of(Weights).picks_vertices

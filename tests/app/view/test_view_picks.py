@@ -109,8 +109,8 @@ def test_no_text_is_shown_without_the_panel_or_the_toggle(column):
     place = near(column, facing(column), 0)
     rest(column, place)
     assert not column.state.of(Weights).hover.lines
-    column.menu("menu View", "Vertex under the mouse")
-    assert column.says("Vertex under the mouse on")
+    column.menu("menu View", "Inspect vertex under cursor")
+    assert column.says("Inspect vertex under cursor on")
     rest(column, place)
     assert column.state.of(Weights).hover.lines
 

@@ -223,7 +223,7 @@ def test_vertex_can_be_unpinned(pinned, way):
     elif way == "Unpin":
         pinned.click("Unpin")
     elif way == "menu":
-        pinned.menu("menu View", "Unpin the vertex")
+        pinned.menu("menu View", "Unpin vertex")
     else:
         pinned.menu("menu Window", "Vertex")
     pinned.step(2)

@@ -130,13 +130,14 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     assert_allclose(found.alignment.similarity.linear, wanted, atol=0.005)
     assert [re.sub(r"[\d.]+", "N", str(line)) for line in found.lines] == [
         f"proportions: template stretched by N, N, N along {whose} x, y and z, pose kept",
-        "result: a gap of N % of the size, N % before",
+        "result: a fitting error of N % of the size, N % before",
     ]
     unfitted, _ = aligned(figure, target, fits=False)
     (line,) = unfitted.lines
     found = re.fullmatch(
         rf"warning: the template fits much better stretched by (.+) along {whose} x, y and z, "
-        rf"with a gap of 0\.\d+ % instead of \d\.\d+ %: if the target was stretched, (.+)",
+        rf"with a fitting error of 0\.\d+ % instead of \d\.\d+ %: if the target was "
+        r"stretched, (.+)",
         line.labelled,
     )
     assert_allclose([float(each) for each in found[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
@@ -170,17 +171,19 @@ def fit_of(figure, pose, angle):
 @pytest.mark.parametrize(
     ("target", "reached", "lines"),
     [
-        (1.5, 1.38, ("warning: pose: not fitted, as that would give a gap of G % of the size, "
+        (1.5, 1.38, ("warning: pose: not fitted, as that would give a fitting error of G % of "
+                     "the size, "
                      "G % before, with tip rotated by 79 degrees; use a template of the same kind "
                      "as the target",)),
         (0.9, 0.7, ("pose: template joints rotated to fit, at most tip by 40 degrees; limbs "
                     "resized, at most base by +0 % in length",
-                    "warning: poor fit: a gap of G % of the size, G % before; use a template of "
+                    "warning: poor fit: a fitting error of G % of the size, G % before; use a "
+                    "template of "
                     "the same kind as the target")),
         (1.5, 1.5, ("pose: template joints rotated to fit, at most tip by 86 degrees; limbs "
                     "resized, at most base by +0 % in length",
-                    "result: a gap of G % of the size, G % before")),
-        (1.5, 0.1, ("pose: not fitted, as that would give a gap of G % of the size, "
+                    "result: a fitting error of G % of the size, G % before")),
+        (1.5, 0.1, ("pose: not fitted, as that would give a fitting error of G % of the size, "
                     "G % before",)),
     ],
 )  # fmt: skip

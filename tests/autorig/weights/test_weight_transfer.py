@@ -223,9 +223,7 @@ def test_transfer_refuses_a_distant_target():
 def test_transfer_refuses_a_target_without_size():
     with pytest.raises(RigError) as caught:
         transfer(np.ones((3, 3)), np.array([[0, 1, 2]]))
-    assert str(caught.value) == (
-        "target: expected a mesh with a size, found 3 vertices at one place"
-    )
+    assert str(caught.value) == ("target: expected a mesh with a size, found 3 coincident vertices")
 
 
 def test_transfer_accepts_points_without_triangles():

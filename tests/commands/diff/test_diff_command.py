@@ -199,7 +199,7 @@ def test_heat_map_shows_where_the_difference_is(tmp_path, capsys):
     dark = pixels[200:, :, :3].max(axis=2) < 90
     assert 100 < bright.sum() < dark.sum()
     code, _, error = said(capsys, first, second, "-o", str(output))
-    assert code == 5 and "exists already (--force replaces it)" in error
+    assert code == 5 and "already exists (--force replaces it)" in error
 
 
 def test_heat_maps_of_several_pairs_form_one_sheet(tmp_path, capsys):

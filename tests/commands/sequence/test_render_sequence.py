@@ -95,7 +95,7 @@ def test_frames_are_counted_from_0_at_the_given_fps(draw, walk, tmp_path, option
 
 def test_frames_beyond_the_end_are_drawn_with_a_note(draw, walk, tmp_path):
     said = draw(walk, "{frame}.png", "--frames", "29:33", size="16x16")
-    assert said.err == "warning: --frames: frames 31 to 32 are beyond the motion's end\n"
+    assert said.err == "warning: --frames: frames 31 to 32 are beyond the end of the motion\n"
     assert len(names(tmp_path, ".png")) == 4
 
 
@@ -121,7 +121,7 @@ def test_doubled_braces_are_literal_braces(draw, walk, tmp_path):
 def test_invalid_names_are_refused_before_any_work(draw, tmp_path, name):
     said = draw(["missing.skel"], name, "--frames", "0:2", code=2)
     assert said.err == (
-        "viewer: --output: expected {frame} or {frame:05} in the name of numbered pictures, as in "
+        "viewer: --output: expected {frame} or {frame:05} in the name of numbered images, as in "
         f'frame_{{frame:05}}.png, found "{tmp_path / name}"\n'
     )
 
@@ -271,7 +271,7 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         (
             "x.png",
             "--follow root",
-            "--follow: expected a video, contact sheet or numbered pictures",
+            "--follow: expected a video, contact sheet or numbered images",
         ),
         (
             "x.mp4",
@@ -281,12 +281,12 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         (
             "x.mp4",
             "--panels",
-            "--panels: applies to one picture only, not to videos or sequences",
+            "--panels: applies to single images only, not to videos or sequences",
         ),
         (
             "x.mp4",
             "--contact-sheet 4",
-            "--contact-sheet: expected the name of a picture, such as .png, found a video",
+            "--contact-sheet: expected an image file name, such as .png, found a video",
         ),
         (
             "x.mp4",
@@ -304,8 +304,7 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         (
             "x.png",
             "--contact-sheet 500 --turntable",
-            "contact sheet: 500 frames in 64 x 48 pixels are 0 x 2 each, which is too small to "
-            "see anything",
+            "contact sheet: 500 frames in 64 x 48 pixels are 0 x 2 each, which is too small",
         ),
         (
             "x.mp4",
@@ -336,7 +335,7 @@ def test_contradictory_options_are_one_line(draw, walk, tmp_path, name, options,
 def test_existing_files_are_checked_before_rendering(draw, walk, tmp_path):
     (tmp_path / "f_2.png").write_bytes(b"precious")
     said = draw(walk, "f_{frame}.png", "--frames", "0:3", size="16x16", code=5)
-    assert said.err == (f"viewer: {tmp_path / 'f_2.png'}: exists already (--force replaces it)\n")
+    assert said.err == (f"viewer: {tmp_path / 'f_2.png'}: already exists (--force replaces it)\n")
     assert names(tmp_path, ".png") == ["f_2.png"]
     draw(walk, "f_{frame}.png", "--frames", "0:3", "--force", size="16x16")
     assert len(names(tmp_path, ".png")) == 3 and picture(tmp_path / "f_2.png").shape == (16, 16, 4)
@@ -348,7 +347,7 @@ def test_inputs_are_never_replaced(draw, tmp_path):
     clip.write_text(anim_text(1.0, 9, {}))
     kept = clip.read_bytes()
     said = draw([str(skel), str(skin), str(clip)], "walk_{frame}.png", "--force", code=5)
-    assert said.err == f"viewer: {clip}: is an input file, which is never replaced\n"
+    assert said.err == f"viewer: {clip}: input files are never overwritten\n"
     assert clip.read_bytes() == kept and names(tmp_path, ".png") == ["walk_1.png"]
 
 

@@ -1,4 +1,4 @@
-"""Machines without a usable OpenGL, brought about by the environment; each has its message."""
+"""Machines without a usable OpenGL, simulated by the environment; each has its message."""
 
 from __future__ import annotations
 
@@ -291,7 +291,7 @@ def test_inaccessible_graphics_card_is_a_note(monkeypatch):
     monkeypatch.setattr("viewer.rendering.offscreen.unreadable_devices", lambda: nodes)
     with Offscreen() as offscreen:
         assert offscreen.renderer.notes == [
-            "rendering in software: /dev/dri/renderD128 exists but you lack the permission to open "
+            "rendering in software: /dev/dri/renderD128 exists but you have no permission to open "
             "it (group render)"
         ]
 

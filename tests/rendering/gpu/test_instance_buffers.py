@@ -1,4 +1,4 @@
-"""Actors drawn as instances: held to the float64 reference, and to the picture of single actors."""
+"""Actors drawn as instances, against the float64 reference and images of single actors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said of machines whose OpenGL is too old, or only seems new enough."""
+"""Messages about OpenGL versions that are too old, or only seem new enough."""
 
 import pytest
 

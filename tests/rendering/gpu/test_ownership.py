@@ -1,4 +1,4 @@
-"""What a refused upload had made before is freed, however far it got."""
+"""Resources of a refused upload are freed, however far it got."""
 
 from __future__ import annotations
 

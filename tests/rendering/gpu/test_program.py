@@ -130,6 +130,9 @@ def test_programs_are_compiled_once(ctx):
 def test_every_shading_mode_compiles(ctx, shading):
     programs = Programs(ctx)
     programs.drawing("mesh", shading)
+    for effects in ((), ("SHADOWS",), ("SHADOWS", "OCCLUSION")):
+        if shading != "scalar":  # which shows numbers on any material
+            programs.drawing("mesh", shading, materials=True, effects=effects)
     programs.release()
 
 

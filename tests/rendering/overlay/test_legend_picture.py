@@ -176,7 +176,7 @@ def test_other_shadings_have_no_legend(offscreen):
 def test_image_that_is_too_small_for_a_legend_says_so(offscreen):
     plain = draw(offscreen, size=(40, 40))
     np.testing.assert_array_equal(plain, draw(offscreen, size=(40, 40), legend=True))
-    assert offscreen.renderer.notes == ["a picture of 40 x 40 pixels has no room for a legend"]
+    assert offscreen.renderer.notes == ["an image of 40 x 40 pixels has no room for a legend"]
 
 
 def test_legend_follows_view_and_size(offscreen):

@@ -7,9 +7,13 @@ import pytest
 from rendering.drawn_figures import skeleton
 from rendering.front_view import PIXELS, alone, front_view, grid_figure
 
+from viewer.rendering.camera import Camera
+from viewer.rendering.gpu.target import Target, picture_rows
 from viewer.rendering.offscreen import Offscreen
+from viewer.rendering.options import DisplayOptions
 from viewer.rendering.outlined import Outlined
 from viewer.rig.figure import Figure
+from viewer.rig.scene import scene_box
 
 
 @pytest.fixture(scope="module")
@@ -19,14 +23,16 @@ def offscreen():
 
 
 def changed(offscreen, scene, *outlined, **options):
-    """Return which pixels the outlines change, and the picture with them."""
-    plain = front_view(offscreen, scene, **options)
-    offscreen.renderer.outlines = outlined
-    try:
-        picture = front_view(offscreen, scene, **options)
-    finally:
-        offscreen.renderer.outlines = ()
-    return (plain != picture).any(axis=-1), picture
+    """Return which pixels outlines cover, and their picture with straight alpha."""
+    front_view(offscreen, scene, **options)
+    camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
+    shown = DisplayOptions(samples=1, **options)
+    with offscreen.context as context:
+        target, box = Target(context, (PIXELS, PIXELS), 1), scene_box(scene)
+        offscreen.renderer.draw_outlines(outlined, scene, camera, shown, target, box)
+        picture = picture_rows(target.framebuffer.read(components=4), target.size).copy()
+        target.release()
+    return picture[..., 3] > 0, picture
 
 
 def test_line_is_as_wide_on_all_sides_and_covers_nothing_inside(offscreen):

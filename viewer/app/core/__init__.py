@@ -1,1 +1,1 @@
-"""Core of the window: scene, camera, time, history and messages; independent of features."""
+"""Application core: scene, camera, time, history and messages; independent of features."""

@@ -1,4 +1,4 @@
-"""State of the camera's fitting: the points it is fitted to, and whether it is still fitted."""
+"""Camera fitting state: the points it is fitted to, and whether it is still fitted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Framing"]
 
 @dataclass(slots=True)
 class Framing:
-    """State of the camera's fitting.
+    """Camera fitting state.
 
     Attributes
     ----------

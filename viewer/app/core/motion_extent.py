@@ -23,7 +23,7 @@ __all__ = ["MotionExtent"]
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # vertices posed in all
 _MOST_FRAMES = 32
-_MOST_PRODUCTS = 100_000_000  # dot products of points and directions: bounds the time
+_MOST_PRODUCTS = 100_000_000  # dot products of points and directions: limits the time
 _N_DIRECTIONS = (100, 1000)
 
 

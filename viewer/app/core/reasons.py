@@ -91,7 +91,7 @@ def no_skeleton(state: AppState) -> str:
 
 
 def no_skin(state: AppState) -> str:
-    """Return why there is no binding space to show."""
+    """Return why the bind pose cannot be shown."""
     has_one = any(actor.figure.is_attached for actor in state.scene.actors)
     return "" if has_one else "there is no skin attached to a skeleton"
 

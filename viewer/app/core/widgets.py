@@ -178,7 +178,7 @@ def menu_item(
 
 
 def same_line_if_room(text: str) -> None:
-    """Place the next check box or button with this text beside the last widget if it fits."""
+    """Place the next check box or button with this text next to the last widget if it fits."""
     style = imgui.get_style()
     width = imgui.calc_text_size(text).x + imgui.get_frame_height() + style.item_inner_spacing.x
     end = imgui.get_item_rect_max().x + style.item_spacing.x + width

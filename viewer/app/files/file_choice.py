@@ -12,7 +12,7 @@ from viewer.phrases import printable
 __all__ = ["PICTURES", "FileDialog", "folder_of"]
 
 PICTURES = (".png", ".jpg", ".jpeg")
-"""Suffixes of textures."""
+"""File suffixes of texture images."""
 
 
 class FileDialog:
@@ -95,7 +95,7 @@ class FileDialog:
         return path if path.suffix else path.with_name(path.name + self.suffix)
 
     def listed(self) -> list[Path]:
-        """Return the folders, and the files that can be opened or all files."""
+        """Return the folders and the files to list: those that can be opened, or all."""
         return [
             path
             for path in self.entries

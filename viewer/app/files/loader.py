@@ -44,7 +44,7 @@ class Loader:
     builders : list of Builder
         Builders of captures whose first frames are in the scene.
     addition : Contents or None
-        Poses and pictures for the open figure, if there was nothing else.
+        Poses and images for the open figure, if there was nothing else.
     error : str
         Why nothing was read; empty if there is no error.
     """
@@ -91,7 +91,7 @@ class Loader:
             self.scene, self.builders = begin(contents, self._settings)
 
     def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
-        """Apply motions to the open figures; motions that fit none are shown on their own."""
+        """Apply motions to the open figures; motions that match none are shown on their own."""
         from viewer.loading.driving import is_body
 
         opened = read_files(self._opened, settings=self._settings)

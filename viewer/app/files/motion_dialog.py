@@ -27,7 +27,7 @@ __all__ = ["ask_for_motion"]
 
 @dataclass(slots=True)
 class _Selection:
-    """Selection of all actors' motions, or only of the chosen actor's."""
+    """Whether to export all actors' motions or only the selected actor's."""
 
     everyone: bool
 
@@ -64,7 +64,7 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
             choice(state, "Actors##exported", "all" if selection.everyone else "one", whose)
             == "all"
         )
-        explain("" if dialog.suffix == "" else "one file per actor, named by its number")
+        explain("" if dialog.suffix == "" else "one file per actor, numbered by actor")
         imgui.same_line()
         imgui.set_next_item_width(16.0 * imgui.get_font_size())
     kinds = {suffix: _title(suffix) for suffix in motion_suffixes()}
@@ -79,7 +79,7 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
 
 
 def _title(suffix: str) -> str:
-    """Return the description of a suffix by its exporters."""
+    """Return a suffix's description, from its exporters."""
     titles = [
         kind.title for kind in EXPORTERS.values() if kind.writes_motion and suffix in kind.suffixes
     ]

@@ -18,7 +18,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["Stream"]
 
-_WAITING = 4  # most parts in the queue: bounds the memory
+_WAITING = 4  # maximum number of parts in the queue: limits memory
 
 
 class Stream:
@@ -84,7 +84,7 @@ class Stream:
         Raises
         ------
         RigError
-            If bodies do not fit the model; the stream then ends.
+            If bodies do not match the model; the stream then ends.
         """
         new: list[Actor] = []
         notes: list[Diagnostic] = []

@@ -1,4 +1,4 @@
-"""Lint panel: faults of rigs and motions, their places, and remedies."""
+"""Lint panel: errors in rigs and motions, their locations, and remedies."""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def _draw_tooltip(state: AppState, finding: Finding) -> None:
         if file_place(finding):
             imgui.text_unformatted(file_place(finding))
         imgui.text_unformatted(printable(finding.message, 2000))
-        imgui.text_unformatted(f"What to do: {finding.hint}")
+        imgui.text_unformatted(f"Remedy: {finding.hint}")
         imgui.text_disabled(_click_text(state, finding))
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()

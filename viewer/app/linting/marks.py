@@ -1,4 +1,4 @@
-"""Marks of the chosen finding in the view, and aiming of the camera at them."""
+"""Markers of the chosen finding in the view, and aiming the camera at them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["aim", "marks_of", "show_finding"]
 _MOST = 3000  # largest number of marked vertices, and of marked edges of triangles
 _FEW = 200  # up to so many triangles are marked at their centres too: tiny edges cover no pixel
 _AROUND, _AROUND_JOINTS = 0.06, 0.15  # surroundings to show, relative to the actor's size
-_ONE_WAY = 0.5  # shortest mean normal of a place that has a front side
+_ONE_WAY = 0.5  # minimum length of the mean normal of a location with a front side
 _AWAY = 0.2  # cosine to the line of sight below which the front side is not visible
 _STEEPEST = 70.0  # degrees
 _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
@@ -83,7 +83,7 @@ def _key(state: AppState) -> object:
 
 
 def marks_of(places: Places) -> tuple[Marks, str]:
-    """Return marks of places, and a note if there are too many to mark all.
+    """Return markers for locations, and a note if there are too many to mark all.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def set_rate(state: AppState, rate: float) -> None:
     clip = state.actor.clip
     if not isinstance(clip, SampledClip | PointClip):
         state.clock.count_by(rate)
-        state.say_status(f"Keys are counted at {rate:g} frames per second")
+        state.say_status(f"Frames of keyed clips are numbered at {rate:g} frames per second")
         return
     together = [actor for actor in state.scene.actors if _is_together(actor, state.actor)]
     for actor in together:

@@ -14,7 +14,7 @@ _gaps: Memo[Motion, bool] = Memo()
 
 
 def no_gaps(state: AppState) -> str:
-    """Return why there are no gaps to interpolate; empty while a capture is being read."""
+    """Return why gaps cannot be interpolated; empty if there are any, or during reading."""
     if state.of(Files).stream is not None or any(
         _has_gaps(actor.clip) for actor in state.scene.actors if actor.clip is not None
     ):

@@ -1,4 +1,4 @@
-"""Ball joints in the Joints panel: rotation vectors, and the numbers stored in files."""
+"""Ball joints in the Joints panel: rotation vectors, and the raw pose values."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Fl
 
 
 def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) -> None:
-    """Draw the three numbers that files of the body model store for a joint."""
+    """Draw the three values that the body model's pose vector holds for a joint."""
     layout, skeleton = figure.pose_layout, figure.skeleton
     if layout is None or skeleton is None:
         return
@@ -90,4 +90,6 @@ def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) ->
     note_item(state, f"own {joint}")
     if imgui.is_item_hovered():
         start = int(layout.starts[joint])
-        imgui.set_tooltip(f"numbers {start} to {start + 2} of the file's pose: {kind}, radians")
+        imgui.set_tooltip(
+            f"numbers {start} to {start + 2} of the file's pose vector: {kind}, radians"
+        )

@@ -1,6 +1,6 @@
 """Drawing of the handles: joints, chain, limit arcs, rings, arrows, and their labels.
 
-Like the picture of the scene they are drawn behind the panels, so they must be drawn after it.
+Like the image of the scene they are drawn behind the panels, so they must be drawn after it.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ __all__ = ["draw", "rows"]
 Rows: TypeAlias = tuple[tuple[int, int, int], ...]
 
 OWN_NUMBERS = -2
-"""Value in place of a DOF for the row with the numbers stored in files of the body model."""
+"""Value in place of a DOF for the row with the raw pose values of the body model."""
 
 _FIRST_ROTATION = 3
 _INDENT = 9.0  # points per level
@@ -156,7 +156,7 @@ def _draw_pose_menu(state: AppState) -> None:
         return
     for text, action in (
         ("Copy as JSON", copy_pose),
-        ("Copy as the file's numbers", copy_numbers),
+        ("Copy as raw pose values", copy_numbers),
         ("Paste", paste_pose),
         ("Mirror", mirror),
     ):

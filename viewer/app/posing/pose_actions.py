@@ -55,7 +55,7 @@ def copy_pose(state: AppState) -> None:
 
 
 def copy_numbers(state: AppState) -> None:
-    """Copy the pose to the clipboard as the model's own numbers."""
+    """Copy the pose to the clipboard as the model's raw pose vector."""
     actor = state.actor
     if actor.pose is None or actor.figure.skeleton is None:
         return
@@ -65,9 +65,9 @@ def copy_numbers(state: AppState) -> None:
 
 
 def paste_pose(state: AppState) -> None:
-    """Pose the chosen actor from the clipboard: JSON, or the model's own numbers.
+    """Pose the chosen actor from the clipboard: JSON, or the model's raw pose vector.
 
-    A pose copied from a figure with other DOFs is transferred joint by joint: JSON contains
+    A pose copied from a figure with different DOFs is transferred joint by joint: JSON contains
     their rotations.
     """
     from viewer.formats import pose

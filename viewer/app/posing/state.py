@@ -40,7 +40,7 @@ class Outcome:
     pose : Pose
         Pose within the joint limits.
     text : str
-        Description of the change, shown beside the handle.
+        Description of the change, shown next to the handle.
     limited : tuple of int
         DOFs whose limits restrict the drag.
     target : (3,) or None

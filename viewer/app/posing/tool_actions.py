@@ -78,7 +78,7 @@ def selected(state: AppState) -> PosedJoint | None:
 def no_tool(state: AppState) -> str:
     """Return why nothing can be posed in the view."""
     if state.options.show == "binding" and state.actor.figure.is_attached:
-        return "the skin is shown in its binding space: press K to show the pose"
+        return "the skin is shown in its bind pose: press K to show the pose"
     if not state.actor.is_drawn:
         return "this actor is not shown"
     return no_pose(state)

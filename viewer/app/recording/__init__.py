@@ -1,1 +1,1 @@
-"""Recording of the view as pictures or video."""
+"""Recording the view as images or video."""

@@ -1,4 +1,4 @@
-"""The Record window: settings for pictures, a contact sheet or a video of the view."""
+"""The Record window: settings for images, a contact sheet or a video of the view."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class RecordedMarks:
         scene : Scene
             Posed scene with the actors of the state, or copies of them.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
 
         Raises
         ------

@@ -48,7 +48,7 @@ def recording_steps(
     settings : RecordSettings
         Settings of the recording.
     path : Path
-        Target file; ``{frame}`` in the name of numbered pictures stands for their number.
+        Target file; ``{frame}`` in the name of numbered images stands for their number.
     ghost : Ghost, optional
         Surface that is drawn over the scene.
 

@@ -1,1 +1,1 @@
-"""Rigging of a mesh with the rig of a template: alignment, matching, transfer and results."""
+"""Rigging a mesh from a template: alignment, matching, transfer and results."""

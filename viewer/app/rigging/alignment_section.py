@@ -47,13 +47,13 @@ _DOUBTFUL = 0.03  # error relative to the target's size, as in the report
 _WARNING = (1.0, 0.77, 0.30, 1.0)
 _STRETCHED = "stretched, pose kept"
 _METHODS = {
-    "in place": "about the origin of both",
+    "in place": "about the shared origin",
     "search": "by closest points",
     "fit": "pose and limbs fitted",
     "landmarks": "by landmarks",
     "given": "by hand",
 }
-"""Texts for the methods of alignment, the values of ``Alignment.how``."""
+"""Labels of the alignment methods, the values of ``Alignment.how``."""
 _POSES = "; joints are rotated and limbs resized where that fits much better"
 _FITS = (
     "; joints are rotated and limbs resized, or all of it stretched, where that fits much better"
@@ -76,7 +76,7 @@ def draw_alignment(state: AppState) -> None:
     if button(state, "Align", why):
         start_align(state)
     if not why:
-        explain(f"searched for by closest points{_FITS if choices.fits else ''}")
+        explain(f"found by matching closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):
@@ -126,7 +126,7 @@ def _draw_error(found: Alignment | None) -> None:
 
 
 def _method_text(found: Alignment) -> str:
-    """Return a text for the method of an alignment, which with fitted limbs has one scale only."""
+    """Return the label of an alignment method, which with fitted limbs has one scale only."""
     scales = found.similarity.factors, found.similarity.own_factors
     is_even = all((factors == 1.0).all() for factors in scales)
     return _METHODS[found.how] if found.how != "fit" or is_even else _STRETCHED
@@ -158,7 +158,7 @@ def _draw_tools(state: AppState) -> None:
 
 
 def _draw_numbers(state: AppState, template: Template) -> None:
-    """Draw the template's placement as numbers: translation, Euler angles about x, y, z, scale."""
+    """Draw input fields of the template's placement: translation, Euler angles, scale."""
     now = similarity_now(state, template)
     angles = np.degrees(matrix_to_euler(now.rotation[None])[0])
     shift, angle, scale = _inputs(state, now.shift, angles, now.scale)

@@ -31,7 +31,7 @@ _DOT = 5.0  # radius, window coordinates
 
 
 def show_both(state: AppState) -> None:
-    """Show the template beside the target, and fit the view to both."""
+    """Show the template next to the target, and fit the view to both."""
     view, template = state.of(Rigging), aligned_template(state)
     if template is None or view.target is None:
         return
@@ -88,7 +88,7 @@ def _hit(frame: ViewFrame, mesh: Mesh, matrix: Floats, place: tuple[float, float
 
 
 def draw_landmarks(state: AppState, template: Template) -> None:
-    """Draw all pairs as numbered dots, and the point whose partner is still to be clicked."""
+    """Draw all pairs as numbered dots, and the first point of an incomplete pair."""
     view = state.of(Rigging)
     assert view.target is not None  # checked by the caller
     posed, place = posed_template(view, template), ghost_place(state, template)

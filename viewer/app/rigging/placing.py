@@ -1,4 +1,4 @@
-"""Placement of the template: aligned with the target, moved by hand, or beside it for landmarks."""
+"""Placement of the template: aligned with the target, moved by hand, or next to it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = [
     "target_place",
 ]
 
-# Messages about the fit of the template, which stay true when it is moved.
+# Messages about the fit of the template, which remain valid when it is moved.
 _DONE = ("R003.pose", "R003.proportions", "R003.not-fitted")
 _GAP = 1.25  # distance between target and template side by side, relative to their mean width
 

@@ -106,7 +106,7 @@ def _draw_table(state: AppState) -> None:
     )
     _row(
         "guarded",
-        "vertices bent too far for exact inverse skinning: their rest position is an estimate",
+        "vertices with a pose too extreme to invert exactly: their rest position is an estimate",
         [f"{int(one.guarded.sum()):,}" for one in rigged],
     )
     _row(

@@ -116,7 +116,7 @@ def _draw_sources(state: AppState) -> None:
             else:
                 _add_template(state)
         if not refuses:
-            explain("add the template beside the target, to pose it like the target")
+            explain("add the template next to the target, to pose it like the target")
     imgui.push_text_wrap_pos(0.0)
     imgui.text_disabled(_template_text(template))
     imgui.pop_text_wrap_pos()

@@ -238,7 +238,7 @@ class Rigging:
     landmarks : list of Landmark
         Pairs that were clicked.
     pending : RayHit or None
-        Point of the template whose partner on the target is still to be clicked.
+        Point of the template whose counterpart on the target has not been clicked yet.
     aside : (3,)
         Offset of the template from the target while landmarks are clicked.
     match_fraction : float or None

@@ -79,7 +79,7 @@ def _measure(state: AppState) -> None:
 
 
 def draw_rig_tools(state: AppState) -> None:
-    """Draw the gizmo or the landmarks over the picture of the scene, and handle drags."""
+    """Draw the gizmo or the landmarks over the viewport, and handle drags."""
     view, template = state.of(Rigging), aligned_template(state)
     x, y, width, height = state.view_rect
     if not view.tool or template is None or view.target is None or min(width, height) < 40.0:

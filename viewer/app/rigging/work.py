@@ -67,7 +67,7 @@ _STEPS = {
     "checks": "checking the result",
     "weighing": "transferring weights",
 }
-"""Progress texts for the steps of the transfer."""
+"""Progress labels for the steps of the transfer."""
 _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the mesh's name
 
 
@@ -224,7 +224,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
                 return
             state.of(Rigging).placing = found
             if state.of(Rigging).tool == "landmarks":
-                state.of(Rigging).tool = ""  # show the template aligned, not beside the target
+                state.of(Rigging).tool = ""  # show the template aligned, not next to the target
 
         return finish
 

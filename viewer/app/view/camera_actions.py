@@ -31,7 +31,7 @@ _AROUND = 0.12  # of the actor's size: surroundings shown of a joint
 
 
 def fit_view(state: AppState) -> None:
-    """Aim the camera at the scene as it is posed and fill the view with it."""
+    """Aim the camera at the scene in its current pose and fill the view with it."""
     fit_shown(state)
 
 

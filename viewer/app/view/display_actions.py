@@ -18,13 +18,13 @@ __all__ = [
 
 
 def toggle_skeleton(state: AppState) -> None:
-    """Show or hide the skeleton beside the skin."""
+    """Show or hide the skeleton together with the skin."""
     shown = {"skin": "both", "both": "skin", "skeleton": "skin", "binding": "skeleton"}
     show(state, shown[state.options.show])
 
 
 def toggle_binding(state: AppState) -> None:
-    """Switch between the attached skin and the skin in its binding space."""
+    """Switch between the posed skin and the skin in its bind pose."""
     show(state, "skin" if state.options.show == "binding" else "binding")
 
 

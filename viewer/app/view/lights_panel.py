@@ -50,7 +50,7 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
     for attribute, text, low, high, unit in (
         ("strength", "Strength", 0.0, 4.0, "%.2f"),
         ("azimuth", "Azimuth", -180.0, 180.0, "%.0f\N{DEGREE SIGN}"),
-        ("inclination", "Inclination", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
+        ("inclination", "Elevation", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
     ):
         changed, value = imgui.slider_float(
             text, plain_zero(getattr(light, attribute), unit), low, high, unit, _CLAMP

@@ -54,7 +54,7 @@ def answer_picks(
     scale : float
         Pixels per window coordinate.
     picture : object
-        Key of the drawn picture, which changes whenever the picture does.
+        Key of the drawn image, which changes whenever the image does.
     """
     picking = state.of(Picking)
     wanted, picking.wanted = picking.wanted, None
@@ -247,7 +247,7 @@ def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> F
 def _look_under_mouse(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
-    """Describe the vertex under the mouse once the mouse and the picture are still."""
+    """Describe the vertex under the mouse once the mouse and the image are still."""
     view, io = state.of(Weights), imgui.get_io()
     x, y, width, height = state.view_rect
     place = (io.mouse_pos.x, io.mouse_pos.y)

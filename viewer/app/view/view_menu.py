@@ -133,10 +133,10 @@ def _draw_vertices(state: AppState) -> None:
     if menu_item(state, text, "V", shows, "" if shows else no_view(state, "weight")):
         toggle_weights(state)
     why = no_mesh(state)
-    if menu_item(state, "Vertex under the mouse", "", view.always_shows_info, why):
+    if menu_item(state, "Inspect vertex under cursor", "", view.always_shows_info, why):
         toggle_vertex_info(state)
     if menu_item(state, "Pick vertices", "", view.picks_vertices, why):
         toggle_picking(state)
     why = "" if view.pinned is not None else "no vertex is pinned: Alt+click one"
-    if menu_item(state, "Unpin the vertex", "Esc", why=why):
+    if menu_item(state, "Unpin vertex", "Esc", why=why):
         unpin(state)

@@ -132,7 +132,7 @@ def toggle_vertex_info(state: AppState) -> None:
     """Choose whether hover text is shown always or only while the Weights panel is visible."""
     view = state.of(Weights)
     view.always_shows_info = not view.always_shows_info
-    state.say_status(f"Vertex under the mouse {'on' if view.always_shows_info else 'off'}")
+    state.say_status(f"Inspect vertex under cursor {'on' if view.always_shows_info else 'off'}")
 
 
 def toggle_picking(state: AppState) -> None:

@@ -24,7 +24,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["draw_hovered", "influence_colors", "pinned_annotations", "vertex_annotation"]
 
-# Pixels in a picture of standard height.
+# Pixels in an image of standard height.
 _THINNEST, _THICKEST = 1.0, 5.0  # lines of the smallest and largest weight
 _DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot, dark borders of dots and of lines
 _FAINTEST = 0.35
@@ -55,7 +55,7 @@ def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotati
     state : AppState
         Holds the posed scene; a vertex that cannot be explained is unpinned.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
     view = state.of(Weights)
     pinned = view.pinned
@@ -91,7 +91,7 @@ def vertex_annotation(
     draws_lines : bool
         Whether lines are drawn in addition to the dot.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
     scale = picture_scale(size)
     vertex = apply_transform(actor.placement, explanation.position)

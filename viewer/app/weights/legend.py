@@ -23,7 +23,7 @@ _LINE = (0.05, 0.05, 0.06, 1.0)
 def draw_legend(state: AppState) -> Rect | None:
     """Draw the legend if a scalar quantity is shown; return its rectangle.
 
-    It is not drawn if the renderer already draws a legend into the picture.
+    It is not drawn if the renderer already draws a legend into the image.
     """
     x, y, width, height = state.view_rect
     shows_mesh = any(

@@ -41,11 +41,11 @@ class Hover:
     Attributes
     ----------
     since : float
-        Time since which neither mouse nor picture has changed, seconds of ImGui's clock.
+        Time since which neither mouse nor image has changed, seconds of ImGui's clock.
     place : (float, float)
         Position of the mouse, window coordinates.
     picture : object
-        Key of the picture, compared to detect a change.
+        Key of the image, compared to detect a change.
     is_known : bool
         Whether the vertex has been determined since then.
     lines : tuple of str

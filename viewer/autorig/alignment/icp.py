@@ -43,14 +43,14 @@ _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end
 _EXACT = 1e-12  # error over size that counts as zero
 _ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
-HOLD = 3e-3  # weight of point-to-point beside point-to-plane distances, before squaring
+HOLD = 3e-3  # weight of point-to-point relative to point-to-plane distances, before squaring
 _PATIENCE = 3  # iterations without improvement; new pairs may raise the error for a while
 FEWEST = 8  # minimum number of pairs for seven unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """Partners of N points: positions and normals (N, 3), and a mask of usable ones (N,)."""
+    """Correspondences of N points: positions and normals (N, 3), and a mask of usable ones (N,)."""
 
     positions: Floats
     normals: Floats
@@ -73,7 +73,7 @@ class Cloud:
     Parameters
     ----------
     samples : SurfaceSamples
-        Points whose partners on the other mesh are searched for.
+        Points for which closest points on the other mesh are searched.
     dense : SurfaceSamples
         Points that are searched.
     """
@@ -84,7 +84,7 @@ class Cloud:
         self.size = _size(dense.positions)
 
     def with_samples(self, samples: SurfaceSamples) -> Cloud:
-        """Return the same mesh with other points for the search on the other mesh."""
+        """Return the same mesh with different points for the search on the other mesh."""
         other = copy(self)
         other.samples = samples
         return other
@@ -106,7 +106,7 @@ class Triangles:
     triangles : (T, 3)
         Vertex indices.
     count : int
-        Number of points whose partners on the other mesh are searched for.
+        Number of points for which closest points on the other mesh are searched.
     """
 
     def __init__(self, positions: Floats, triangles: Ints, count: int) -> None:
@@ -321,7 +321,7 @@ class Gaps:
         From the template's samples to the target.
     uneven_towards, uneven_away : (N,), (M,)
         The same without the median offset along the normals: a
-        jacket that is two centimetres from the skin everywhere fits it well.
+        jacket at a constant two centimetres from the skin fits it well.
     """
 
     towards: Floats

@@ -34,7 +34,7 @@ _NEAR_UNIT = 0.15  # relative tolerance for interpreting a ratio of sizes as a r
 _TRIM = 0.8  # fraction of distances that counts: excludes hair, skirts and cropped parts
 _QUICK, _LONG = 12, 60  # iterations for every candidate, and for the best few
 _FINALISTS = 4
-# A mesh that is in place is only rotated if that reduces the error below this fraction.
+# A mesh that is already in place is rotated only if that reduces the error below this fraction.
 _NO_BETTER = 0.7
 _IN_PLACE = 300  # samples that decide whether a mesh is in place already
 
@@ -129,9 +129,9 @@ def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bo
     Returns
     -------
     Candidate
-        Its error is one-way: a shirt that lies on the body fits, regardless of what it leaves
-        uncovered. Of several with similar errors the first, so that nothing is rotated
-        unnecessarily: most figures look nearly the same from behind.
+        The error is one-way: a shirt that lies on the body fits, regardless of the parts it
+        leaves uncovered. The first of several with similar errors, so that nothing is
+        rotated unnecessarily: most figures look nearly the same from behind.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []

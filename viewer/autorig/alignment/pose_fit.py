@@ -2,8 +2,8 @@
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
-moves all joints at once (``pose_step``). Partners may be far apart at first, such as lowered and
-outstretched arms, and come closer with every iteration.
+moves all joints at once (``pose_step``). Corresponding points may be far apart at first, as for
+lowered and outstretched arms, and come closer with every iteration.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Fitted:
     Attributes
     ----------
     figure : Figure
-        With its limbs resized.
+        Figure with resized limbs.
     pose : Pose
         DOFs are within their limits; the remainder is in the joints' quaternions.
     similarity : Similarity

@@ -30,7 +30,7 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["AlignedTemplate", "Pairs", "PoseStep", "solve_step"]
 
-_HOLD = 0.2  # h: weight of point-to-point beside point-to-plane distances
+_HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
 # Penalties on the squares of total rotations (radians) and total growths (logarithms).
 _ROTATED, _GROWN = 3e-6, 3e-5
 _NOW = 1e-5  # penalty on both within one iteration
@@ -47,9 +47,9 @@ class AlignedTemplate:
     Attributes
     ----------
     positions, normals : (V, 3)
-        Its vertices.
+        Vertices of the template.
     joints, axes : (J, 3)
-        Its joints, and unit vectors along their limbs.
+        Joints of the template, and unit vectors along their limbs.
     """
 
     positions: Floats
@@ -65,7 +65,7 @@ class Pairs:
     Attributes
     ----------
     vertices : (N,)
-        Of the template, with partners that face the same way.
+        Vertices of the template, matched with points that face the same way.
     targets, normals : (N, 3)
         Points of the target and the normals there.
     ends : (M,)

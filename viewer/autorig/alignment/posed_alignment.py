@@ -1,9 +1,9 @@
 """Alignment of a template whose pose and proportions differ from the target's.
 
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
-similarity aligns one with the other. So if the alignment leaves a gap, pose and proportions are
-fitted too, and kept if that closes most of it. A figure in another pose also looks nearly the same
-from behind: if the alignment is ambiguous, both facings are fitted.
+similarity aligns one with the other. So if the alignment leaves a large error, pose and proportions
+are fitted too, and kept if that removes most of the error. A figure in another pose also looks
+nearly the same from behind: if the alignment is ambiguous, both facings are fitted.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _CLEARLY = 0.85  # fraction of the misfit that the opposite facing must reach af
 _ROUNDS = 30  # iterations to align the template facing the other way
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that were not given by the user
-# Separate scales are tried if the gap exceeds the first, and kept if they leave at
+# Separate scales are tried if the error exceeds the first, and kept if they leave at
 # most the second of it and differ by more than the third.
 _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
@@ -167,7 +167,7 @@ def _if_better(
     kept: PosedAlignment,
     report: Callable[[float, str], None],
 ) -> PosedAlignment:
-    """Return the template with fitted pose and proportions if these close most of the gap."""
+    """Return the template with fitted pose and proportions if these remove most of the error."""
     rigid = kept.alignment
     is_part = rigid.away > PART
     before = misfit(rigid, is_part)
@@ -223,7 +223,7 @@ def _facing_back(job: _Job, ours: Posed, rigid: Alignment, up: str) -> Alignment
 def _stretched(
     ours: Posed, exact: Triangles, kept: PosedAlignment, samples: int
 ) -> PosedAlignment | None:
-    """Return the template with separate scales per axis, if that closes most of the gap."""
+    """Return the template with separate scales per axis, if that removes most of the error."""
     rigid = kept.alignment
     template = Triangles(ours.positions, ours.triangles, samples)
     trials = [
@@ -254,7 +254,7 @@ def _stretched(
 
 
 def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
-    """Return whether a stretched template leaves a much smaller gap than another."""
+    """Return whether a stretched template leaves a much smaller error than another."""
     gap = misfit(stretched.alignment, False)
     return gap <= _STRETCH_LEFT * misfit(other.alignment, False)
 
@@ -283,7 +283,7 @@ def _scales(similarity: Similarity) -> Phrase:
 
 
 def _gap(after: float, before: float) -> Phrase:
-    """Return the gaps after and before a fit as text."""
+    """Return the fitting errors after and before a fit as text."""
     return Phrase("gap", after=100.0 * after, before=100.0 * before)
 
 

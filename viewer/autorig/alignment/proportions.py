@@ -37,7 +37,7 @@ class Limbs:
     axes : (J, 3)
         Unit vectors along the limbs, in the bind pose; 0 for a joint without influence.
     partners : (J,)
-        The joint on the other side, or the joint itself.
+        Mirror counterpart of each joint, or the joint itself.
     """
 
     weights: Floats
@@ -88,7 +88,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     figure : Figure
         With mesh, skeleton and skin.
     limbs : Limbs
-        Its own.
+        Limbs of this figure.
     lengths, girths : (J,)
         Factors along and across the limbs.
 

@@ -74,13 +74,13 @@ class Similarity:
         return points @ self.linear.T + self.shift
 
     def undo(self, points: Floats) -> Floats:
-        """Map points (..., 3) of the target space back."""
+        """Map points (..., 3) of the target space back to the source space."""
         rotated = (points - self.shift) / (self.scale * self.factors) @ self.rotation
         return rotated / self.own_factors
 
 
 def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) -> Similarity:
-    """Return the similarity that maps points closest to their partners, in least squares.
+    """Return the similarity that maps points closest to their targets, in the least-squares sense.
 
     With means removed, sum_i q_i p_i^T = U D V^T, R = U S V^T with S = diag(1, 1, det(U V^T)),
     s = tr(D S) / sum |p_i|^2, t = mean q - s R mean p (Umeyama 1991, eqs. 39 to 43).

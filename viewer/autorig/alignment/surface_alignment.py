@@ -53,7 +53,7 @@ _SLIDING = 0.02  # misfit over size up to which sliding refines the fit
 # fits nearly as well in many other positions, the whole of it does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
 PART = 0.05
-"""Fraction of the size: if the template has points farther from the target, that is only a part."""
+"""Fraction of the size: if template points are farther than this, the target is only a part."""
 
 _CAP = 0.05  # fraction of the size; larger distances, as of hair or a missing hand, are clamped
 _BAD = 0.03  # RMS over size above which a warning is given
@@ -66,7 +66,7 @@ class Posed:
     Attributes
     ----------
     positions : (V, 3)
-        Its own unit.
+        Positions in the mesh's own unit.
     triangles : (T, 3)
         Vertex indices.
     """
@@ -93,7 +93,7 @@ class AlignmentSettings:
     matrix : (4, 4) or None
         A given alignment, as dragged in the window: nothing is searched.
     samples : int
-        Points distributed over each surface whose partners on the other one are searched for.
+        Points distributed over each surface for which closest points on the other are searched.
         The run time of a fit is proportional to it.
     """
 
@@ -132,7 +132,8 @@ class Alignment:
         Trimmed RMS distance (the best 90 %) of the target from the template, over the target's
         size.
     away : float
-        The same of the template from the target; large if the target is only a part of a figure.
+        The same distance of the template from the target; large if the target is only a part of a
+        figure.
     uneven : (float, float)
         RMS distances over the size in the same two directions, without the median offset between
         the surfaces. All distances count, each clamped to 5 %, so that protruding ends of limbs are

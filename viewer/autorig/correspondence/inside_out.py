@@ -19,7 +19,7 @@ __all__ = ["with_reversed_winding", "wound_backwards"]
 
 # Squared number of border edges over triangles; with smaller holes the volume's sign is reliable.
 _CLOSED = 0.25
-_MOST = 0.5  # fraction of the target's area
+_MOST = 0.5  # fraction of the target's area above which an island is reversed
 
 
 def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
@@ -62,7 +62,7 @@ def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
     mesh : Mesh
         V vertices.
     vertices : (V,) bool
-        Of whole parts.
+        Vertices of whole parts.
     """
     rows = np.logical_or.reduce(vertices[mesh.triangles], axis=1)
     if not rows.any():

@@ -139,7 +139,7 @@ def sheet_normals(mesh: Welded) -> Floats:
 
 
 def match(template: Template, target: Welded, size: float, settings: MatchSettings) -> Matches:
-    """Find the vertices of a target that lie on the template.
+    """Match the vertices of a target that lie on the template.
 
     Parameters
     ----------

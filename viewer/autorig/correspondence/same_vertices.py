@@ -3,8 +3,8 @@
 The closest point of the surface slides if a vertex was moved along it, and gets blended weights;
 the vertex itself has the exact ones. A target's vertex is identified with one of the template's if
 each is the other's nearest, it slid by less than half the length of its edges, and nearly all of
-its edges correspond to edges of the template. Another tessellation of the same surface has hardly
-any such vertices.
+its edges correspond to edges of the template. A different tessellation of the same surface has
+hardly any such vertices.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def at_vertices(
     corners : (T, 3)
         The surface's triangles, as indices of its U vertices.
     places : (U, 3)
-        Positions of these vertices.
+        Positions of the U vertices.
     same : (W,)
         The vertex that a point is snapped to, or -1.
     """

@@ -32,9 +32,9 @@ def transfer_clip(
     Parameters
     ----------
     clip : Clip or SampledClip
-        Of the template.
+        Clip of the template.
     skeleton : Skeleton
-        The target's.
+        Skeleton of the target.
     length_scale : float
         Target units per unit of the template's figure space, 1 if nothing was scaled.
     figure_scale : float
@@ -47,13 +47,13 @@ def transfer_clip(
     Returns
     -------
     Clip or SampledClip
-        Of the same type, name and timing. Shape weights of captures are dropped: the target has its
-        own.
+        Clip with the same type, name and timing. Shape weights of captures are dropped: the target
+        has its own.
 
     Raises
     ------
     RigError
-        If the clip has another number of joints, or moves a DOF that does not exist.
+        If the clip has a different number of joints, or moves a DOF that does not exist.
     """
     path = length_scale if path_scale is None else path_scale
     roots = skeleton.parents < 0

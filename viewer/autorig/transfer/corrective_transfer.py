@@ -26,32 +26,32 @@ def transfer_correctives(
     target_triangles: Ints,
     scale: float,
 ) -> Correctives | None:
-    """Return correctives for the target, scaled from the template's point under each vertex.
+    """Return correctives interpolated at the closest template point of each vertex, and scaled.
 
-    The closest point of an unmatched vertex may be on another limb: there
-    the correctives fade smoothly to 0.
+    The closest point of an unmatched vertex may be on a different limb, so
+    correctives fade smoothly to 0 at unmatched vertices.
 
     Parameters
     ----------
     correctives : Correctives
         Offsets of the template's vertices.
     points : SurfacePoints
-        The template's point for each of the target's V vertices.
+        Closest template point for each of the target's V vertices.
     triangles : (T, 3)
-        The template's.
+        Triangles of the template.
     matched : (V,) bool
         Vertices that lie on the template.
     positions : (V, 3)
         The target's vertices.
     target_triangles : (F, 3)
-        Its triangles.
+        Triangles of the target.
     scale : float
         Target units per template unit.
 
     Returns
     -------
     Correctives or None
-        None if it would have more than ``MOST_NUMBERS`` numbers.
+        None if it would have more than ``MOST_NUMBERS`` values.
     """
     offsets = correctives.values()
     if len(offsets) * len(positions) * 3 > MOST_NUMBERS:

@@ -31,12 +31,12 @@ class InvertedSkinning:
     Attributes
     ----------
     positions : (V, 3)
-        Bind space; pose correctives are still included.
+        Positions in the bind pose; pose correctives are still included.
     matrices : (V, 3, 4)
         The matrix that poses each vertex.
     guarded : (V,) bool
-        Vertices whose matrix is nearly singular: inverted by the nearest rotation, so posing
-        does not reproduce them exactly.
+        Vertices whose matrix is nearly singular: unposed with the inverse of the nearest
+        rotation, so posing does not reproduce them exactly.
     """
 
     positions: Floats

@@ -55,7 +55,7 @@ def surface_shifts(
     target_positions : (W, 3)
         The target's vertices.
     target_triangles : (T, 3)
-        Its triangles.
+        Triangles of the target.
     max_distance : float
         In the target's unit; pairs farther apart are rejected.
 

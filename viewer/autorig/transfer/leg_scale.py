@@ -1,7 +1,8 @@
 """Ratio of the leg lengths of two figures, by which paths and heights are scaled.
 
-A root is at the height of the legs' length, and step width is proportional to leg length.
-So if limbs were scaled, or the whole figure stretched, lengths of the root scale with the legs.
+The root's height above the feet is roughly the leg length, and step length is proportional
+to it. So if limbs were scaled, or the whole figure stretched, root heights and translations scale
+with the legs.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["leg_scale"]
 
-_LOW = 0.1  # fraction of the joints' extent in height; joints this close to the lowest are feet
-_LEGS = 0.2  # fraction of the joints' extent in height; a root closer to the feet has no legs
+_LOW = 0.1  # fraction of the joints' vertical extent; joints this close to the lowest are feet
+_LEGS = 0.2  # fraction of the vertical extent; with the root closer to the feet there are no legs
 
 
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
@@ -25,9 +26,9 @@ def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> f
     Parameters
     ----------
     before, after : Skeleton
-        With the same joints.
+        Skeletons with the same joints.
     up : "y" or "z"
-        The axis that points up, of both.
+        Up axis of both skeletons.
     otherwise : float
         Returned if there are no legs, as for hands, heads, or a root on the ground.
     """

@@ -176,7 +176,7 @@ def _zero_pose(skeleton: Skeleton) -> Pose:
 
 
 def _with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> Skeleton:
-    """Return a skeleton with other rest offsets, its lengths scaled: (J, 3), (J,)."""
+    """Return a skeleton with new rest offsets (J, 3) and its lengths scaled by (J,)."""
     scales = _dof_scales(skeleton, joint_scales)
     return replace(
         skeleton,

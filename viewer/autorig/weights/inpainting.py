@@ -87,7 +87,7 @@ def inpaint(
 
 
 def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
-    """Return the clipped and scaled solution for all joints adjacent to unknown vertices."""
+    """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
     sparse = scipy_part("sparse")
     used = np.unique(border.indices)  # matched vertices within two edges of an unknown one
     right = sparse.csc_array(-border[:, used] @ weights[used])

@@ -109,7 +109,7 @@ def nothing_matched(distances: Floats, size: float) -> str:
 
 
 def template_lines(skin: Skin) -> tuple[Diagnostic, ...]:
-    """Return messages about faults of the template's weights."""
+    """Return messages about errors in the template's weights."""
     negative = int((skin.weights < 0.0).sum())
     if not negative:
         return ()

@@ -29,7 +29,7 @@ def weight_matrix(skin: Skin, triangles: Ints) -> Any:
     Raises
     ------
     RigError
-        If the skin has another number of vertices than the triangles need, or the weights of a
+        If the skin has fewer vertices than the triangles refer to, or the weights of a
         corner of a triangle add up to 0.
     """
     if triangles.max(initial=-1) >= skin.n_vertices:

@@ -78,7 +78,7 @@ def transferred_weights(
     positions : (V, 3)
         The target's vertices.
     triangles : (T, 3)
-        Its triangles.
+        Triangles of the target.
     settings : WeightSettings
         Limits of matching, smoothing, number of influences.
     report : callable
@@ -100,7 +100,7 @@ def transferred_weights(
     size = box_size(bounding_box(positions))
     if size <= 0.0:
         raise RigError(
-            f"target: expected a mesh with a size, found {len(positions)} vertices at one place"
+            f"target: expected a mesh with a size, found {len(positions)} coincident vertices"
         )
     report(0.0, "welding seams")
     target = weld(positions, triangles)

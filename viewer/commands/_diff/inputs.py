@@ -12,8 +12,8 @@ from viewer.formats import FORMATS, Source, detect
 def input_files(text: str) -> list[Path]:
     """Return the files that one argument refers to.
 
-    ``text``: a file; several joined by ``+``; a folder of a known kind (PIG, EasyMocap); or any
-      folder with rig files, all opened together, such as a submission.
+    ``text``: a file; several joined by ``+``; a folder in a known format (PIG, EasyMocap); or
+      any folder with rig files, all opened together, such as a student's submission.
     Raises FormatError if it is a folder without a readable file.
 
     >>> input_files("arm.skel+arm.skin") == [Path("arm.skel"), Path("arm.skin")]

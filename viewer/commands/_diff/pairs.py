@@ -9,7 +9,7 @@ from viewer.diagnostics import Phrase
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
 
-# Of clips for an actor: matching name, the actor's own, any other.
+# Ranks of clips for an actor: matching name, the actor's own, any other.
 _N_RANKS = 3
 
 
@@ -22,7 +22,7 @@ class Pairing:
     pairs : tuple of (Actor, Actor)
         In the first scene's order; each with the motion to compare.
     first, second : tuple of Phrase
-        Labels of everything unpaired: actors, and motions that belong to unpaired actors only.
+        Labels of everything unpaired: actors, and motions that belong only to unpaired actors.
     """
 
     pairs: tuple[tuple[Actor, Actor], ...]
@@ -42,11 +42,11 @@ _RULES: tuple[Callable[[Actor, Actor], bool], ...] = (
 def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
     """Pair the actors of two scenes, and the motions of paired actors.
 
-    People of captures are paired by their number. Actors of the same name are paired first, of
+    People of captures are paired by their number. Actors with the same name are paired first, of
     the same kind if there are several; then actors of the same kind, skinned figures with
     skinned figures; then the rest, in order. Keyframed clips are assigned to any skeleton they
-    fit when files are opened, so the clip with the partner's clip name takes precedence, then the
-    actor's own, then one assigned to an unpaired actor.
+    fit when files are opened, so a clip with the same name as the other actor's clip takes
+    precedence, then the actor's own, then one assigned to an unpaired actor.
 
     ``first``, ``second``: actors of the reference and of the other scene; not modified.
     """
@@ -84,7 +84,7 @@ def _kind(actor: Actor) -> tuple[bool, bool, bool]:
 
 
 def _lone(actors: Sequence[Actor], clips: Sequence[Clip]) -> tuple[Phrase, ...]:
-    """Return unpaired clips, and actors with their kind unless they have mesh and skeleton."""
+    """Return unpaired clips, and actors, with their kind unless they have mesh and skeleton."""
     kinds = {
         (True, False, False): "lone-skeleton",
         (False, True, False): "lone-mesh",
@@ -100,8 +100,8 @@ def _with_clips(
     """Return actors with the keyframed clips to compare, and the remaining clips.
 
     ``actors``: the paired ones.
-    ``lone``: the unpaired ones of the same scene; their clips may be meant for the others.
-    ``partners``: the motion of each one's partner.
+    ``lone``: the unpaired ones of the same scene; their clips may belong to paired actors.
+    ``partners``: the motion of each actor's counterpart.
     """
     pool = [actor.clip for actor in (*actors, *lone) if isinstance(actor.clip, Clip)]
     if not pool:
@@ -114,7 +114,7 @@ def _with_clips(
                 continue
             fitting = [c for c in pool if _rank(c, actor, partner) == rank and _suits(c, actor)]
             if fitting:
-                # Among clips of the same name, the actor's own comes first.
+                # Among clips with the same name, the actor's own comes first.
                 dealt[index] = next((c for c in fitting if c is actor.clip), fitting[0])
                 pool.remove(dealt[index])
     found = [
@@ -125,7 +125,7 @@ def _with_clips(
 
 
 def _rank(clip: Clip, actor: Actor, partner: Motion | None) -> int:
-    """Return how well a clip matches a partner's motion, 0 is best; ``_N_RANKS`` if not at all."""
+    """Return the rank of a clip's match with the other motion, 0 is best; ``_N_RANKS`` if none."""
     if isinstance(partner, Clip) and clip.name == partner.name:
         return 0
     if clip is actor.clip:

@@ -23,12 +23,12 @@ _COLORED = ("vertices", "surface, from the first")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heat:
-    """The reference, coloured by its distance to another figure.
+    """Heat map of the reference, coloured by its distance to another figure.
 
     Attributes
     ----------
     actors : tuple of Actor
-        In the pose with the largest distance; with the field ``difference``.
+        Actors in the pose with the largest distance, with the field ``difference``.
     most : float
         The largest distance, in the unit of the legend.
     """
@@ -58,16 +58,16 @@ def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None
 
 
 def save_heat(heats: Sequence[Heat], output: Path, skinning: Skinning) -> str:
-    """Write one picture, a sheet with a common scale if there are several; return a summary line.
+    """Write one image, a sheet with a common scale for several heat maps; return a summary line.
 
-    Raises ViewerError if there is nothing to colour, or too many for one sheet.
+    Raises ViewerError if there is nothing to colour, or too many heat maps for one sheet.
     Raises OutputError if it cannot be written.
     """
     from viewer.media.picture_sinks import SheetSink
     from viewer.rendering.offscreen import render
 
     if not heats:
-        raise ViewerError(f"{printable(output, 300)}: there is no mesh in common to colour")
+        raise ViewerError(f"{printable(output, 300)}: no common mesh to colour")
     most = max(heat.most for heat in heats)
     options = DisplayOptions(
         shading="scalar",

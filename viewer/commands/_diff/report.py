@@ -25,9 +25,9 @@ class Compared:
     differences : tuple of (str, Difference)
         One per actor, with the actor's name in the reference.
     mismatches : tuple of Diagnostic
-        Actors on one side only, and on which side.
+        Actors on one side only, with the side.
     error : str
-        Why it could not be opened; empty if it could.
+        Reason why it could not be opened; empty if it could.
     diagnostics : tuple of Diagnostic
         Warnings of its readers.
     """
@@ -109,7 +109,7 @@ def _cells(row: Compared, tolerance: float | None) -> list[str]:
             for measure in difference.measures
             if measure.name in names
         ]
-        # Relative to each reference's own size: figures of one scene may have different units.
+        # Relative to each reference's size, because figures in a scene may have different units.
         worst = max(found, key=lambda pair: pair[0].relative(pair[1].size), default=None)
         cells.append("-" if worst is None else amount(worst[0].maximum, worst[0].kind, worst[1]))
     count = len(row.mismatches) + sum(len(d.mismatches) for _, d in row.differences)

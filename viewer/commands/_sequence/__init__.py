@@ -1,1 +1,1 @@
-"""Frames of motions: their numbers, which of them are drawn, and into what."""
+"""Frames of motions: numbering, selection and output."""

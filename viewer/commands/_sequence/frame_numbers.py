@@ -78,7 +78,7 @@ class Numbering:
     def checked_time(self, time: float) -> float:
         """Return a time, checked to lie within the motions.
 
-        A capture's last frame extends for half a frame's duration, since nobody types its exact
+        A capture's last frame extends for half a frame's duration, since nobody enters its exact
         time.
 
         Raises ViewerError if the time lies outside the captures.
@@ -155,7 +155,7 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
         help="frames per second of captures, and for numbering the frames of clips "
         "(default: the file's own, or 30)",
     )
-    # Commands with another name for the option put that name into messages.
+    # Commands that name the option differently use their own name in messages.
     parser.set_defaults(frame_option="--frame")
 
 

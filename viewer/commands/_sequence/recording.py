@@ -1,4 +1,4 @@
-"""Numbered pictures, videos and contact sheets of ``viewer render``."""
+"""Numbered images, videos and contact sheets of ``viewer render``."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ _NARROW, _WIDE = 0.4, 2.5  # aspect ratios of the cells of contact sheets
 
 
 def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of videos, numbered pictures and contact sheets."""
-    group = parser.add_argument_group("videos, numbered pictures, contact sheets")
+    """Add the options of videos, numbered images and contact sheets."""
+    group = parser.add_argument_group("videos, numbered images, contact sheets")
     group.add_argument(
         "--turntable",
         nargs="?",
@@ -49,14 +49,14 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         "--contact-sheet",
         type=int,
         metavar="N",
-        help="one picture of N numbered frames, evenly spaced over the motion, at one scale and "
+        help="one image of N numbered frames, evenly spaced over the motion, at one scale and "
         "with one ground line",
     )
     group.add_argument(
         "--onion",
         type=int,
         metavar="N",
-        help="one picture of N poses in place, evenly spaced over the motion, earlier ones fainter",
+        help="one image of N poses in place, evenly spaced over the motion, earlier ones fainter",
     )
     group.add_argument(
         "--speed",
@@ -79,9 +79,9 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
-    """Return the requested output if it is more than one still picture.
+    """Return the requested output if it is more than one still image.
 
-    Raises ViewerError if options conflict, or the name of numbered pictures has no frame field.
+    Raises ViewerError if options conflict, or the name of numbered images has no frame field.
     """
     frames = None if arguments.frames is None else parse_range(arguments.frames)
     turntable = None if arguments.turntable is None else parse_turntable(arguments.turntable)
@@ -96,7 +96,7 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
 
 
 def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
-    """Return the kind of output, and whether it is certain; "" for a still picture."""
+    """Return the kind of output, and whether it is certain; "" for a still image."""
     asks = arguments.frames is not None or arguments.turntable is not None
     if arguments.contact_sheet is not None:
         return "sheet", True
@@ -115,13 +115,13 @@ def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
 
 def _check_options(arguments: argparse.Namespace, kind: str) -> None:
     if kind and arguments.panels:
-        raise ViewerError("--panels: applies to one picture only, not to videos or sequences")
+        raise ViewerError("--panels: applies to single images only, not to videos or sequences")
     if arguments.frames is not None:
         for option in ("frame", "time"):
             if getattr(arguments, option) is not None:
                 raise ViewerError(f"--frames and --{option}: expected one of them, found both")
     if arguments.follow is not None and not kind:
-        raise ViewerError("--follow: expected a video, contact sheet or numbered pictures")
+        raise ViewerError("--follow: expected a video, contact sheet or numbered images")
     _check_onion(arguments, kind)
     for option in ("speed", "video-quality"):
         given = getattr(arguments, option.replace("-", "_"))
@@ -138,7 +138,7 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
         raise ViewerError(f"--contact-sheet: expected 1 to {_MOST_CELLS} frames, found {cells}")
     if kind == "sheet" and Path(arguments.output).suffix.lower() in (".mp4", ".webm"):
         raise ViewerError(
-            "--contact-sheet: expected the name of a picture, such as .png, found a video"
+            "--contact-sheet: expected an image file name, such as .png, found a video"
         )
 
 
@@ -168,17 +168,17 @@ def _check_name(name: str) -> None:
     )
     if not is_good:
         raise ViewerError(
-            "--output: expected {frame} or {frame:05} in the name of numbered pictures, as in "
+            "--output: expected {frame} or {frame:05} in the name of numbered images, as in "
             f'frame_{{frame:05}}.png, found "{printable(name)}"'
         )
 
 
 def _check_picture(output: Path) -> None:
-    """Check that numbered pictures do not have the name of a video; a GIF may be either."""
+    """Check that numbered images do not have the suffix of a video; a GIF may be either."""
     suffix = output.suffix.lower()
     if suffix in VIDEOS and suffix not in PICTURES:
         raise UnsupportedFormatError(
-            f"{printable(output, 300)}: expected a picture ({', '.join(PICTURES)}) for one file "
+            f"{printable(output, 300)}: expected an image ({', '.join(PICTURES)}) for one file "
             f"per frame, found {suffix}"
         )
 
@@ -193,7 +193,7 @@ def draw_sequence(
     """Draw and write all frames; return a line about the written files.
 
     Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
-    Raises OutputError if a file exists already, or cannot be written.
+    Raises OutputError if a file already exists, or cannot be written.
     """
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import fit_turntable, frame_motion, seen_aspect
@@ -297,7 +297,7 @@ def _follow_notes(scene: Scene, arguments: argparse.Namespace) -> list[str]:
 
     name = arguments.follow
     actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
-    # A person's body and keypoints count as one.
+    # A person's body and keypoints count as one match.
     others = [
         actor for actor in actors[1:] if actor.person is None or actor.person != actors[0].person
     ]

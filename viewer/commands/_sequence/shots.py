@@ -1,4 +1,4 @@
-"""Times of a motion to draw, and the camera's rotation meanwhile."""
+"""Times of a motion to draw, and the camera's rotation over them."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ class Request:
     Attributes
     ----------
     kind : "pictures", "video", "sheet" or "onion"
-        One file per frame, one video file, one picture of all frames in cells, or in one place.
+        One file per frame, one video file, one image of all frames in cells, or in one place.
     output : Path
-        As given; includes ``{frame}`` for pictures.
+        As given; includes ``{frame}`` for images.
     range : Range or None
         Range of frames; None for the whole motion.
     turntable : Turntable or None
         Rotation of the camera; None if it does not rotate.
     is_certain : bool
-        False for a GIF, which is a still picture if nothing moves.
+        False for a GIF, which is a still image if nothing moves.
     """
 
     kind: str
@@ -74,7 +74,7 @@ class Shots:
     seconds : float
         Duration of all frames.
     remark : str
-        Remark about the frame rate, or an empty string.
+        Note about the frame rate, or an empty string.
     notes : list of str
         Messages about unexpected results.
     """
@@ -182,7 +182,7 @@ def _places(
     start, stop = numbering.span(request.range)
     total, first = numbering.count, numbering.first
     behind = f"frames {first + max(total, start)} to {first + stop - 1}"
-    notes = [f"--frames: {behind} are beyond the motion's end"] if stop > total else []
+    notes = [f"--frames: {behind} are beyond the end of the motion"] if stop > total else []
     # Step between drawn frames, in frames of the motion.
     step = 1 if request.range is None else request.range.step
     pace = step * (arguments.speed or 1.0) * rates.played / rates.drawn

@@ -45,7 +45,7 @@ _CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging, compari
 CODES: dict[str, Code] = {
     code: row for table in _CODED for code, row in sorted(table.CODES.items())
 }
-"""By code; a code is never reused for another fault."""
+"""By code; a code is never reused with a different meaning."""
 
 MESSAGES: dict[str, str] = {
     key: template for table in TABLES for key, template in table.MESSAGES.items()
@@ -66,10 +66,10 @@ PLACES = {
     "items": "joints",
     "frames": "frames",
 }
-"""Plural noun for the places of a part."""
+"""Plural noun for the elements of a part."""
 
 FURTHER = "; first of {}"
-"""Suffix of a message that stands for several faults."""
+"""Suffix of a message that reports several errors."""
 
 NOTHING_ELSE = "; the rest of the file was not checked"
-"""Suffix of a message whose fault ended the reading."""
+"""Suffix of a message about an error that stopped parsing."""

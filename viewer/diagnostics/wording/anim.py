@@ -14,7 +14,7 @@ MESSAGES = {
     "F002.anim-channels": "{where}: expected {expected:#channel} as declared by numchannels, found "
     "{found}",
     "F002.anim-keys": "{where}: expected {expected:#key}, found {found}",
-    "F002.anim-keys-again": "{where}: expected one list of keys, found a second",
+    "F002.anim-keys-again": "{where}: expected a single list of keys, found a second one",
     "F002.anim-mode": "{where}: extrapolate: expected one of {modes:list}, found {found:quoted}"
     + _BEGINS,
     "F002.anim-tangent": "{where}: tangent: expected {rules:list} or a number, found "

@@ -12,7 +12,7 @@ MESSAGES = {
     "F002.archive": _KIND + "{found:text}",
     "F002.archive-pointer": _KIND + "a Git LFS pointer (`git lfs pull` fetches the file)",
     "F002.archive-value": "{item:text}: {problem}",
-    "F002.no-key": "{item:text}: expected a value, found no such key",
+    "F002.no-key": "{item:text}: key not found",
     "F002.value": "{item:text}: expected {expected}, found {found}",
     "F002.text": "{item:text}: expected a string, found {found}",
     "F002.no-rows": "{item:text}: expected at least one row, found none",
@@ -23,7 +23,7 @@ MESSAGES = {
     "F003.limit": _LIMIT,
     "W003.limit": _LIMIT,
     "F002.npz": "expected a valid .npz file, found a damaged one ({reason:text})",
-    "F002.npz-twice": "{item:text}: expected a single entry of this name, found {found}",
+    "F002.npz-twice": "{item:text}: expected a single entry with this name, found {found}",
     "F002.npz-encrypted": "{item:text}: expected stored or deflated data, found encrypted data",
     "F002.npz-method": "{item:text}: expected stored or deflated data, found compression method "
     "{method}",
@@ -36,12 +36,12 @@ MESSAGES = {
     "download it again in binary mode",
     "F002.pickle-named": "expected a dict with string keys, found {found}",
     "F002.pickle-key": "expected a dict with string keys, found the key {found}",
-    "F002.pickle-twice": "{item:text}: expected a single value of this name, found two",
+    "F002.pickle-twice": "{item:text}: expected a single value with this name, found two",
     "F006.pickle-rest": "ignored {n:#byte} after the end of the pickle",
 }
 
 PHRASES = {
-    # Places in text tables
+    # Locations in text tables
     "row": "row {index}",
     "word": "word {index}",
     # Values found
@@ -87,27 +87,27 @@ PHRASES = {
     "unread-expression-endless": "circular {name} expression",
     "unread-chumpy": "{name} without values",
     "unread-indices": "{name} with unsupported indices",
-    # Faults of sparse matrices
-    "sparse-shapes": "expected a sparse matrix of three one-dimensional arrays, found other shapes",
-    "sparse-indices": "expected integer indices in a sparse matrix, found other numbers",
+    # Invalid sparse matrices
+    "sparse-shapes": "data, indices and index pointers of a sparse matrix must be one-dimensional",
+    "sparse-indices": "expected integer indices in a sparse matrix, found non-integers",
     "sparse-size": "expected at most {most} rows and columns, found {shape:axes}",
     "sparse-starts": "expected {expected} index pointers in a sparse {shape:axes} matrix, found "
     "{found}",
     "sparse-order": "expected index pointers in ascending order from 0 to {count} in a sparse "
-    "matrix, found another order",
+    "matrix, found them unsorted",
     "sparse-count": "expected {expected} indices in a sparse matrix, found {found}",
     "sparse-range": "expected indices 0 to {last} in a sparse matrix, found {low} to {high}",
     "sparse-no-shape": "expected a sparse matrix with a shape, found none",
     "sparse-no-part": "expected a sparse matrix with {part}, found none",
-    # Faults of single arrays
+    # Invalid arrays
     "array-bytes": "expected {shape:axes} {dtype}, found {found} bytes",
-    "array-letter": "expected Unicode characters in a string, found code point {found}",
+    "array-letter": "invalid Unicode code point {found} in a string",
     "array-not-numbers": "expected an array of numbers, found {found}",
     "npy-lead": "expected an .npy header, found {found}",
-    "npy-header-length": "expected a header below 64 KiB, found {found} bytes",
+    "npy-header-length": "expected a header smaller than 64 KiB, found {found} bytes",
     "npy-header-cut": "expected a header of {expected} bytes, found {found}",
     "npy-header": "expected a header with descr, fortran_order and shape, found {found}",
-    "npy-memory": "expected {size} bytes of free memory, found less",
+    "npy-memory": "not enough memory: {size} bytes needed",
     "npy-cut": "expected {expected} bytes of values, found {found}",
     "npy-damaged": "expected a valid array, found a damaged one ({reason:text})",
     "matrix-objects": "expected {shape:axes} numbers, found an unsupported value ({what}): save it "
@@ -124,7 +124,7 @@ PHRASES = {
     "noun-persistent": "a persistent id",
     "noun-extension": "an extension code",
     "noun-buffer": "an out-of-band buffer",
-    # Faults of pickles
+    # Invalid pickles
     "pickle-steps": "expected at most {most} opcodes in a pickle, found more",
     "pickle-line-end": "expected the end of a line, found the end of the file (truncated?)",
     "pickle-line": "expected at most {most} characters in a line, found {found}",
@@ -157,7 +157,7 @@ PHRASES = {
     "pickle-array-state": "expected the state of an array, found {found}",
     "pickle-byte-order": "expected the byte order of an array, found {found}",
     "pickle-dtype-state": "expected the state of a dtype, found {found}",
-    "pickle-other": "expected a value, found something else",
+    "pickle-other": "unexpected object in the pickle",
     "pickle-selection": "expected {expected:text} indices in {name}, found {found}",
     "pickle-selection-range": "expected indices 0 to {last}, found {low} to {high}",
 }

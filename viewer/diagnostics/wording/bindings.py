@@ -20,8 +20,8 @@ MESSAGES = {
     "{value:z.3g})",
     "B003.ill-conditioned": "{n:#bind matrix/{all}|is|are} ill-conditioned: {names:list} "
     "(condition number {value:.3g})",
-    "B004.joints": "bind pose of {n:#joint|differs|differ} from the rest pose (worst: {joint:text} "
-    "by {distance}): the mesh is deformed at rest",
+    "B004.joints": "{n:#joint|has a bind pose that differs|have bind poses that differ} from the "
+    "rest pose (worst: {joint:text} by {distance}): the mesh is deformed at rest",
     "B005.reflected": "{n:#bind matrix/{all}|is|are} reflected: {names:list} (determinant "
     "{value:.3g})",
     "B006.not-affine": "{n:#bind matrix/{all}|is|are} not affine: {names:list} (error {value:.3g})",

@@ -21,14 +21,14 @@ MESSAGES = {
     "{found:list12}",
     "F002.smpl-no-vertex": "{item:text}: expected at least one vertex, found none",
     "F002.smpl-joints": "{item:text}: expected joint indices 0, 1, 2 … in the second row, found "
-    "another order",
+    "different indices",
     "F002.smpl-regressor": "{item:text}: joint {joint}: expected weights that sum to 1, found "
     "{found:.4g}",
     "F007.smpl-posedirs": "no `posedirs`: plain linear blend skinning",
     "F007.smpl-shapedirs": "no `shapedirs`: fixed shape",
     "F007.smpl-uvs": "`vt` and `ft` do not match: omitted",
     "F007.smpl-symmetry-range": "`vert_sym_idxs` refers to nonexistent vertices: omitted",
-    "F007.smpl-symmetry": "`vert_sym_idxs` is not a pairing of vertices: omitted",
+    "F007.smpl-symmetry": "`vert_sym_idxs` does not pair the vertices: omitted",
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
     # Rigged meshes
     "F002.rig-material": "{item:text}: row {index} is not a material: {problem:text}",
@@ -36,7 +36,8 @@ MESSAGES = {
     "F002.rig-up": "{item:text}: expected y or z, found {found:quoted}",
     "F002.rig-parts": "{problem:text}",
     "F002.rig-layout": "{item:text}: expected at least {expected}, found {found}",
-    "F002.rig-hand": "{item:text}: expected joint indices from 0 to {last}, found others",
+    "F002.rig-hand": "{item:text}: expected joint indices from 0 to {last}, found indices out of "
+    "range",
     "S003.rig-limits": "{item:text}: DOF {dof}: expected a minimum not above the maximum, found "
     "{low:g} and {high:g}",
     "B001.rig-matrices": "{item:text}: expected {expected:#matrix}, one per joint, found {found}",
@@ -65,8 +66,8 @@ MESSAGES = {
     "F007.motion-angles": "{item:text}: angles used as stored, without the mean hand pose",
     "F007.motion-place": "no trans: the body stays in place",
     "F007.motion-rates": "conflicting frame rates ({rates:list}): the first one is used",
-    "F007.motion-no-rate": "no frame rate: the usual {rate:g} frames per second assumed",
-    "F007.motion-aist-rate": "no frame rate: the {rate:g} frames per second of AIST++ assumed",
+    "F007.motion-no-rate": "no frame rate: {rate:g} fps assumed, as is usual",
+    "F007.motion-aist-rate": "no frame rate: {rate:g} fps assumed, as in AIST++",
     "F007.motion-tissue": "dmpls (soft tissue) of {n:#frame} omitted",
     "F007.motion-keys": "ignored unknown keys: {keys:list12}",
     # PIG models
@@ -79,8 +80,8 @@ MESSAGES = {
     "F002.pig-roots": "{item:+{}: }joint {joint}: expected one root, found a second",
     "F002.pig-index": _INDEX,
     "W010.pig-joint": _INDEX,
-    "F002.pig-twice": "{item:+{}: }expected each pair once, found joint {joint} and vertex "
-    "{vertex} again",
+    "F002.pig-twice": "{item:+{}: }expected unique pairs, found joint {joint} and vertex {vertex} "
+    "again",
     "F002.pig-symmetry": "{item:+{}: }expected vertices paired with each other, found {vertex} -> "
     "{partner} -> {back}",
     "F002.pig-lost": "{item:+{}: }rows with invalid entries",

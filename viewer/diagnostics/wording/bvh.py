@@ -14,9 +14,9 @@ MESSAGES = {
     "F007.bvh-no-count": "missing Frames: all rows are used",
     "F007.bvh-no-channels": "no joint has channels: shown in the rest pose",
     "F007.bvh-empty": "no frames: shown in the rest pose",
-    "F007.bvh-no-time": "missing Frame Time: {rate:g} frames per second assumed",
+    "F007.bvh-no-time": "missing Frame Time: {rate:g} fps assumed",
     "F007.bvh-time": "Frame Time: expected {low:g} to {high:,.0f} seconds, found {seconds:g}; "
-    "{rate:g} frames per second assumed",
+    "{rate:g} fps assumed",
     "F007.bvh-positions": "position channels are 0 except at the root: interpreted as relative to "
     "OFFSET",
 }
@@ -25,7 +25,7 @@ PHRASES = {
     "bvh-frame": "frame {frame}",
     "bvh-position": "frame {frame}: {axis}position of joint {joint:name}",
     "bvh-frames": "{n:#frame}",
-    "bvh-part": "{n} of {width} numbers of the next",
+    "bvh-part": "{n} of {width} numbers for the next",
     # Estimates of unit and up axis; in inches, 0 if that would be no likely size
     "unit-from-size": "taken for {unit} (skeleton {size:.4g} high{metres:+; inches would be "
     "{metres:.3g} m})",

@@ -5,17 +5,19 @@ from viewer.diagnostics.codes import Code
 CODES = {
     "C001": Code("warning", "keys out of time order", "sort the keys"),
     "C002": Code("warning", "duplicate key times", "keep one of them"),
-    "C003": Code("warning", "joint jumps between frames", "look for a bad frame or a cut there"),
+    "C003": Code(
+        "warning", "joint jumps between frames", "look for a bad frame or a cut at that time"
+    ),
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
     "C005": Code(
-        "warning", "missing frames", "interpolate them (--interpolate-gaps) or capture again"
+        "warning", "missing frames", "interpolate them (--interpolate-gaps) or record again"
     ),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
     "C007": Code("warning", "foot sliding", "lock the foot or adjust the root motion"),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),
     "C009": Code("error", "clip for another skeleton", "open it with the skeleton it was made for"),
-    "C010": Code("note", "clip without duration", "give it keys at two different times"),
-    "C011": Code("warning", "low-confidence keypoints", "omit them or capture again"),
+    "C010": Code("note", "zero-length clip", "add keys at different times"),
+    "C011": Code("warning", "low-confidence keypoints", "omit them or record again"),
     "C012": Code("note", "keypoints that are never visible", "none if the camera cannot see them"),
     "C013": Code("note", "unclear ground height", "specify it (--ground)"),
 }
@@ -44,15 +46,15 @@ MESSAGES = {
     "C012.points": "{n:#keypoint/{all}|is|are} never visible: {names:list}",
     "C013.heights": "feet rest at {n:#height} ({levels:list}): ground height unclear, feet not "
     "checked",
-    "C013.no-height": "feet never rest long enough at one height: ground height unclear, "
-    "feet not checked",
+    "C013.no-height": "feet never rest long enough at one height: ground height unclear, feet not "
+    "checked",
 }
 
 PHRASES = {
-    # Why a clip cannot move a skeleton, after its name
+    # Why a clip cannot drive a skeleton, after the skeleton's name
     "clip-needs": "needs {n} (3 + 3 x {joints} joints)",
-    "not-course-rig": "is not a course rig, whose clips move the root along x, y, z and rotate "
-    "each joint about x, y, z: {reason}",
+    "not-course-rig": "is not a .skel-style rig, in which clips translate the root along x, y, z "
+    "and rotate each joint about x, y, z: {reason}",
     "joint-with-dofs": "joint {joint:text} has DOFs {kinds:all}",
     "joint-without-dofs": "joint {joint:text} has no DOFs",
     "dofs-unordered": "its DOFs are not in the order of its joints",

@@ -6,17 +6,17 @@ CODES = {
     "D001": Code(
         "warning", "part without a counterpart", "compare files of the same figure and motion"
     ),
-    "D002": Code("note", "choice made for a comparison", "none if intentional"),
+    "D002": Code("note", "assumption made for the comparison", "none if the assumption is correct"),
 }
 
 MESSAGES = {
-    "D001.absent": "only one of them is present in {n:#frame}",
+    "D001.absent": "only one of the two is present in {n:#frame}",
     "D001.actor": "only in {side:text}: {actor}",
     "D001.dofs": "{n:#DOF} only in the {side}: {names:list}",
     "D001.durations": "durations differ: {first:.6g} s and {second:.6g} s",
     "D001.joints": "{n:#joint} only in the {side}: {names:list}",
-    "D001.limits": "different limits of {n:#DOF}, such as {dof:text}: {low:.6g} to {high:.6g} and "
-    "{other_low:.6g} to {other_high:.6g}",
+    "D001.limits": "{n:#DOF|has|have} different limits, such as {dof:text}: {low:.6g} to "
+    "{high:.6g} and {other_low:.6g} to {other_high:.6g}",
     "D001.mesh": "only the {side} has a mesh",
     "D001.no-motion": "the {side} has no motion",
     "D001.parents": "different parents: {names:list}",
@@ -27,13 +27,13 @@ MESSAGES = {
     "D002.joints-by-index": "no joint names in common: compared by index",
     "D002.meshes": "meshes differ ({vertices:#vertex}, {triangles:#triangle}; "
     "{other_vertices:#vertex}, {other_triangles:#triangle}): closest points are compared",
-    "D002.order": "joints are in a different order, which matters to .skin and .anim files: where "
+    "D002.order": "joints are in a different order, which matters for .skin and .anim files: where "
     "the first has {first:text}, the second has {second:text}",
     "D002.partner": "compared with {name:name}",
     "D002.points-by-index": "no point names in common: compared by index",
-    "D002.rates": "frame rates differ ({first:g} and {second:g} fps): compared at that "
-    "of the first",
-    "D002.searched": "closest points in {n:#frame/{all}}",
+    "D002.rates": "frame rates differ ({first:g} and {second:g} fps): compared at that of the "
+    "first",
+    "D002.searched": "closest points computed in {n:#frame/{all}}",
     "D002.up": "up axes differ ({first} and {second}): compared without conversion",
 }
 

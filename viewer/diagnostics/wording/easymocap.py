@@ -1,4 +1,4 @@
-"""Messages about recordings of EasyMocap and their cameras."""
+"""Messages about EasyMocap recordings and their cameras."""
 
 _RECORD = "{item:+{}: }{problem}"
 
@@ -11,24 +11,24 @@ MESSAGES = {
     "F002.capture-frames": "expected frame files (smpl_full, smplfull, smpl, keypoints3d: "
     "000000.json …), found none",
     "F002.capture-people": "expected people, found none in {n:#frame}",
-    "F002.capture-people-fault": "expected people, found none in {n:#frame}; first fault: "
+    "F002.capture-people-fault": "expected people, found none in {n:#frame}; first error: "
     "{problem}",
     "F002.capture-list": "expected a list of people, found {found}",
-    "F002.capture-digits": "expected numbers of at most {most} digits, found a longer one",
-    "F002.capture-text": "expected UTF-8 text, found other bytes",
-    "F007.capture-no-files": "ignored, not files: {names:list}",
+    "F002.capture-digits": "expected numbers of at most {most} digits, found a longer number",
+    "F002.capture-text": "expected UTF-8 text, found invalid bytes",
+    "F007.capture-no-files": "ignored (not files): {names:list}",
     "F007.capture-beside": "read {name:text}/, ignored {others:text}/ in the same folder",
     "F007.capture-files": "ignored files next to the frame folders: {names:list}",
     "F007.capture-camera": "read {folder:text}/{name:text}, ignored other cameras: {others:list}",
     "F007.capture-numbers": "{n:#frame} numbered from {first} to {last}: treated as consecutive",
     "C005.capture-twice": "omitted frames that occur in more than one file: {names:list}",
-    # Records of people: faults in single frames are remarks as long as one person remains
+    # Person records: errors in single frames are notes as long as one person can be read
     "F002.record": _RECORD,
     "F003.record": _RECORD,
     "F002.record-twice": "{item:text} occurs twice: the first one is used",
     "F007.record": "{problem}",
-    "F007.records": "{name:text}: {n} more faults in frame files",
-    "F007.record-untracked": 'people without a track (id -1) are named "untracked" and numbered '
+    "F007.records": "{name:text}: {n} more errors in frame files",
+    "F007.record-untracked": 'untracked people (id -1) are named "untracked" and numbered '
     "within each frame: they cannot be matched between frames",
     "F007.record-no-id": "people without id: numbered in list order",
     "F007.record-ids": "people with different id and personID: id is used",
@@ -37,7 +37,7 @@ MESSAGES = {
     "F007.record-poses": "poses in this record and in a separate folder: those in the folder are "
     "used",
     "F007.record-vertices": "vertices are not needed: ignored",
-    "F007.record-first": "no earlier record has {keys:or}: 0 is used there",
+    "F007.record-first": "no earlier record has {keys:or}: 0 is used until one does",
     "F007.record-last": "no {item} in this record: the person's last known values are used",
     "F007.record-no-last": "no {item} in this or earlier records of the same person: 0 is used",
     "F007.record-unseen": "{name:text}: no keypoint of {people:list} is ever visible: every "
@@ -46,14 +46,14 @@ MESSAGES = {
     "F007.cameras": "{problem}; cameras omitted",
     "F007.camera": "{problem}; camera omitted",
     "F007.cameras-beside": "no {name} in the same folder; cameras omitted",
-    "F002.camera-focal": "{item:text}: expected positive focal lengths and a last row of 0 0 1, "
-    "found other numbers",
+    "F002.camera-focal": "{item:text}: focal lengths must be positive and the last row must be "
+    "0 0 1",
     "F002.camera-focal-range": "{item:text}: expected focal lengths of {low:g} to {high:g} pixels, "
     "found {first:g} and {second:g}",
     "F003.camera-limit": "{item:text}: expected numbers within ±{limit:g}, found {found:g}",
-    "F002.camera-rotation": "{item:text}: expected a rotation matrix, found another matrix",
-    "F002.camera-no-key": "{item:text}: expected {shape:axes} numbers, found no such key",
-    "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found something else",
+    "F002.camera-rotation": "{item:text}: not a rotation matrix",
+    "F002.camera-no-key": "{item:text}: key not found",
+    "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found no matrix of numbers",
     "F002.camera-shape": "{item:text}: expected {shape:axes} numbers, found {found:axes}",
     "F002.camera-twice": 'expected unique keys, found "{found:text}" again',
     "F002.camera-value": "expected `name: value`, found {found:quoted}",
@@ -67,7 +67,7 @@ MESSAGES = {
 PHRASES = {
     "not-finite": "expected finite numbers, found {found:g}",
     "beyond-limit": "expected numbers within ±{limit:.2g}, found {found:g}",
-    "found-no-key": "no such key",
+    "found-no-key": "no value",
     "record-person": "expected a person with named values, found {found}",
     "record-id": "expected an integer, found {found}",
     "record-id-limit": "expected an id below {limit}, found {found}",
@@ -77,10 +77,10 @@ PHRASES = {
     "record-count": "expected {expected:#number}, found {found}",
     "record-odd": "expected {expected:#number}, found {found} among them",
     "record-lengths": "expected {expected:or} numbers, found {found}",
-    "record-vposer": "expected rotations, found {found} numbers, a VPoser code that only its "
-    "network can decode: write full poses in EasyMocap",
+    "record-vposer": "expected rotations, found {found} numbers, a VPoser latent vector, which "
+    "needs the VPoser network to decode: export full poses from EasyMocap",
     "record-rows": "expected rows of 3 or 4 numbers, found {found}",
-    "record-other-rows": "expected rows of 3 or 4 numbers, found others",
+    "record-other-rows": "expected rows of 3 or 4 numbers, found rows of other lengths",
     "record-no-rows": "expected rows of 3 or 4 finite numbers, found none",
     "record-most-points": "expected at most {most} keypoints, found {found}",
     "record-points": "expected {expected:#keypoint}, found {found}",

@@ -10,7 +10,7 @@ MESSAGES = {
     "{high:g} of {joint})",
     "F002.skel-none": "figure {figure:text} has no skeleton to write as .skel",
     "F002.skel-rest": ".skel cannot store joints with a rest rotation or scale",
-    "F002.skel-dofs": ".skel can store only the DOFs x, y and z of each joint",
+    "F002.skel-dofs": ".skel can store only rotations about x, y and z as DOFs",
     "F002.skel-root": ".skel cannot store a root translation in the pose, or its limits",
     "F002.skel-limits": ".skel treats limits beyond ±{most:.0f} as unlimited",
     "F002.skel-numbers": ".skel cannot store numbers beyond ±{most:.3g}",
@@ -23,8 +23,8 @@ MESSAGES = {
     "F002.bvh-item": "{joint}: expected OFFSET, CHANNELS, JOINT, End Site or "
     '"}}", found {found:quoted}',
     "F002.bvh-end-item": '{joint}: expected OFFSET or "}}", found {found:quoted}',
-    "F002.bvh-offset-again": "{joint}: expected one OFFSET, found a second",
-    "F002.bvh-channels-again": "{joint}: expected one CHANNELS, found a second",
+    "F002.bvh-offset-again": "{joint}: expected one OFFSET, found a second one",
+    "F002.bvh-channels-again": "{joint}: expected one CHANNELS, found a second one",
     "F002.bvh-channel": "{item}: expected a channel name (Xposition … Zrotation), found "
     "{found:quoted}",
     "F002.bvh-position-again": "{item}: expected each position channel once, found {found:quoted} "

@@ -9,20 +9,20 @@ MESSAGES = {
     # Incompatible files
     "B001.joints": "expected {joints:#bind matrix}, one per joint of {skeleton:text}, found {n}",
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
-    "F002.no-body-model": "--model: expected a body model, found another file",
+    "F002.no-body-model": "--model: not a body model",
     "F004.capture": "{problem}; specify the model with --model",
     "F004.capture-of-member": "{problem}; specify a {member} model with --model",
     "F004.clip-alone": "a clip without a skeleton: open it together with its .skel",
     "F004.clip-taken": "every matching skeleton already has a clip",
     "F004.model": "{problem} (--model selects the model)",
     "F004.morph-alone": "a blend shape without a mesh: open it together with its .skin",
-    "F004.picture": "cannot apply the picture: {figures:all} has no texture coordinates",
-    "F004.picture-alone": "a picture without a figure: open it together with a figure",
+    "F004.picture": "cannot apply the texture image: no texture coordinates in {figures:all}",
+    "F004.picture-alone": "an image without a figure: open it together with a figure",
     "F004.pose": "cannot apply the pose: {figure:text} has no skeleton",
     "F004.pose-alone": "a pose without a figure: open it together with a figure",
     "F004.skin": "expected weights and bindings for the {n} joints of {skeleton:text}, found none",
-    # Remarks
-    "C005.keypoint-count": "{person} has {n} keypoints from frame {frame} on, {known} before; "
+    # Notes
+    "C005.keypoint-count": "{person} has {n} keypoints from frame {frame} onwards, {known} before; "
     "those frames are omitted",
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
@@ -36,7 +36,7 @@ MESSAGES = {
     "F007.model-beside": "--model {model:text}: no motion is applied to it with --beside",
     "F007.no-shapes": "no shape coefficients in the files: the model's mean shape is used for all",
     "F007.only-morphs": "{figure:text}: without its .skel, only blend shapes deform it",
-    "F007.several-pictures": "{n:d} pictures in the folder: specify the texture to show",
+    "F007.several-pictures": "{n:d} images in the folder: specify the texture to show",
     "F007.stands-alone": "shown separately: {problem}",
     "F007.unit-taken": "{note}; --unit overrides it",
     "F007.unit-taken-and-scaled": "{note}, and scaled to metres to match the others; --unit "

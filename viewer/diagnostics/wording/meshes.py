@@ -6,7 +6,7 @@ CODES = {
     "M001": Code("warning", "degenerate triangles", "merge their corners or delete them"),
     "M002": Code("warning", "flipped triangles", "reverse their winding"),
     "M003": Code("warning", "inside-out mesh", "reverse the winding of all its triangles"),
-    "M004": Code("note", "unused vertices", "delete them unless something refers to them"),
+    "M004": Code("note", "unused vertices", "delete them unless they are referenced elsewhere"),
     "M005": Code("note", "open boundaries", "close them if the mesh is meant to be solid"),
     "M006": Code("warning", "non-manifold edges", "split the parts that meet there"),
     "M007": Code("warning", "zero-length normals", "recompute the normals"),
@@ -16,7 +16,7 @@ CODES = {
     ),
     "M010": Code("warning", "stray vertices", "move or delete them"),
     "M011": Code("warning", "duplicate triangles", "delete the copies"),
-    "M012": Code("warning", "non-orientable surface", "cut it where its winding reverses"),
+    "M012": Code("warning", "non-orientable surface", "cut it where the winding reverses"),
     "Y001": Code("warning", "asymmetric positions", "mirror one side"),
     "Y002": Code("warning", "asymmetric weights", "mirror the weights of one side"),
 }
@@ -39,10 +39,10 @@ MESSAGES = {
     "distance from the centre)",
     "M011.triangles": "{n:#duplicate triangle} (first: triangle {triangle})",
     "M012.surface": "non-orientable surface of {n:#triangle} (at triangle {triangle})",
-    "Y001.positions": "{n:#vertex|is not at the mirrored position of its partner|are not at the "
-    "mirrored positions of their partners} (worst: {distance} at vertex {vertex})",
-    "Y002.weights": "weights of {n:#vertex} differ from {n:?its partner's|their partners'} (worst: "
-    "sum of {difference:.3g} at vertex {vertex})",
+    "Y001.positions": "{n:#vertex|is not at the mirrored position of its counterpart|are not at "
+    "the mirrored positions of their counterparts} (worst: {distance} at vertex {vertex})",
+    "Y002.weights": "weights of {n:#vertex} differ from those of {n:?its mirror counterpart|their "
+    "mirror counterparts} (worst: total difference {difference:.3g} at vertex {vertex})",
 }
 
 PHRASES: dict[str, str] = {}

@@ -3,16 +3,15 @@
 MESSAGES = {
     "F004.body-joint": "{motion:text} moves the joint {joint:text}, which {figure:text} does not "
     "have",
-    "F004.no-skeleton": "{figure:text} has no skeleton to move",
+    "F004.no-skeleton": "{figure:text} has no skeleton to animate",
     "F004.mirror": "figure {figure:text} has no skeleton to mirror",
     "F004.mapping-joint": "the mapping names {joint:quoted}, which {figure:text} does not have",
     "F004.mapping-joints": "the mapping names {joint:quoted}, of which {figure:text} has {n}",
-    "F004.joints-unmatched": "{motion:text} does not fit {figure:text}: expected hips and a leg or "
-    "an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
+    "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
+    "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
     "{figure:text}: {idle:list8}",
-    "F004.no-common-joint": "{pose:text} and {figure:text} have no joint name in common",
-    "F004.asymmetric": "{joint:text} has no partner on the other side: the skeleton is not "
-    "symmetric",
+    "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
+    "F004.asymmetric": "{joint:text} has no mirror counterpart: the skeleton is not symmetric",
     "F007.coefficient-left-out": "{group} coefficient {last} omitted (largest value "
     "{largest:.3g}): {figure:text} has {most}",
     "F007.coefficients-left-out": "{group} coefficients {first} to {last} omitted (largest value "
@@ -25,7 +24,7 @@ MESSAGES = {
     "{pairs:list60}",
     "F007.joints-at-rest": "joints kept at rest: {names:list60}",
     "F007.joints-without-partner": "unmatched joints of {motion:text}: {names:list60}",
-    "F007.path-scaled": "root path scaled by {scale:.4g}, the ratio of {by}",
+    "F007.path-scaled": "root path scaled by {scale:.4g}, {by}",
     "F007.joint-positions-left-out": "translations of {n:#joint} relative to {n:?its parent|their "
     "parents} omitted (largest: {most:.3g} at {joint:text})",
     "F007.joints-taken-over": "transferred {n} of {all} joints of {figure:text}",
@@ -36,7 +35,7 @@ MESSAGES = {
     "F007.translation-kept": "{fault}; unchanged",
     "F007.pose-clamped": "{n:#DOF} of the pose clamped to {n:?its|their} limits",
     "F007.pose-joints-left-out": "{n:#joint} of the pose omitted: missing from {figure:text}",
-    "F007.body-joints-left-out": "{n:#joint} of the pose beyond the body's {own} omitted",
+    "F007.body-joints-left-out": "{n:#joint} in the pose beyond the body's {own} omitted",
     "F007.part-left-out": "{part} omitted: {figure:text} has no such joint",
     "F007.hand-part-left-out": "{part} omitted: {figure:text} has no hand components",
 }
@@ -45,10 +44,10 @@ PHRASES = {
     "the-pose": "the pose",
     "two-joints": "two joints",
     "joint-by-joint": "{joint:text} by {partner:text}",
-    "ratio-of-legs": "leg lengths",
-    "ratio-of-arms": "arm lengths",
-    "ratio-of-bones": "bone lengths",
-    "ratio-of-nothing": "unknown lengths",
+    "ratio-of-legs": "the ratio of leg lengths",
+    "ratio-of-arms": "the ratio of arm lengths",
+    "ratio-of-bones": "the ratio of bone lengths",
+    "ratio-of-nothing": "as no lengths can be compared",
     "left-moves": "joint translations",
     "left-place": "figure translation",
     "left-size": "figure scale",

@@ -3,13 +3,13 @@
 _BACK = "index from -1 to {least}, found {found}"
 _EARLY = "defined before this line, found {found}"
 _RANGE = "index from 1 to {limit}, found {found}"
-_NONE = "only if the file defines one, found {found}"
+_NONE = "{found} is not defined: the file has no"
 
 MESSAGES = {
     "F002.obj-mesh": "expected a mesh, found no `v` line{looks:+ ({})}",
     "F002.obj-vertex": "v: expected 3 numbers, or 4, 6 or 7 with w or a colour, found {found}",
     "F002.obj-face": "f: expected at least {least} corners, found {found}",
-    "F002.obj-zero": "f: expected an index from 1, found 0",
+    "F002.obj-zero": "f: indices start at 1, found 0",
     "F002.obj-corner": "f: expected a corner v, v/vt, v//vn or v/vt/vn, found {found:quoted}",
     "F002.obj-v-back": f"f: expected a vertex {_BACK}",
     "F002.obj-vt-back": f"f: expected a texture coordinate {_BACK}",
@@ -20,9 +20,9 @@ MESSAGES = {
     "F002.obj-v-range": f"f: expected a vertex {_RANGE}",
     "F002.obj-vt-range": f"f: expected a texture coordinate {_RANGE}",
     "F002.obj-vn-range": f"f: expected a normal {_RANGE}",
-    "F002.obj-v-none": f"f: expected a vertex {_NONE}",
-    "F002.obj-vt-none": f"f: expected a texture coordinate {_NONE}",
-    "F002.obj-vn-none": f"f: expected a normal {_NONE}",
+    "F002.obj-v-none": f"f: vertex {_NONE} vertices",
+    "F002.obj-vt-none": f"f: texture coordinate {_NONE} texture coordinates",
+    "F002.obj-vn-none": f"f: normal {_NONE} normals",
     "F005.obj-texture": "texture without vt lines: drawn untextured",
     "F006.mtl-color": "{word:text}: expected 1 or 3 numbers {limits:text}, found "
     "{found:quoted}; ignored",

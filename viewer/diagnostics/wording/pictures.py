@@ -1,8 +1,8 @@
-"""Messages about pictures and texture files."""
+"""Messages about images and texture files."""
 
 MESSAGES = {
-    "F001.picture": "unreadable picture: {reason:text}",
-    "F002.picture": "unsupported or damaged picture",
+    "F001.picture": "unreadable image: {reason:text}",
+    "F002.picture": "unsupported or damaged image",
     "F005.texture": "texture {problem}; drawn untextured",
     "F005.texture-refused": "texture {name:text} {reason}",
 }

@@ -1,4 +1,4 @@
-"""Messages about pose files, their use with a figure, and landmark files."""
+"""Messages about pose files, applying them to a figure, and landmark files."""
 
 _JSON = "expected JSON, found "
 
@@ -7,7 +7,7 @@ MESSAGES = {
     "F002.no-pose": "--pose: expected a pose, found a figure or motion",
     # JSON
     "F002.json": _JSON + "a syntax error: {reason:text}",
-    "F002.json-nesting": _JSON + "too many nested levels",
+    "F002.json-nesting": "JSON nested too deeply",
     "F002.json-twice": 'expected unique keys, found "{found:text}" twice',
     "F002.json-constant": "expected a finite number, found {found}",
     # Pose files
@@ -20,7 +20,7 @@ MESSAGES = {
     "F002.pose-frames": "{item:text}: expected a single pose, found {found} frames",
     "F002.pose-three": "{item:text}: expected 3 numbers, found {found}",
     "F002.pose-single": "{item:text}: expected a single number, found {found}",
-    "F002.pose-dofs": "dofs: expected an object of names and numbers, found {found}",
+    "F002.pose-dofs": "dofs: expected an object mapping names to numbers, found {found}",
     "F002.pose-dof": "dofs: {item:text}: expected a number, found {found}",
     "F002.pose-array": "{item:text}: expected {expected}, found {found}",
     "F003.pose-number": "{item:text}: expected finite numbers, found {found:g}",

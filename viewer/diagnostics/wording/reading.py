@@ -18,7 +18,7 @@ CODES = {
     "F004": Code("error", "incompatible files", "open files that belong together"),
     "F005": Code("warning", "missing texture or material library", "put it next to the file"),
     "F006": Code("warning", "unknown content", "remove it or correct its name"),
-    "F007": Code("note", "remark about a file", "none if intentional"),
+    "F007": Code("note", "note about a file", "none if intentional"),
 }
 
 _NUMBER = "{item}: expected a number, found {found:quoted}"
@@ -37,7 +37,7 @@ MESSAGES = {
     "F002.unclosed": 'expected "}}" to close {section} (line {line}), found {found:quoted}',
     "F002.width-end": "{item}: expected {expected:#number}, found {found} before the end of the "
     "file",
-    "F002.more": "{item}: expected {expected:#number}, found more: {found:quoted}",
+    "F002.more": "{item}: expected {expected:#number}, found another: {found:quoted}",
     "F002.count": "{item}: expected a count, found {found:quoted}",
     "F002.open": 'expected "}}" to close {word:quoted}, found the end of the file',
     "F003.beyond": "{item}: expected numbers within ±{most:.2g}, found {found:g}",
@@ -45,7 +45,7 @@ MESSAGES = {
     "triangles",
     "F006.closing": 'missing "}}" at the end of the file',
     "F006.last-brace": '{section}: missing "}}" at the end of the file',
-    "F006.unknown": "skipped unknown {found:quoted}",
+    "F006.unknown": "skipped unknown keyword {found:quoted}",
     "F007.no-faces": "no faces: {n} points, not drawn",
     "F007.further-warnings": "further warnings omitted",
 }

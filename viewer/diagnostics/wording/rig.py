@@ -1,7 +1,7 @@
 """Messages about ``.rig`` files."""
 
 MESSAGES = {
-    "F002.rig-empty": "expected a skeleton or a skin, found no file name",
+    "F002.rig-empty": "expected the file name of a skeleton or skin, found none",
     "F002.rig-item": "expected skeleton, skin or morphs, found {found:quoted}",
     "F002.rig-word": 'expected "{expected}", found {found:quoted}',
     "F002.rig-morphs": "morphs: expected {expected:#file}, found {found}",

@@ -21,15 +21,15 @@ CODES = {
     "R006": Code(
         "warning", "few matched vertices", "check the alignment or allow a larger distance"
     ),
-    "R007": Code("note", "rigid part", "none if the part is rigid"),
+    "R007": Code("note", "rigid part", "none if the part is meant to be rigid"),
     "R008": Code("note", "transferred joints", "none if they lie inside the limbs"),
     "R009": Code("warning", "joints outside the mesh", "check the alignment or move the joints"),
     "R010": Code(
-        "warning", "pose bent too far for inverse skinning", "use a target in a less bent pose"
+        "warning", "pose too extreme for inverse skinning", "use a target in a less extreme pose"
     ),
     "R011": Code("note", "accuracy of the rigged figure", "none if the error is small"),
     "R012": Code("warning", "rigged figure differs from the target", "check the alignment"),
-    "R013": Code("note", "omitted part of the template", "none if it is not needed"),
+    "R013": Code("note", "template data not transferred", "none if the data is not needed"),
     "R014": Code("note", "property derived from the target", "none if it is correct"),
 }
 
@@ -51,9 +51,11 @@ MESSAGES = {
     "R004.not-fitted": "pose: not fitted, as that would give {gap}, with {joint:text} rotated by "
     "{angle:.0f} degrees; use a template of the same kind as the target",
     "R004.stretched-along-its-axes": "the template fits much better stretched by {scales}, with a "
-    "gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, fit proportions",
+    "fitting error of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, fit "
+    "proportions",
     "R004.stretched-along-the-target": "the template fits much better stretched by {scales}, with "
-    "a gap of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use --scale axes",
+    "a fitting error of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use "
+    "--scale axes",
     "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all take the weights of the "
     "nearest vertex",
     "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",
@@ -76,7 +78,7 @@ MESSAGES = {
     "{vertices:list8}",
     "R011.residual": "after posing, the mesh differs from the target by at most {residual:.2e} of "
     "its size",
-    "R012.residual": "this error is above {limit:g}",
+    "R012.residual": "the error after posing exceeds {limit:g}",
     "R013.correctives": "pose correctives of the template omitted",
     "R013.correctives-too-large": "pose correctives of the template omitted: too large for this "
     "many vertices",
@@ -97,9 +99,9 @@ PHRASES = {
     "own-factors": " (along the template's x, y, z: {x:.4g}, {y:.4g}, {z:.4g})",
     "scales-along-its-axes": "{x:.4g}, {y:.4g}, {z:.4g} along its own x, y and z",
     "scales-along-the-target": "{x:.4g}, {y:.4g}, {z:.4g} along the target's x, y and z",
-    "gap": "a gap of {after:.3f} % of the size, {before:.3f} % before",
+    "gap": "a fitting error of {after:.3f} % of the size, {before:.3f} % before",
     "by-joint-regressor": "the joint regressor",
     "by-boundaries": "the boundaries of their regions",
-    "joints-missed": "; too little of the target around {names:list8}",
+    "joints-missed": "; too few target vertices around {names:list8}",
     "joints-without-boundary": "; {n} without such a boundary moved with their parents",
 }

@@ -3,9 +3,9 @@
 from viewer.diagnostics.codes import Code
 
 CODES = {
-    "S001": Code("error", "parent after its child", "list joints parents first"),
+    "S001": Code("error", "parent after its child", "list parents before their children"),
     "S002": Code("error", "cyclic hierarchy", "give one of these joints another parent"),
-    "S003": Code("error", "limit with minimum above maximum", "swap the two numbers"),
+    "S003": Code("error", "limit with minimum above maximum", "swap the two values"),
     "S004": Code("warning", "pose outside its limits", "widen the limit or change the pose"),
     "S005": Code("note", "locked DOFs", "none if these joints should not move"),
     "S006": Code(

@@ -11,8 +11,8 @@ MESSAGES = {
     "in {size} bytes",
     "F002.skin-brace": '{section}: expected "{{", found {found:quoted}',
     "F002.skin-bindings-brace": 'bindings: expected "}}", found {found:quoted}',
-    "F002.skin-rows": "{section}: expected {expected} rows of {width} numbers, found {found}"
-    "{rest:+ and {} numbers} " + _TO,
+    "F002.skin-rows": "{section}: expected {expected} rows of {width} numbers, found "
+    "{found}{rest:+ and {} numbers} " + _TO,
     "F002.skin-rows-end": 'expected "}}" to close {section} (line {line}), found the end of the '
     "file after {found} of {expected} rows",
     "F002.skin-entries": "{section}: expected {expected} entries as in {other}, found {found}",
@@ -39,7 +39,7 @@ MESSAGES = {
     "{vertex}); used as stored",
     "W002.skin-negative": "{n:#negative weight} (first: {weight:g} at vertex {vertex}); used as "
     "stored",
-    "B001.skin-section": "expected a `{missing}` section beside `{present}`, found none",
+    "B001.skin-section": "expected a `{missing}` section to go with `{present}`, found none",
     "B001.skin-count": "bindings (to line {line}): expected {expected:#matrix}, found "
     "{found:#matrix} followed by {then:quoted}",
     "F002.skin-bindings-end": "bindings (from line {line}): expected {expected:#matrix}, found "

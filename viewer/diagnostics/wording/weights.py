@@ -16,7 +16,9 @@ CODES = {
     "W007": Code("note", "more than 4 influences", "prune and normalise for engines that keep 4"),
     "W008": Code("note", "more than 8 influences", "prune and normalise for engines that keep 8"),
     "W009": Code("note", "duplicate influences", "merge them"),
-    "W010": Code("error", "weight of a nonexistent joint", "bind the joint or correct the index"),
+    "W010": Code(
+        "error", "weight refers to a nonexistent joint", "add the joint or correct the index"
+    ),
 }
 
 MESSAGES = {

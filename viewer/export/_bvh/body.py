@@ -25,7 +25,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, rest_translatio
 from viewer.rig.pose import rest_pose
 
 _BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
-_NOISE = 1e-9  # relative to the skeleton's size: smaller motions are ignored
+_NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 
 @dataclass(frozen=True, slots=True, eq=False)

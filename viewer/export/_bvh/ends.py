@@ -10,8 +10,8 @@ from viewer.rig.units import METRES
 
 _MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
 _FEW = 4  # minimum number of vertices for measuring a joint's extent
-_TOO_SHORT = 0.1  # of the parent bone: shorter ends are implausible
-_HALF = 0.5  # of the parent bone: length of an end without any other estimate
+_TOO_SHORT = 0.1  # fraction of the parent bone: shorter ends are implausible
+_HALF = 0.5  # fraction of the parent bone: length of an end without any other estimate
 _NO_SIZE = 0.1  # metres: the end of a skeleton without any bone
 _DEFAULT_END = 1.0  # the same, if the unit is unknown
 

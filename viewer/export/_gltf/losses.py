@@ -25,7 +25,7 @@ from viewer.rig.skinning import METHODS, Skinning
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """A written file, and the indices of its contents.
+    """A written file, and indices of its contents.
 
     Attributes
     ----------

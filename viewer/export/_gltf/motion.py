@@ -44,7 +44,7 @@ def add_animation(
     components.
     Times begin at 0.
 
-    ``document``: changed.
+    ``document``: modified in place.
     ``name``: name of the motion.
     ``rate``: frames per second.
     ``skeleton``: skeleton in the written shape.

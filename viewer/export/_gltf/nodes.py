@@ -88,7 +88,7 @@ def add_nodes(
 ) -> Tree:
     """Add all nodes except that of the mesh.
 
-    ``document``: changed.
+    ``document``: modified in place.
     ``name``: name of the figure.
     ``up``: the up axis of the figure's world.
     ``unit``: as in ``Figure.unit``.

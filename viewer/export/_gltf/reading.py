@@ -75,7 +75,7 @@ def read_back(
     ``node``: index of the mesh's node.
     ``sources`` (M,): indices of the file's morph targets that change over time.
     ``start``: frame of the figure that is the first in the file.
-    ``sets``: number of influence sets to use, normalized to a sum of 1; all if omitted.
+    ``sets``: number of influence sets to use, normalised to a sum of 1; all if omitted.
     """
     nodes = file.root["nodes"]
     parents = np.full(len(nodes), -1, dtype=np.int32)

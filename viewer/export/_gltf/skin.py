@@ -112,7 +112,7 @@ def influence_sets(
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
 
-    ``influences``: tells whether vertices are fixed; their node is bound at the origin.
+    ``influences``: determines whether vertices are fixed; their node is bound at the origin.
     ``inverse_bind`` (J, 4, 4): of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]

@@ -143,7 +143,7 @@ def _norms(weights: Floats) -> Floats:
 
 
 def _stretches(correctives: Floats | None) -> Floats:
-    """Return upper bounds of the displacement by nine numbers of norm 1: (J,)."""
+    """Return upper bounds of the displacement by nine corrective weights of norm 1: (J,)."""
     if correctives is None:
         return np.zeros(0)
     squares = np.einsum("pva,pva->pv", correctives, correctives)

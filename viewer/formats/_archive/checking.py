@@ -26,7 +26,7 @@ _ROWS = {
     "joints": "row-joint",
     "frames": "row-frame",
 }
-"""Phrase for a row of each part of a figure or motion."""
+"""Phrase key for a row, by part of a figure or motion."""
 
 
 def archive_of(source: Source) -> Archive:
@@ -50,7 +50,7 @@ def finite(
     key : str
         Their key in the archive.
     values : (N, ...)
-        Any numbers.
+        Numbers to check.
     part : str
         Part of the figure or motion, see ``Diagnostic``.
     places : (N,), optional
@@ -60,12 +60,12 @@ def finite(
     -------
     (N, ...)
         Neutral values in place of invalid ones, unless the file is refused: NaN for positions, the
-        identity for matrices of bindings, the previous row for frames, otherwise 0.
+        identity for bind matrices, the previous row for frames, otherwise 0.
 
     Raises
     ------
     FormatError
-        If a number is not finite; gives the key and the number.
+        If a number is not finite; the message gives the key and the number.
     """
     # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
@@ -88,7 +88,7 @@ def _refuse_numbers(
     part: Part,
     places: NDArray[np.integer] | None,
 ) -> None:
-    """Record a fault for numbers that are not finite, or beyond single precision."""
+    """Record an error for numbers that are not finite, or beyond single precision."""
     first = np.argwhere(bad)[0].tolist()
     found = float(numbers[tuple(first)])
     rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1)) if first else np.zeros(1, np.int64)
@@ -112,7 +112,7 @@ def _with_neutral(numbers: Floats, bad: Bools, part: Part) -> Floats:
         lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
         if part == "frames":
             return held_rows(numbers, lost)
-        # The whole matrix is replaced: a single 0 in it would make a different transform.
+        # The whole matrix is replaced: a single 0 in it would give a different transform.
         return np.where(lost[:, None, None], np.eye(4), numbers)
     return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
 

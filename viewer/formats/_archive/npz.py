@@ -1,4 +1,4 @@
-r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never the objects that are pickled in them.
+r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never pickled objects.
 
 ::
 
@@ -6,8 +6,8 @@ r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never the objects that a
     npy    = "\x93NUMPY" version length header values
     header = "{" "'descr': '<f8'" "'fortran_order': False" "'shape': (6890, 3)" "}"   in any order
 
-On opening, the zip directory and the headers are read, and all sizes are compared with each other.
-Values are read on demand, from the file if there is one. The header is matched by its grammar;
+On opening, the zip directory and the headers are read, and all sizes are checked for consistency.
+Values are read on demand, from the file if it is on disk. The header is matched by its grammar;
 numpy's own reader evaluates it as Python code, and warns about files of Python 2.
 """
 
@@ -53,7 +53,7 @@ _SMALL = 64 << 20  # bytes; below this any ratio is accepted, as arrays of zeros
 _ENCRYPTED = 0x41  # flag bits 0 and 6
 _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
 _CHUNK = 1 << 20
-# All that Python's zipfile raises for damaged archives, as found by the mutation tests.
+# All exceptions that zipfile raises for damaged archives, as found by the mutation tests.
 _DAMAGE = (
     zipfile.BadZipFile,
     zipfile.LargeZipFile,
@@ -67,7 +67,11 @@ _DAMAGE = (
 )
 
 _LONGEST_HEADER = 1 << 16
-_LEAD = {b"\1\0": "<H", b"\2\0": "<I", b"\3\0": "<I"}  # format of the header's length, by version
+_LEAD = {
+    b"\1\0": "<H",
+    b"\2\0": "<I",
+    b"\3\0": "<I",
+}  # struct format of the header length, by version
 _RECORD = re.compile(rb"'descr'\s*:\s*[\[(]")
 _ITEM = re.compile(
     rb"'(?P<key>descr|fortran_order|shape)'\s*:\s*"
@@ -77,7 +81,7 @@ _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 
 
 def array_dtype(code: str) -> np.dtype[Any] | None:
-    """Return a type of numbers or text in numpy's spelling, or None for all others.
+    """Return a numeric or string dtype by its numpy spelling, or None for other types.
 
     Not supported are records, sub-arrays, objects, dates and platform-dependent types.
 
@@ -96,7 +100,7 @@ def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
     >>> item_count((6890, 3), 8), item_count((0, 1 << 62), 8)
     (20670, None)
     """
-    # An axis of length 0 makes the product 0 even if others are too long.
+    # An axis of length 0 makes the product 0 even if other axes are too long.
     if (
         len(shape) > _MAX_AXES
         or math.prod(max(side, 1) for side in shape) > _MAX_BYTES // item_size
@@ -138,7 +142,7 @@ class _Header:
 
 
 class _Reader(io.BufferedReader):
-    """A file with a limit on single reads, as zipfile trusts the stated size of the directory."""
+    """A file with a size limit for each read, as zipfile trusts the declared directory size."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is None or size < 0:
@@ -151,7 +155,7 @@ class _Reader(io.BufferedReader):
 
 
 class _Storage:
-    """The file of a source, opened anew for each read; its bytes if there is no file."""
+    """The file of a source, reopened for each read; its bytes if there is no file."""
 
     def __init__(self, source: Source) -> None:
         self.path = source.path
@@ -236,7 +240,7 @@ def _key(member: zipfile.ZipInfo) -> str:
 
 
 def _check_members(source: Source, members: list[zipfile.ZipInfo], size: int) -> None:
-    """Refuse unreadable or too large members, before anything is unpacked."""
+    """Refuse unreadable or oversized members before anything is unpacked."""
     for name, count in Counter(map(_key, members)).items():
         if count > 1:
             raise source.fault("F002.npz-twice", item=printable(name, 60), found=count)
@@ -267,7 +271,7 @@ def _open_member(storage: _Storage, archive: zipfile.ZipFile, member: zipfile.Zi
 
 
 def _read_header(storage: _Storage, key: str, stream: IO[bytes], size: int) -> _Header | Opaque:
-    """Read the header, and check that the values take the rest of ``size`` bytes."""
+    """Read the header, and check that the values fill the rest of ``size`` bytes."""
     lead = stream.read(8)
     layout = _LEAD.get(lead[6:8])
     if not lead.startswith(b"\x93NUMPY") or layout is None:
@@ -306,7 +310,7 @@ def _parse_header(
 
 
 def _parse_shape(text: bytes | None) -> tuple[int, ...] | None:
-    """Return the sizes in ``6890, 3`` or ``5,`` or the ``6890L, 3L`` of Python 2."""
+    """Parse axis lengths written as ``6890, 3``, ``5,`` or ``6890L, 3L`` (Python 2)."""
     if text is None:
         return None
     words = [word.strip().removesuffix(b"L") for word in text.split(b",")]

@@ -1,4 +1,4 @@
-"""Opening of archives: pickles, ``.npz`` and ``.npy`` files, detected by their first bytes."""
+"""Opens archives: pickles, ``.npz`` and ``.npy`` files, detected by their first bytes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def open_archive(source: Source) -> Archive:
     Parameters
     ----------
     source : Source
-        The file. Harmless faults are added to its warnings. Its ``max_size`` is also the largest
+        The file. Harmless errors are added to its warnings. Its ``max_size`` is also the largest
         size of all members of an ``.npz`` together, unpacked.
 
     Raises
@@ -54,6 +54,6 @@ def open_archive(source: Source) -> Archive:
     if head.startswith(_LFS):
         raise source.fault("F002.archive-pointer")
     if not is_archive(head):
-        looks = source.looks_like() or "something else"
+        looks = source.looks_like() or "an unknown format"
         raise source.fault("F002.archive", found=looks)
     return open_pickle(source)

@@ -1,6 +1,6 @@
-"""Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without running code in them.
+"""Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without executing code in them.
 
-A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever given to
+A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever passed to
 Python's own unpickler: ``_pickle/`` supports the few opcodes needed for arrays and plain data, and
 refuses all others by name. All other values are returned as ``Opaque``.
 """
@@ -166,14 +166,14 @@ class Archive:
         self._values: dict[str, Value] = {}
 
     def has(self, key: str) -> bool:
-        """Return whether the file has a value of this name."""
+        """Return whether the file has a value with this name."""
         return key in self.keys
 
     def get(self, key: str) -> Value:
         """Return a value: an array is a ``Deferred``, a matrix may be ``Sparse``.
 
         Containers are new lists, tuples and dicts. Values that would run code, or are nested
-        without end, are ``Opaque``. Arrays are read-only, in C order and native byte order.
+        infinitely, are ``Opaque``. Arrays are read-only, in C order and native byte order.
 
         Raises
         ------
@@ -265,11 +265,11 @@ class Archive:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record a fault of the value called ``item``, see ``Source.refuse``."""
+        """Record an error in the value called ``item``, see ``Source.refuse``."""
         self.source.refuse(key, None, count, part, places, item=printable(item, 60), **values)
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
-        """Return the error of a fault of the value called ``item``, see ``Source.fault``."""
+        """Return the exception for an error in the value called ``item``, see ``Source.fault``."""
         return self.source.fault(key, item=printable(item, 60), **values)
 
 
@@ -322,8 +322,8 @@ def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
 
 
 def _from_lists(value: Value) -> Deferred | None:
-    """Return numbers in nested lists as an array, None if they are not numbers or ragged."""
-    # Only numbers are given to numpy: one long string would make all elements as long.
+    """Return numbers in nested lists as an array, None if the lists are ragged or not numeric."""
+    # Only numbers are passed to numpy: one long string would make all elements that long.
     if not _is_numbers(value):
         return None
     try:

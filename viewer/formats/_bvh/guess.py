@@ -1,4 +1,4 @@
-"""Estimates of facts missing from a BVH file: unit, up axis and exact frame rate."""
+"""Estimates of properties missing from a BVH file: unit, up axis and exact frame rate."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
-_LONG = 2.0  # ratio of the extents along z and y above which z is up
+_LONG = 2.0  # ratio of the z extent to the y extent above which z is up
 _UPRIGHT = 0.8  # smallest cosine of the angle to an axis that a body stands along
 _LOOKS = 16  # frames that are examined
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
@@ -67,8 +67,8 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     Returns
     -------
     unit : str
-        As in ``Figure.unit``: the one of metres, centimetres and millimetres that gives a size
-        between that of a child and that of a giant; empty if none does.
+        As in ``Figure.unit``: metres, centimetres or millimetres, whichever gives a height
+        between a child's and a giant's; empty if none does.
     facts : tuple of (str, str)
         As in ``Figure.facts``: ``("unit", "cm, taken from …")``.
     note : Phrase or None

@@ -41,7 +41,7 @@ class BvhJoint:
 
 @dataclass(slots=True)
 class Hierarchy:
-    """All joints in the order of the file, and the place of its motion.
+    """All joints in the order of the file, and the offset of its motion.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class _Parser:
         self.keyword = b""  # the current word in upper case
         self.found: list[BvhJoint] = []
         self.open: list[int] = []
-        self.n_joints = 0  # number of joints in found; the others are End Sites
+        self.n_joints = 0  # number of joints in ``found``; the other entries are End Sites
         self.extra_braces = 0
 
     def hierarchy(self) -> Hierarchy:
@@ -144,7 +144,7 @@ class _Parser:
         self._advance()
 
     def _begins_item(self) -> bool:
-        """Return whether a keyword with its number ends a name whose "{" is missing."""
+        """Return whether a keyword and its number follow a name whose "{" is missing."""
         assert self.word is not None  # the caller checked it
         if self.keyword not in _ITEMS[:2]:
             return False
@@ -177,7 +177,7 @@ class _Parser:
         joint.offset = values
 
     def _refuse_offset(self, joint: BvhJoint, keyword: Word, found: int) -> None:
-        """Record a fault of an OFFSET with a wrong number of values, and skip it."""
+        """Record an error in an OFFSET with a wrong number of values, and skip it."""
         refuse, word = self.source.refuse, self._found()
         places = None if joint.is_end else [self.n_joints - 1]
         item = Phrase("of", item="OFFSET", owner=called(joint))
@@ -229,7 +229,7 @@ class _Parser:
         return None if self.word is None else self.word.group()
 
     def _fault(self, key: str, **values: Any) -> FormatError:
-        """Return the error of a fault at the current word."""
+        """Return the exception for an error at the current word."""
         where = self.source.end if self.word is None else self.word.start()
         return self.source.fault(key, where, found=self._found(), **values)
 

@@ -61,7 +61,7 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     Raises
     ------
     FormatError
-        For a word that is not a number, or a row that is too short or long; gives its line.
+        For a word that is not a number, or a row that is too short or too long; gives the line.
     """
     if start < 0:
         source.warn("F007.bvh-no-motion", source.end)
@@ -137,9 +137,9 @@ def _refuse_word(source: Source, start: int, bad: int, width: int, declared: int
 
 
 def _held_frames(source: Source, start: int, width: int, declared: int | None) -> Floats | None:
-    """Record all faults in the frames, and return these with the invalid ones replaced.
+    """Record all errors in the frames, and return the frames with invalid ones replaced.
 
-    None if there is no fault in them, or the starts of the frames are unknown.
+    None if there is no error in them, or the starts of the frames are unknown.
     """
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
@@ -212,7 +212,7 @@ def _check_lines(source: Source, start: int, width: int, declared: int | None) -
     if not odd or len(lines) < 2:
         return
     if len(odd) == len(lines):
-        # No row has the right length: frames are lines only if there are as many of both.
+        # No row has the right length: each line is a frame only if their counts are equal.
         if len(lines) == declared:
             raise _wrong_row(source, 0, width, lines[0])
         return

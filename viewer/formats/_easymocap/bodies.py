@@ -36,7 +36,7 @@ _SMPL, _SMPLH, _SMPLX, _MANO = FAMILY[24], FAMILY[52], FAMILY[55], FAMILY[16]
 _BODY = members_by_numbers()[66]
 _FACE = _SMPLX.names[22:25]
 _VPOSER = 32
-_SHAPES = 10  # shape components before those of the expression in the legacy code
+_SHAPES = 10  # shape components that precede the expression components in the legacy code
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +92,13 @@ _LAYOUTS = {
 
 
 def body_layout(record: dict[str, Any]) -> BodyLayout:
-    """Return the layout of a record, determined by the length of its ``poses``.
+    """Return the layout of a record, as determined by the length of its ``poses``.
 
     Raises
     ------
     RecordError
-        If no layout has this length, or the record is invalid, so that it does not determine the
-        layout of others.
+        If no layout has this length, or the record is invalid and so cannot determine the layout
+        of others.
     """
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
@@ -126,7 +126,7 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
 
 
 def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
-    """Return a layout extended by the coefficients that a record has for the first time.
+    """Return a layout extended by coefficients that occur in a record for the first time.
 
     Raises
     ------
@@ -143,12 +143,12 @@ RowFault = tuple[int, str, RecordError]
 """An invalid record: its row, the name of the invalid part, and the problem."""
 
 Remark = tuple[str, str, str]
-"""A remark, which is not a fault: the key of its message, the file, and the key of the record."""
+"""A note, not an error: message key, file, and key within the record."""
 
 
 @dataclass(slots=True)
 class Rows:
-    """Values of one person in some frames, in order of arrival, with their origins."""
+    """Values of one person in some frames, in the order read, with their origins."""
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
@@ -199,7 +199,7 @@ class BodyRows(Rows):
         self.widen(self.layout)
 
     def widen(self, layout: BodyLayout) -> None:
-        """Add coefficients that no record had so far; see ``with_coefficients``."""
+        """Add coefficients that no earlier record had; see ``with_coefficients``."""
         self.layout = layout
         for key, count in layout.widths[len(self.buffers) :]:
             self.buffers.append(array("d", bytes(8 * count * len(self.frames))))
@@ -230,7 +230,7 @@ class BodyRows(Rows):
         self.keep_origin(frame, path, place)
 
     def _take_slowly(self, record: dict[str, Any]) -> None:
-        """Add a record that may have faults, with an exact error for the first of them."""
+        """Add a record that may be invalid; the first error is raised with its exact location."""
         self._drop_unfinished()
         try:
             for key, count, put in self._plan:
@@ -261,7 +261,7 @@ class BodyRows(Rows):
         return zip(self.layout.widths, self.buffers, strict=True)
 
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
-        """Return the values by key, a mask of valid rows, and the faults of the others.
+        """Return the values by key, a mask of valid rows, and the errors in the others.
 
         Returns
         -------
@@ -270,7 +270,7 @@ class BodyRows(Rows):
         keep : (rows,) bool
             True for valid rows.
         faults : list of RowFault
-            Fault of each invalid row.
+            Error in each invalid row.
         """
         keep: Bools = np.ones(len(self.frames), dtype=np.bool_)
         values: dict[str, Floats] = {}
@@ -280,7 +280,7 @@ class BodyRows(Rows):
             if key in COEFFICIENTS:
                 rows = self._with_missing(key, rows)
             values[key] = rows
-            # A single sum finds NaN; rows are examined only if there is one.
+            # A single sum detects NaN; rows are examined only then.
             limit = limit_of(key)
             if rows.size and not -limit <= rows.min() <= rows.max() <= limit:
                 is_good = (np.abs(rows) <= limit).all(axis=1)
@@ -294,7 +294,7 @@ class BodyRows(Rows):
         return values, keep, faults
 
     def _with_missing(self, key: str, rows: Floats) -> Floats:
-        """Repeat earlier coefficients where records omit them, and add a remark."""
+        """Repeat earlier coefficients where records omit them, and add a note."""
         lacking = self._lacking[key]
         is_given: Bools = np.ones(len(rows), dtype=np.bool_)
         is_given[lacking] = False

@@ -1,4 +1,4 @@
-"""Reader of calibrated cameras: ``intri.yml`` and ``extri.yml``, files of OpenCV's FileStorage.
+"""Reader of calibrated cameras: ``intri.yml`` and ``extri.yml``, written by OpenCV's FileStorage.
 
 ::
 
@@ -100,7 +100,7 @@ def find_cameras(
     views : tuple of CameraView
         Cameras in the order of the files; empty if there are no files or they are invalid.
     notes : list of Diagnostic
-        Faults of the files.
+        Errors in the files.
     """
     for folder in folders:
         there = [name for name in (_INTRINSIC, _EXTRINSIC) if (folder / name).is_file()]

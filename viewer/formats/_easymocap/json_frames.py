@@ -1,4 +1,4 @@
-"""Reader of one frame file of EasyMocap: its list of people, and the faults in it."""
+"""Reader of one EasyMocap frame file: its list of people, and errors in it."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ _decode = json.JSONDecoder(object_pairs_hook=_unique).decode
 
 
 def load_people(path: str, max_size: int) -> list[Any]:
-    """Return the people in a frame file, unchecked; NaN and infinities pass.
+    """Return the people in a frame file, unchecked; NaN and infinities are accepted.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
     path, max_size
         As for ``load_people``, which has read the file.
     place : int
-        Index of the person.
+        Index of the person in the list.
     key : str
         Empty for the record itself.
     """
@@ -200,7 +200,7 @@ def has_numbers(record: Record, key: str) -> bool:
 
 
 def row_of(record: Record, key: str) -> list[Any]:
-    """Return the numbers of a key, which may be stored as a matrix of one row.
+    """Return a key's numbers, which may be stored as a one-row matrix.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def row_of(record: Record, key: str) -> list[Any]:
 
 
 def limit_of(key: str) -> float:
-    """Return the largest valid magnitude of the numbers of a key."""
+    """Return the largest allowed magnitude of a key's numbers."""
     return FARTHEST if key == _TRANSLATION else LARGEST
 
 
@@ -247,7 +247,7 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
 
 
 def take_row(record: Record, key: str, count: int, put: Any) -> None:
-    """Pass the numbers of a key to ``put``, the ``fromlist`` of an ``array("d")``.
+    """Pass a key's numbers to ``put``, the ``fromlist`` of an ``array("d")``.
 
     Raises
     ------

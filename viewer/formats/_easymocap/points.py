@@ -1,4 +1,4 @@
-"""Keypoints of EasyMocap's records, collected per person.
+"""Keypoints from EasyMocap records, collected per person.
 
 ``keypoints3d`` has rows of x, y, z and confidence, or of x, y, z with full confidence; hands and
 face may have keys of their own. A confidence of 0 means "not detected".
@@ -147,7 +147,7 @@ class PointRows(Rows):
         raise RecordError(key, Phrase("record-other-rows"))
 
     def points(self) -> tuple[Floats, list[RowFault]]:
-        """Return the points (N, K, 4), and the faults of invalid rows."""
+        """Return the points (N, K, 4), and the errors in invalid rows."""
         points = self._rows().copy()
         is_odd, is_unseen = _is_odd(points), points[..., 3] == 0.0
         points[is_odd | is_unseen] = 0.0

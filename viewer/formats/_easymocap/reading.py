@@ -1,4 +1,4 @@
-"""Sequential reading of a recording's frame files in growing parts, with gaps for faults."""
+"""Sequential reader of frame files, in growing parts, with gaps for invalid frames."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from viewer.rig.motion.body_motion import BodyMotion
 
 __all__ = ["Options", "Reading"]
 
-_SIZES = (64, 256, 1024, 4096)  # frames per part; all further parts have the last size
+_SIZES = (64, 256, 1024, 4096)  # frames per part; further parts have the last size
 _MOST_WARNINGS = 20
 
 
@@ -64,7 +64,7 @@ class _Part:
 
 @dataclass(slots=True, eq=False)
 class Reading:
-    """One pass over the files, with its state and warnings.
+    """A single pass over the files, with its state and warnings.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Reading:
     body_layout, point_layout : layouts or None
         Layout of the first record that has one; others must agree, but may add coefficients.
     first_fault : Diagnostic or None
-        First fault.
+        First error.
     """
 
     files: FrameFiles
@@ -142,7 +142,7 @@ class Reading:
             self._take_person(person, record, folder, frame, (path, place), part)
 
     def _note_ids(self, path: str, record: dict[str, Any]) -> None:
-        """Remark on the identity used where a record has none, or two that differ."""
+        """Add a note on the identity used where a record has none, or two that differ."""
         if "id" not in record and "personID" not in record:
             self.note("F007.record-no-id", path)
         elif "id" in record and record["id"] != record["personID"]:
@@ -268,13 +268,13 @@ class Reading:
             self._fault_of(rows.paths[row], rows.places[row], problem, label, name)
 
     def _fault_of(self, path: str, place: int, problem: RecordError, *names: str) -> None:
-        """Record a fault of a person's record, or of a key of it."""
+        """Record an error in a person's record, or in one of its keys."""
         line = self._line(path, place, problem.key)
         values = {"item": ": ".join(filter(None, names)), "problem": problem.problem}
         self._fault(Diagnostic(f"{problem.code}.record", Path(path), line, values=values))
 
     def _line(self, path: str, place: int, key: str) -> int | None:
-        # Finding the line reads the file again, which is skipped for faults that are not shown.
+        # Finding the line reads the file again, which is skipped for errors that are not shown.
         if self._n_faults >= _MOST_WARNINGS:
             return None
         return record_line(path, self.options.max_size, place, key)
@@ -286,7 +286,7 @@ class Reading:
             self._found.append(remark_on("F007.record", fault))
 
     def note(self, key: str, path: str, **values: Any) -> None:
-        """Record a remark about the files, each only once."""
+        """Record a note about the files, without repeating it."""
         mark = key, *values.values()
         if mark not in self._said:
             self._said.add(mark)

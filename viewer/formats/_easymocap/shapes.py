@@ -1,4 +1,4 @@
-"""Repetition of coefficients that many writers store only once per person."""
+"""Repeats coefficients that many writers store only once per person."""
 
 from __future__ import annotations
 

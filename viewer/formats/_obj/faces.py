@@ -24,12 +24,12 @@ _SLASH = ord("/")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CornerFault:
-    """Faulty corners of one kind.
+    """Invalid corners with the same error.
 
     Attributes
     ----------
     key, offset, values : str, int, dict
-        The fault of the first, as ``Source.refuse`` takes it.
+        The first error, as arguments of ``Source.refuse``.
     faces : (n,)
         Face of each corner.
     """
@@ -49,12 +49,12 @@ class FaceRows:
     counts : (F,)
         Corners of each face, 3 or more.
     corners : (C, 3)
-        Vertex, texture coordinate and normal of each, from 0; -1 if missing. Their range can be
+        0-based vertex, texture coordinate and normal of each; -1 if missing. Their range can be
         checked only when the whole file has been read.
     offsets : (F,)
         Offset of each face in the file.
     faults : tuple of CornerFault
-        Faults to record when the triangles of the faces are known.
+        Errors to record when the triangles of the faces are known.
     """
 
     counts: Places
@@ -64,7 +64,7 @@ class FaceRows:
 
 
 def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
-    """Read the faces of some lines; None if any has a fault.
+    """Read the faces of some lines; None if any is invalid.
 
     Negative indices count back from the last ``v``, ``vt`` or ``vn`` before the face.
 
@@ -99,7 +99,7 @@ def _corner_numbers(rows: Rows, begins: Places) -> Places | None:
     None if a corner is invalid.
     """
     values, bad = parse_numbers(rows.body.replace(b"/", b" "), 0, len(rows.body))
-    if bad >= 0 or (values == 0.0).any():  # 0 is no index, and means "missing" below
+    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index, and means "missing" below
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:

@@ -1,4 +1,4 @@
-"""Parser for lines of an ``.obj`` with faults: records them and substitutes neutral values."""
+"""Parser for invalid lines of an ``.obj``: records errors and substitutes neutral values."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from viewer.rig.arrays import Bools
 __all__ = ["checked_corners", "faulty_faces", "faulty_rows"]
 
 _LOST = -(2**40)
-"""Stands for an unknown vertex; no file has so many."""
+"""Represents an unknown vertex; no file has this many."""
 
 
 def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
-    """Parse the numbers behind a keyword; see ``number_rows``.
+    """Parse the numbers after a keyword; see ``number_rows``.
 
     Parameters
     ----------
     source : Source
-        The file, which records the faults.
+        The file, which records the errors.
     lines : Lines
         Lines of the file.
     keyword : str
@@ -50,7 +50,7 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     part: Part = "positions" if keyword == "v" else ""
     bad = words.bad
     is_used = bad - firsts[owners[bad]] < width
-    parts: tuple[Part, Part] = (part, "")  # the checks use no further numbers
+    parts: tuple[Part, Part] = (part, "")  # the checks use no other numbers
     for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
         owned = owners[bad[chosen]] + first
         refuse_words(
@@ -86,7 +86,7 @@ def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     Parameters
     ----------
     source : Source
-        The file, which records the faults of omitted faces.
+        The file, which records the errors of omitted faces.
     lines : Lines
         Lines of the file.
     before : dict of str to int
@@ -95,7 +95,7 @@ def faulty_faces(source: Source, lines: Lines, before: dict[str, int]) -> FaceRo
     Returns
     -------
     FaceRows
-        Faces, with the faults to record when their triangles are known.
+        Faces, with the errors to record when their triangles are known.
     """
     rows = rows_of(lines, "f")
     begins = word_begins(rows.letters)
@@ -163,7 +163,7 @@ def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int])
     Parameters
     ----------
     source : Source
-        The file, which records the faults.
+        The file, which records the errors.
     faces : list of FaceRows
         All faces of the file.
     ends : dict of str to int

@@ -28,7 +28,7 @@ KEYWORDS = ("v", "vt", "vn", "f")
 _PIECE = 1 << 18  # bytes
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _LINE_END = re.compile(rb"[\r\n]")
-_PAD = b"\n\n\n"  # padding, so that three letters can be read at every start of a line
+_PAD = b"\n\n\n"  # padding, so that three letters can be read at the start of every line
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Lines:
     base : int
         Offset of the first line in the file.
     data : bytes
-        Their text; continued lines are joined with spaces.
+        Text of the lines; continued lines are joined with spaces.
     letters : (N,) uint8
         ``data`` as an array.
     starts, ends : (L,)

@@ -63,12 +63,12 @@ class _Statements:
 def read_libraries(
     source: Source, libraries: list[tuple[bytes, int]], names: list[str]
 ) -> tuple[Material, ...]:
-    """Return materials by name, with their pictures where these can be read.
+    """Return materials by name, with their images where these can be read.
 
     Parameters
     ----------
     source : Source
-        The ``.obj``; warned of libraries, materials and pictures that are missing.
+        The ``.obj``; warned of libraries, materials and images that are missing.
     libraries : list of (bytes, int)
         What follows each ``mtllib``, and where.
     names : list of str

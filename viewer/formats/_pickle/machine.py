@@ -51,7 +51,7 @@ class Machine:
         return self.source.fault("F002.pickle-step", problem=problem, at=self._step_at)
 
     def next_step(self) -> int:
-        """Return the next opcode, and charge it to the budget."""
+        """Return the next opcode, and deduct it from the budget."""
         self._step_at = self.at
         if self.at >= len(self.data):
             raise self.cut_short(1, 0)
@@ -60,7 +60,7 @@ class Machine:
         return self.data[self.at - 1]
 
     def spend(self, count: int) -> None:
-        """Charge a number of items to the budget; refuse a pickle that exceeds it."""
+        """Deduct a number of items from the budget; refuse a pickle that exceeds it."""
         self._budget -= count
         if self._budget < 0:
             raise self.fail(Phrase("pickle-steps", most=_MAX_STEPS))
@@ -110,11 +110,11 @@ class Machine:
         return int(word)
 
     def cut_short(self, wanted: int, found: int) -> FormatError:
-        """Return the error of a length that exceeds the rest of the file."""
+        """Return the error for a length that exceeds the rest of the file."""
         return self.fail(Phrase("pickle-cut", expected=wanted, found=found))
 
     def damaged_line_ends(self) -> FormatError:
-        """Return the error of a file that was damaged by a transfer in text mode."""
+        """Return the error for a file damaged by a text-mode transfer."""
         return self.source.fault("F002.pickle-line-ends")
 
     # The stack.
@@ -130,7 +130,7 @@ class Machine:
         return self.stack[-1]
 
     def pop(self) -> object:
-        """Pop the topmost value, but none below a mark."""
+        """Pop the topmost value, but never one below a mark."""
         value = self.top()
         self.stack.pop()
         return value
@@ -165,7 +165,7 @@ class Machine:
         self.memo[index] = self.top()
 
     def recall(self, index: int) -> None:
-        """Push a value of the memo onto the stack."""
+        """Push a value from the memo onto the stack."""
         if index not in self.memo:
             raise self.fail(Phrase("pickle-recall", found=index))
         self.stack.append(self.memo[index])

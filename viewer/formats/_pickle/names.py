@@ -2,7 +2,7 @@
 
 ``find`` looks up a pair of module and name in a literal table. It imports nothing and returns a
 stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy and Python
-themselves write. All four raise ``MisfitError`` for everything else.
+themselves write. All four raise ``MisfitError`` for anything else.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def call(function: object, arguments: object) -> tuple[object, int]:
     Parameters
     ----------
     function : object
-        A ``StandIn``; all other objects are refused. arguments : object
-        A tuple; all other objects are refused.
+        A ``StandIn``; anything else is refused. arguments : object
+        A tuple; anything else is refused.
     """
     if not isinstance(function, StandIn) or function.role not in _CALLS:
         raise MisfitError(Phrase("pickle-call", found=noun(function)))
@@ -128,8 +128,8 @@ def as_key(value: object) -> str | bytes | int:
     Raises
     ------
     MisfitError
-        If it has another type. Objects are refused so that no hash of theirs is ever computed,
-        large numbers because they can be chosen so that all of them collide.
+        If it has another type. Objects are refused so that their hashes are never computed,
+        large numbers because they can be chosen so that all their hashes collide.
     """
     if isinstance(value, str | bytes):
         return value

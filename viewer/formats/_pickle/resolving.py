@@ -1,4 +1,4 @@
-"""Conversion of the values that a pickle built to those of an archive, one key at a time.
+"""Converts the values that a pickle builds to those of an archive, one key at a time.
 
 Values are converted on demand, so a key that is not needed costs nothing and cannot invalidate the
 others. Shared and self-containing values are traversed within a budget and a depth.
@@ -124,7 +124,7 @@ class _Resolver:
         return later.values()
 
     def expression(self, value: Instance, depth: int) -> Deferred | Opaque:
-        """Return the array that a chumpy object stands for, if it is known without computing."""
+        """Return the array that a chumpy object represents, if it is known without computing."""
         state = value.state or {}
         name = value.of.name
         if depth > _DEEPEST_EXPRESSION:

@@ -115,7 +115,7 @@ def _float(machine: Machine) -> None:
     machine.push(struct.unpack_from(">d", machine.data, machine.skip(8))[0])
 
 
-# Texts.
+# Strings.
 
 
 def _quoted(machine: Machine) -> None:
@@ -288,7 +288,7 @@ _STEPS: dict[int, Step] = {
     0x8B: _long_integer(4),
     ord("F"): _float_text,
     ord("G"): _float,
-    # Texts and bytes
+    # Strings and bytes
     ord("S"): _quoted,
     ord("T"): _span(4, "latin-1", is_signed=True),
     ord("U"): _span(1, "latin-1"),

@@ -1,4 +1,4 @@
-"""Arrays of a PIG model, read from a folder of texts or an archive with the same checks."""
+"""Arrays of a PIG model, read from a folder of text tables or an archive with the same checks."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Part:
     values : (N, columns)
         Numbers; of a sparse matrix (joint, vertex, weight) rows.
     source : Source
-        The file, which records faults.
+        The file, which records errors.
     offset_of : callable or None
         Returns the offset of a row in a text; None for archives, which have no lines.
     """

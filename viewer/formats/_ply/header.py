@@ -58,7 +58,7 @@ class Header:
     elements : list of Element
         In file order.
     comments : list of (str, int)
-        Texts and their offsets.
+        Comment strings and their offsets.
     end : int
         Offset of the data.
     """
@@ -99,7 +99,7 @@ def read_header(source: Source) -> Header:
 
 
 def _no_ply(source: Source, line: bytes) -> FormatError:
-    """Return the error of a file in another format."""
+    """Return the error for a file in another format."""
     looks = source.looks_like()
     if looks is not None:
         return source.fault("F002.ply-looks", 0, looks=looks)

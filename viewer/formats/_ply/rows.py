@@ -31,9 +31,9 @@ class Table:
     element : Element
         Its declaration in the header.
     columns : dict of str to (N,)
-        Its properties that are not lists.
+        Properties of the element that are not lists.
     lists : dict of str to ((N,), (M,))
-        Its lists: the number of values of each row, and the values of all rows.
+        List properties: the number of values of each row, and the values of all rows.
     offsets : (N,) or None
         Offset of each row in a text.
     is_first : bool
@@ -177,7 +177,7 @@ class _Text:
         )
 
     def _no_count(self, table: Table, row: int, word: int) -> FormatError:
-        """Return the error of a list without a valid count."""
+        """Return the error for a list without a valid count."""
         item = Phrase("ply-row", element=table.element.name, row=row)
         found = float(self.values[word])
         if np.isnan(found):

@@ -1,4 +1,4 @@
-"""Values by name from a JSON text or an archive, with the locations of faults."""
+"""Values by name from a JSON text or an archive, with error locations."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class NamedValues:
         self.source.warn(key, self.offset(*path), **values)
 
     def array(self, key: str, kinds: str, expected: Phrase) -> NDArray[Any]:
-        """Return an array of certain kinds of values, stored as an array or as lists.
+        """Return an array of the given kinds of values, stored as an array or as lists.
 
         Parameters
         ----------

@@ -27,7 +27,7 @@ Word = re.Match[bytes]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Range of a section's numbers, by which an error finds the line of a word.
+    """Range of a section's numbers, from which errors determine the line of a word.
 
     Attributes
     ----------
@@ -101,13 +101,13 @@ def words_of(source: Source, block: Block) -> Words:
 
 
 def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
-    """Return the error of a block interrupted by ``found``; None stands for the end of the file."""
+    """Return the error for a block interrupted by ``found``; None is the end of the file."""
     line = source.line(block.header)
     return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
 
 
 def to_whole(values: Floats) -> tuple[Ints, int]:
-    """Return numbers as int32, and the index of the first that this changes, -1 for none."""
+    """Return numbers as int32, and the index of the first one changed by this, -1 for none."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
     whole.flags.writeable = False  # so that it need not be copied

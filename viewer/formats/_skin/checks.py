@@ -33,7 +33,7 @@ _FAR = 1e6  # a vertex this many times the median distance away is stray
 def even_counts(source: Source, sections: Sections) -> None:
     """Refuse sections whose number of vertices differs from that of the positions.
 
-    If all other sections agree, the positions are at fault.
+    If all other sections agree, the positions are wrong.
     """
     tables = sections.tables
     counts = {name: len(table) for name, table in tables.items()}

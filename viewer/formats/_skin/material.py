@@ -1,4 +1,4 @@
-"""The ``material`` section of a ``.skin`` file, and the picture that it references."""
+"""The ``material`` section of a ``.skin`` file, and the image that it references."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def read_material(
     keywords : container of bytes
         Keywords of sections, which cannot be part of a name.
     pictures : dict
-        Pictures loaded so far, by name; this material's is added.
+        Images loaded so far, by name; this material's is added.
 
     Returns
     -------
     material : Material
-        With its picture, if that can be read.
+        Material with its image, if the image can be read.
     end : int
         Offset after the section.
 

@@ -1,7 +1,7 @@
 """Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
 
-A block without faults is parsed at once. Otherwise every word is examined: each fault is recorded
-and replaced by NaN. Line breaks have no meaning in the format, but most files have one vertex or
+A valid block is parsed at once. Otherwise every word is examined: each error is recorded and the
+value replaced by NaN. Line breaks have no meaning in the format, but most files have one vertex or
 triangle per line. If so, a line of a wrong length does not affect the others.
 """
 
@@ -45,7 +45,7 @@ def read_rows(
     Parameters
     ----------
     source : Source
-        The file, which records the faults.
+        The file, which records the errors.
     block : Block
         Range of the numbers.
     count : int
@@ -71,7 +71,7 @@ def read_rows(
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
-        values.flags.writeable = False  # allows the mesh to use it without a copy
+        values.flags.writeable = False  # lets the mesh use it without a copy
         begin, end = block.start, block.end
         return values.reshape(count, width), lambda row: source.number_offset(
             begin, end, width * row
@@ -155,9 +155,9 @@ def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int)
     Parameters
     ----------
     source : Source
-        The file, which records the faults.
+        The file, which records the errors.
     rows, offset_of : (T, 3), callable
-        Results of ``read_rows``, which has recorded the faults that it found.
+        Results of ``read_rows``, which has recorded the errors it found.
     first : int
         Index of the first triangle, for messages.
     """

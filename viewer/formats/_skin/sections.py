@@ -58,7 +58,7 @@ class Sections:
     counts: dict[str, int] = field(default_factory=dict)  # as declared by the file
 
     def triangle_offset(self, triangle: int) -> int:
-        """Return the offset of a triangle, counted through all sections."""
+        """Return the offset of a triangle, numbered across all sections."""
         ends = np.cumsum([len(run.triangles) for run in self.triangles])
         run = int(np.searchsorted(ends, triangle, side="right"))
         first = int(ends[run]) - len(self.triangles[run].triangles)
@@ -127,7 +127,7 @@ def _read_section(source: Source, sections: Sections, word: Word) -> int:
 
 
 def _read_table(source: Source, block: Block, count: int) -> Floats:
-    """Parse a table, NaN where it has faults, and register its rows."""
+    """Parse a table, with NaN for invalid values, and register its rows."""
     rows, offset_of = read_rows(source, block, count, _WIDTHS[block.name])
     source.remember(block.name, offset_of)
     return rows

@@ -1,7 +1,7 @@
 """The ``skinweights`` section of a ``.skin`` file.
 
-It has a count for each vertex, followed by that many pairs of joint and weight. Without faults the
-numbers are parsed at once; otherwise every word is examined, and an unreadable vertex gets no
+It has a count for each vertex, followed by that many pairs of joint and weight. Valid numbers are
+parsed at once; otherwise every word is examined, and an unreadable vertex gets no
 influence.
 """
 
@@ -32,7 +32,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
     Parameters
     ----------
     source : Source
-        The file, which records the faults.
+        The file, which records the errors.
     block : Block
         Range of the numbers.
     count : int
@@ -71,7 +71,7 @@ def _whole_influences(
     starts = np.zeros(len(heads) + 1, dtype=np.int32)
     np.cumsum(values[heads].astype(np.int32), out=starts[1:])
     weights = pairs[:, 1].copy()
-    # Allows the skin to use them without a copy.
+    # Lets the skin use them without a copy.
     starts.flags.writeable = weights.flags.writeable = False
     begin, end = block.start, block.end
 
@@ -175,7 +175,7 @@ def _faulty_pairs(
 def _no_influences(
     source: Source, block: Block, words: Words, known: Floats, count: int
 ) -> FormatError:
-    """Return the error of the first wrong count, found by following the counts one by one."""
+    """Return the error for the first wrong count, found by following the counts one by one."""
     numbers = known.tolist()
     heads: list[int] = []
     position = 0

@@ -102,7 +102,7 @@ def model_uvs(
 def model_symmetry(
     source: Source, archive: Archive, n_vertices: int, used: list[str]
 ) -> Ints | None:
-    """Return each vertex's mirror partner, if the file has a valid map."""
+    """Return each vertex's mirror counterpart, if the file has a valid map."""
     if not archive.has("vert_sym_idxs"):
         return None
     partners = archive.array("vert_sym_idxs", (n_vertices,)).values()

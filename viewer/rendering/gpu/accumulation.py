@@ -1,4 +1,4 @@
-"""Sum of several passes of one picture, in floating point."""
+"""Sum of several passes of one image, in floating point."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Accumulation"]
 
 
 class Accumulation:
-    """Adds pictures and draws their average.
+    """Adds images and draws their average.
 
     Colours are premultiplied by alpha, so the average of the pixels is that of the coverage.
 
@@ -29,7 +29,7 @@ class Accumulation:
     Attributes
     ----------
     count : int
-        Pictures added since the last ``clear``.
+        Images added since the last ``clear``.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs, size: tuple[int, int]):

@@ -1,7 +1,7 @@
 """Mipmaps of textures, computed by numpy for software rendering.
 
 Mesa compiles two programs for ``glGenerateMipmap``, which takes 60 ms, a fifth of the time from
-the start to the first picture.
+the start to the first image.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""OpenGL version that a machine offers if it lacks the required one."""
+"""OpenGL version offered by a machine that lacks the required one."""
 
 from __future__ import annotations
 

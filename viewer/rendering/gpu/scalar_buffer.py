@@ -65,7 +65,7 @@ class ScalarBuffer:
         name : str
             A key of ``SCALARS``, with a joint if the quantity needs one. Missing data count as 0.
         pose : Pose or None
-            None for the mesh in its binding space.
+            None for the mesh in its bind pose.
         skinning : Skinning
             Skinning of the drawn mesh.
         """

@@ -14,10 +14,8 @@ from viewer.rig.arrays import Bytes
 __all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
 
 
-def check_size(
-    context: moderngl.Context, size: tuple[int, int], what: str = "picture size"
-) -> None:
-    """Raise for a picture size that the driver cannot draw; ``what`` begins the message.
+def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:
+    """Raise for an image size that the driver cannot draw; ``what`` begins the message.
 
     Raises
     ------
@@ -32,10 +30,10 @@ def check_size(
 
 
 def target_bytes(size: tuple[int, int], samples: int) -> int:
-    """Return the memory in bytes that OpenGL needs for a picture while it is drawn.
+    """Return the memory in bytes that OpenGL needs for an image while it is drawn.
 
-    Colour and depth of every sample, 4 bytes each, plus the resolved picture; without
-    multisampling, the picture and its depth.
+    Colour and depth of every sample, 4 bytes each, plus the resolved image; without
+    multisampling, the image and its depth.
 
     Parameters
     ----------
@@ -56,7 +54,7 @@ def _gigabytes(count: int) -> str:
 
 
 class Target:
-    """Framebuffers of a picture while it is drawn.
+    """Framebuffers of an image while it is drawn.
 
     Parameters
     ----------
@@ -72,7 +70,7 @@ class Target:
     framebuffer : moderngl.Framebuffer
         The framebuffer to draw to.
     texture : moderngl.Texture
-        The picture after ``resolve``.
+        The image after ``resolve``.
     """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
@@ -85,7 +83,7 @@ class Target:
         self._owned: list[Any] = []
         try:
             self._allocate()
-            check_errors(context, f"a picture of {size[0]} x {size[1]} pixels")
+            check_errors(context, f"an image of {size[0]} x {size[1]} pixels")
         except (moderngl.Error, RenderError):
             self.release()
             context.clear_errors()  # the error of the failed allocation
@@ -120,32 +118,32 @@ class Target:
             alone = _gigabytes(target_bytes(self.size, 0))
             less = f"1 sample per pixel (--samples 1) needs {alone}, {less}"
         return RenderError(
-            f"a picture of {width} x {height} pixels{samples} needs "
+            f"an image of {width} x {height} pixels{samples} needs "
             f"{_gigabytes(target_bytes(self.size, self.samples))} of graphics memory, which "
             f"{self.context.info['GL_RENDERER']} does not provide; {less}"
         )
 
     def resolve(self) -> moderngl.Texture:
-        """Average the samples and return the picture's texture."""
+        """Average the samples and return the image's texture."""
         if self.samples:
             self.context.copy_framebuffer(self._resolved, self.framebuffer)
         return self.texture
 
     def read(self) -> Bytes:
-        """Return the resolved picture: (H, W, 4) uint8, first row at the top.
+        """Return the resolved image: (H, W, 4) uint8, first row at the top.
 
-        Alpha is straight, not premultiplied, as in picture files.
+        Alpha is straight, not premultiplied, as in image files.
         """
         return straight(picture_rows(self._resolved.read(components=4), self.size))
 
     def read_into(self, buffer: moderngl.Buffer) -> None:
-        """Queue a copy of the resolved picture to a buffer, without waiting for it.
+        """Queue a copy of the resolved image to a buffer, without waiting for it.
 
         Parameters
         ----------
         buffer : moderngl.Buffer
             4 bytes per pixel, last row first; ``picture_rows`` converts its contents to a
-            picture. Reading it waits for the copy.
+            image. Reading it waits for the copy.
         """
         self._resolved.read_into(buffer, components=4)
 

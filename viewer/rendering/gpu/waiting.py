@@ -1,6 +1,6 @@
 """Waiting for the driver without holding Python's lock, so that other threads can run.
 
-moderngl holds the global interpreter lock during every call. Reading a picture that is still being
+moderngl holds the global interpreter lock during every call. Reading an image that is still being
 drawn blocks until the drawing is finished, and no other thread can run Python meanwhile: an
 encoder thread that needs the lock five times per frame would be delayed by five frames. ``ctypes``
 releases the lock during a call, so two OpenGL functions are called through it.

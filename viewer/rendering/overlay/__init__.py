@@ -1,1 +1,1 @@
-"""Text, marks and legends drawn over a picture."""
+"""Text, markers and legends drawn over an image."""

@@ -1,4 +1,4 @@
-"""Annotations drawn over a picture: lines and dots in the scene, labels next to points."""
+"""Annotations drawn over an image: lines and dots in the scene, labels next to points."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default colour of labels, sRGB."""
 
-_LETTERS = 13.0  # height, pixels, in a picture of standard height
+_LETTERS = 13.0  # height, pixels, in an image of standard height
 _GAP = 7.0  # pixels between a point and its label
 _LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
 _RIM = 5.0  # pixels between a point and the start of its leader line
@@ -79,14 +79,14 @@ class Annotation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedLabels:
-    """Labels with their positions in the picture.
+    """Labels with their positions in the image.
 
     Attributes
     ----------
     texts : tuple of M str
         Their texts.
     corners : (M, 2)
-        Top left corners, pixels from the picture's left and upper edge.
+        Top left corners, pixels from the image's left and upper edge.
     colors : (M, 3)
         sRGB, 0 to 1.
     points : (M, 3)
@@ -98,7 +98,7 @@ class PlacedLabels:
     owners : (M,)
         Indices of the ``Labels`` that they belong to.
     n_seen : tuple of int
-        Number of points within the picture, for each ``Labels``.
+        Number of points within the image, for each ``Labels``.
     """
 
     texts: tuple[str, ...]
@@ -118,12 +118,12 @@ class PlacedLabels:
 
 
 def letters_for(size: tuple[int, int]) -> int:
-    """Return the height of text in a picture, pixels.
+    """Return the height of text in an image, pixels.
 
     Parameters
     ----------
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
     return round(_LETTERS * picture_scale(size))
 
@@ -140,7 +140,7 @@ def place_labels(
     view : View
         The camera's matrices.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     lettering : Lettering
         The font.
     """
@@ -177,7 +177,7 @@ def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Seg
     view : View
         The camera's matrices.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
     led, scale = placed.has_line, picture_scale(size)
     points, to = placed.points[led], placed.ends[led]

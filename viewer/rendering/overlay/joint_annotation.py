@@ -36,7 +36,7 @@ def joint_annotation(
     options : DisplayOptions
         Display options that select the marks.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     selected : (int, int)
         Index of an actor and of its highlighted joint; -1 for none.
     """

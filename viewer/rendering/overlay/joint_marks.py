@@ -1,4 +1,4 @@
-"""Joint marks drawn over the picture: X-ray bones and axes; and the joint at a pixel."""
+"""Joint marks drawn over the image: X-ray bones and axes; and the joint at a pixel."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
 """Colour of the selected joint, sRGB and opacity."""
 
 _AXIS_COLORS = ((0.95, 0.36, 0.33), (0.42, 0.83, 0.36), (0.36, 0.58, 1.0))  # x, y, z; sRGB
-_AXIS_FRACTION = 0.4  # of the distance to the nearest connected joint
-_AXIS_LIMITS = 0.005, 0.05  # of the skeleton's size
-_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels, for a picture of standard height
+_AXIS_FRACTION = 0.4  # fraction of the distance to the nearest connected joint
+_AXIS_LIMITS = 0.005, 0.05  # fraction of the skeleton's size
+_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels, for an image of standard height
 _OUTLINE = 2.0
 _DARK = (0.05, 0.06, 0.08, 0.85)
 _DOT_REACH, _BONE_REACH = 8.0, 4.0  # pixels
@@ -181,9 +181,9 @@ def joint_at(
     view : View
         The camera's matrices.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     pixel : (float, float)
-        From the picture's left and upper edge.
+        From the image's left and upper edge.
     with_bones : bool
         Whether bones are drawn; a bone belongs to the joint that rotates it.
 

@@ -36,7 +36,7 @@ _ALIKE = 1.0  # pixels; labels of points nearer than this are allowed at the sam
 # Minimum distance of a label from other points: times its distance from its own point, or in gaps
 # for a label with a leader line.
 _CLEARER = 1.5
-_FREE = 3.0  # the same for a place with plenty of room
+_FREE = 3.0  # the same for a position with plenty of room
 _BESIDE_LINE = 0.75  # minimum distance of a leader line from other points, in gaps
 
 
@@ -86,23 +86,23 @@ class Places:
 
 
 def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> Places:
-    """Return all candidate places of labels that lie within a picture.
+    """Return all candidate places of labels that lie within an image.
 
     Parameters
     ----------
     anchors : (N, 2)
-        The points, pixels from the picture's left and upper edge.
+        The points, pixels from the image's left and upper edge.
     sizes : (N, 2)
         Width and height of the labels, pixels.
     picture : (int, int)
-        Width and height of the picture.
+        Width and height of the image.
     gap : float
         Pixels between a point and its label.
     """
     ways = np.tile(_WAYS, (len(_REACHES), 1))
     nearest = anchors[:, None] + gap * np.repeat(_REACHES, len(_WAYS))[:, None] * ways
     low = np.rint(nearest - 0.5 * (1.0 - np.sign(ways)) * sizes[:, None])
-    # Labels straight above, below or beside their point may be shifted to stay in the picture.
+    # Labels straight above, below or beside their point may be shifted to stay in the image.
     room = np.maximum(np.array(picture) - sizes, 0)[:, None]
     low = np.where(ways == 0.0, np.clip(low, 0.0, room), low)
     is_inside = (low >= 0.0) & (low + np.maximum(sizes, 1)[:, None] <= picture)
@@ -121,7 +121,7 @@ def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
     Parameters
     ----------
     places : Places
-        Candidate places within the picture.
+        Candidate places within the image.
     anchors : (N, 2)
         The labels' points, pixels.
     dots : Dots
@@ -143,7 +143,7 @@ def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
     Parameters
     ----------
     places : Places
-        Candidate places within the picture.
+        Candidate places within the image.
     gap : float
         Pixels between a point and its label.
 
@@ -192,7 +192,7 @@ def clear_places(places: Places, dots: Dots, gap: float) -> Places:
     Parameters
     ----------
     places : Places
-        Candidate places within the picture.
+        Candidate places within the image.
     dots : Dots
         All points.
     gap : float

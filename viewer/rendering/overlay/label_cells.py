@@ -1,4 +1,4 @@
-"""Uniform grid over a picture, for fast queries of the points within many rectangles."""
+"""Uniform grid over an image, for fast queries of the points within many rectangles."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PAIRS = 1 << 18  # pairs of a rectangle and a dot per batch
 
 
 class Cells:
-    """The cells: 1 to ``n`` per axis within the picture; 0 and ``n + 1`` are outside it.
+    """The cells: 1 to ``n`` per axis within the image; 0 and ``n + 1`` are outside it.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ class Dots:
     Parameters
     ----------
     cells : Cells
-        Grid over the picture.
+        Grid over the image.
     points : (N, 2)
-        Pixels from the picture's left and upper edge. Points within the same quarter of a pixel
+        Pixels from the image's left and upper edge. Points within the same quarter of a pixel
         are merged: otherwise all joints of a distant figure would be compared with each other.
     """
 
@@ -121,7 +121,7 @@ class Dots:
         return np.concatenate([[0], counts.cumsum()]).astype(np.int32)
 
     def count_at(self, pixels: Ints) -> Ints:
-        """Return the number of dots in the cells of pixels within the picture: (...,)."""
+        """Return the number of dots in the cells of pixels within the image: (...,)."""
         places = pixels // self.cells.side + 1
         return self._counts[places[..., 1], places[..., 0]]
 

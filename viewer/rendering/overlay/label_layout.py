@@ -65,13 +65,13 @@ def lay_out(
     Parameters
     ----------
     anchors : (N, 2)
-        The points, pixels from the picture's left and upper edge.
+        The points, pixels from the image's left and upper edge.
     order : (N,)
         Indices of the labels in the order of placement.
     sizes : (N, 2)
         Width and height of the labels, pixels, 1 or more.
     picture : (int, int)
-        Width and height of the picture; labels stay within it.
+        Width and height of the image; labels stay within it.
     gap : float
         Pixels between a point and its label.
     """

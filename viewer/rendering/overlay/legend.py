@@ -1,4 +1,4 @@
-"""Legend of a scalar quantity, as data shared by pictures and panels."""
+"""Legend of a scalar quantity, as data shared by images and panels."""
 
 from __future__ import annotations
 

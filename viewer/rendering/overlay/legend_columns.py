@@ -1,4 +1,4 @@
-"""Split of a legend's items into columns, for pictures and the window."""
+"""Split of a legend's items into columns, for images and the window."""
 
 from __future__ import annotations
 

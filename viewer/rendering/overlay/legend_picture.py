@@ -1,4 +1,4 @@
-"""Legends as pixels, for pictures without a window; Pillow is imported on first use."""
+"""Legends as pixels, for images without a window; Pillow is imported on first use."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ __all__ = ["legend_pixels"]
 _SIZES = 9, 40  # height of letters, pixels: smallest and largest
 _LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 56.0
 _SMALLER = 0.6  # factor to which the text height of many items may shrink
-_MOST = 0.9  # maximum fraction of the picture's width and height
-# Fractions of the picture's width for several columns. Figures are in the middle, so the text
+_MOST = 0.9  # maximum fraction of the image's width and height
+# Fractions of the image's width for several columns. Figures are in the middle, so the text
 # shrinks before the columns use more than the first fraction.
 _WIDE, _WIDER = 0.3, 0.45
 _LONGEST = 40  # characters of a name
@@ -31,7 +31,7 @@ _PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 19
 
 
 def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
-    """Return a legend's pixels, sized for a picture.
+    """Return a legend's pixels, sized for an image.
 
     Many named items are set in several columns, then in smaller text, then in wider columns; those
     that still do not fit are counted.
@@ -41,7 +41,7 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
     legend : Legend
         The legend.
     size : (int, int)
-        Width and height of the picture that contains the legend, pixels.
+        Width and height of the image that contains the legend, pixels.
 
     Returns
     -------
@@ -82,7 +82,7 @@ class _Drawing:
         self.columns = legend_columns(widths, rows, fraction * size[0] - 2 * self.gap)
 
     def pixels(self) -> Bytes | None:
-        """Return the pixels if they fit into nine tenths of the picture."""
+        """Return the pixels if they fit into nine tenths of the image."""
         legend, gap = self.legend, self.gap
         width = max(
             self._width(legend.heading),

@@ -11,8 +11,8 @@ from viewer.rig.arrays import Bytes, Ints
 __all__ = ["Lettering", "shelves"]
 
 _RIM = 2  # width of the outline, pixels
-_WIDEST = 2048  # pixels; longer texts are truncated
-_MOST = 4000  # cached texts
+_WIDEST = 2048  # pixels; longer strings are truncated
+_MOST = 4000  # maximum number of cached strings
 _DARK = 205  # opacity of the rim, of 255
 
 
@@ -73,7 +73,7 @@ def shelves(sizes: Ints, width: int, tallest: int) -> Ints:
     sizes : (N, 2)
         Widths, at most ``width``, and heights, pixels.
     width, tallest : int
-        Size of the picture; rectangles that do not fit are omitted.
+        Size of the image; rectangles that do not fit are omitted.
     """
     corners: list[tuple[int, int]] = []
     x = y = 0

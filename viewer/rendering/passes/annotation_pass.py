@@ -1,4 +1,4 @@
-"""Pass that draws annotations: marks of findings, X-ray joints, explanations of vertices."""
+"""Pass that draws annotations: markers of findings, X-ray joints, vertex callouts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class AnnotationPass:
         view : View
             The camera's matrices.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
 
         Raises
         ------
@@ -59,17 +59,17 @@ class AnnotationPass:
         Parameters
         ----------
         annotations : sequence of Annotation
-            All annotations of the picture.
+            All annotations of the image.
         view : View
             The camera's matrices.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
 
         Returns
         -------
         list of (int, int)
             For each annotation, the number of labels omitted for lack of room next to their points,
-            and the number of labels within the picture.
+            and the number of labels within the image.
 
         Raises
         ------

@@ -1,6 +1,6 @@
 """Soft contact shadows: a blurred field of the heights of figures above the ground.
 
-They need no light: they stand for the ambient light that figures keep from the ground below them.
+They need no light: they represent the ambient light that figures block from the ground below them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Contact:
     Attributes
     ----------
     texture : moderngl.Texture
-        Red is darkness by contact, green by what is farther above, 0 to 1.
+        Red is darkness by contact, green by occluders farther above, 0 to 1.
     low, high : (2,)
         Its corners on the ground, along the ground's axes.
     """
@@ -86,11 +86,11 @@ class ContactPass:
         spheres : (N, 4)
             Bounds of the figures: centres and radii, scene space.
         size : float
-            Of a figure, scene units: gives the softness.
+            Size of a figure, scene units: determines the softness.
         axes : (3, 3)
             The ground's two axes and the up axis as rows.
         height : float
-            Of the ground, scene units.
+            Height of the ground, scene units.
         """
         centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
         near = (centers - radii)[:, 2] < height + _FAR * size
@@ -99,7 +99,7 @@ class ContactPass:
         margin = 3.0 * _WIDE * size
         low = (centers - radii)[near, :2].min(axis=0) - margin
         high = (centers + radii)[near, :2].max(axis=0) + margin
-        # Seen from below, right is the first axis and up the second one turned round.
+        # Seen from below, right is the first axis and up the second one reversed.
         below = np.stack([axes[0], -axes[1], -axes[2]])
         bottom, top = height - _BELOW * size, height + _FAR * size
         middle = np.array([0.5 * (low + high)[0], -0.5 * (low + high)[1], -0.5 * (bottom + top)])
@@ -118,7 +118,7 @@ class ContactPass:
         draw(view, "depth")
 
     def _blur(self, scale: Floats) -> None:
-        """Turn depths into darkness and blur it; ``scale`` is a figure's size in the field."""
+        """Convert depths to darkness and blur it; ``scale`` is a figure's size in the field."""
         self.context.enable_only(moderngl.NOTHING)
         values = {
             "u_field": 0,

@@ -74,7 +74,7 @@ class GroundPass:
         self._background: moderngl.VertexArray | None = None
 
     def draw_background(self, background: str) -> None:
-        """Fill the picture; "transparent" leaves it cleared."""
+        """Fill the image; "transparent" leaves it cleared."""
         if background == "transparent":
             return
         program = self.programs.drawing("background")
@@ -95,7 +95,7 @@ class GroundPass:
         box : (2, 3)
             Bounds of the objects on the ground, scene space; they define height, step and extent.
         background : str
-            Background of the picture; lines are light on a dark one.
+            Background of the image; lines are light on a dark one.
         """
         program = self.programs.drawing("ground")
         step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)

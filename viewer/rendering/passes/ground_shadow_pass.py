@@ -16,7 +16,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["GroundShadowPass"]
 
-_OPACITY = 0.42  # of the key light's shadow
+_OPACITY = 0.42  # opacity of the key light's shadow
 _CONTACT_OPACITIES = 0.55, 0.38
 _GRAZING = 0.06, 0.22  # sine of the light's height at which its shadow begins, and is full
 _FIELD_UNIT = 0
@@ -50,7 +50,7 @@ class GroundShadowPass:
         up : (3,)
             The up axis.
         height : float
-            Of the ground along it.
+            Height of the ground along that axis.
         """
         back = np.linalg.inv(shadow.matrix)
         away = back[:3, 2]

@@ -23,9 +23,9 @@ FEWEST = 8
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
-    Posed buffers are used instead for small groups, since a moving camera needs no skinning then,
-    for translucent actors, and if meshes are drawn several times, in binding space or with a
-    scalar quantity.
+    Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
+    translucent actors, and meshes that are drawn several times per frame, in the bind pose or
+    coloured by a scalar.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def draw_instances(
     instances : InstanceBuffers
         Updated buffers.
     actors : sequence of Actor
-        The same actors in the same order.
+        The actors that the buffers were updated with, in that order.
     view : View
         The camera's matrices.
     options : DisplayOptions
@@ -102,7 +102,7 @@ def draw_instance_shapes(
     options: DisplayOptions,
     fragment: str,
 ) -> None:
-    """Draw the surfaces of such actors with a fragment shader that needs no material."""
+    """Draw instanced surfaces with a fragment shader that needs no material."""
     program = programs.drawing(
         "instance", fragment=fragment, skin=instances.method, affine=instances.is_affine
     )

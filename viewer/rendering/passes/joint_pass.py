@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
-_CUBE_SIZE = 0.015  # of the skeleton's size, for a skeleton without boxes
+_CUBE_SIZE = 0.015  # fraction of the skeleton's size, for a skeleton without boxes
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
 

@@ -1,4 +1,4 @@
-"""Pass that draws labels over a picture from one texture of rasterised text."""
+"""Pass that draws labels over an image from one texture of rasterised text."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ class LabelPass:
         texts : sequence of N str
             The texts; those that do not fit into the texture are omitted.
         corners : (N, 2)
-            Top left corners, pixels from the picture's left and upper edge.
+            Top left corners, pixels from the image's left and upper edge.
         colors : (N, 3)
             Colours of the text, sRGB, 0 to 1.
         lettering : Lettering
             The font.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         """
         if not texts:
             return

@@ -189,7 +189,7 @@ class LatePasses:
         return outlines
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
-        """Return the sum of passes of a picture of this size."""
+        """Return the sum of passes of an image of this size."""
         from viewer.rendering.gpu.accumulation import Accumulation
 
         if self._sum is None or self._sum.size != size:

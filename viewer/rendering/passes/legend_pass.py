@@ -1,4 +1,4 @@
-"""Pass that draws the legend of a scalar quantity into the corner of a picture."""
+"""Pass that draws the legend of a scalar quantity into the corner of an image."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rendering.overlay.legend import Legend
 
 __all__ = ["LegendPass"]
 
-_MARGIN = 0.014  # of the picture's height
+_MARGIN = 0.014  # fraction of the image height
 
 
 class LegendPass:
@@ -40,7 +40,7 @@ class LegendPass:
         legend : Legend
             The legend; its texture is cached until a different one is drawn.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
 
         Returns
         -------

@@ -149,7 +149,7 @@ class MotionPathPass:
         view : View
             The camera's matrices.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         at : Moment
             The drawn part of the paths.
         """

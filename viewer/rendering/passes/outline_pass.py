@@ -71,6 +71,7 @@ class OutlinePass:
         view: View,
         options: DisplayOptions,
         target: Target,
+        is_layer: bool = False,
     ) -> None:
         """Draw outlines into a target; its framebuffer is bound afterwards.
 
@@ -86,13 +87,15 @@ class OutlinePass:
             What is shown.
         target : Target
             The picture.
+        is_layer : bool
+            Replace its colours where there are lines, with straight instead of premultiplied alpha.
 
         Raises
         ------
         RenderError
             If the driver has no room for the masks.
         """
-        self._make(target)
+        self._make(target.size, options.samples)
         assert self._mask is not None  # made above
         mask = self._mask
         mask.framebuffer.use()
@@ -107,21 +110,21 @@ class OutlinePass:
             covered = mask.resolve()
             covered.build_mipmaps(max_level=_LEVEL)
             covered.use(0)
-            self._compose(target)
+            self._compose(target, is_layer)
 
-    def _make(self, target: Target) -> None:
+    def _make(self, size: tuple[int, int], samples: int) -> None:
         """Create masks of the picture's size."""
         mask = self._mask
-        if mask is not None and (mask.size, mask.samples) == (target.size, target.samples):
+        if mask is not None and (mask.size, mask.asked_samples) == (size, samples):
             return
         self._free()
-        self._mask = Target(self.context, target.size, target.samples)
+        self._mask = Target(self.context, size, samples)
         self._mask.texture.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)
-        texture = self.context.texture(target.size, 2, dtype="f2")
+        texture = self.context.texture(size, 2, dtype="f2")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._distance = [texture, self.context.framebuffer([texture])]
 
-    def _compose(self, target: Target) -> None:
+    def _compose(self, target: Target, is_layer: bool) -> None:
         """Find distances from the resolved mask, and draw the lines, in tiles with an edge."""
         size, scale = target.size, picture_scale(target.size)
         reach = min(int(np.ceil(scale * _WIDTH)) + 2, _MOST)
@@ -135,14 +138,21 @@ class OutlinePass:
         edges = {"u_mask": 0, "u_reach": reach, "u_level": level}
         set_uniforms(self._spread, edges)
         self._arrays[0].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=tiles)
-        self.context.enable(moderngl.BLEND)
         target.framebuffer.use()
         self.context.viewport = (0, 0, *size)
+        if not is_layer:
+            self.context.enable(moderngl.BLEND)
         texture.use(1)
         colors = np.array(_COLORS, dtype="f4").tobytes()
-        values = {"u_distance": 1, "u_width": scale * _WIDTH, "u_colors": colors}
+        values = {
+            "u_distance": 1,
+            "u_width": scale * _WIDTH,
+            "u_colors": colors,
+            "u_straight": is_layer,
+        }
         set_uniforms(self._line, {**edges, **values})
         self._arrays[1].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=tiles)
+        self.context.enable(moderngl.BLEND)
 
     def _cover(
         self,

@@ -1,4 +1,4 @@
-"""The key light's shadow map, fitted to what casts shadows."""
+"""The key light's shadow map, fitted to the shadow casters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["ShadowPass", "light_view", "map_side", "parallel_view"]
 
 _SIDES = 256, 2048  # texels on each side of a shadow map
 _MARGIN = FILTER_RADIUS + 2.0  # texels without shadow around all casters
-_STEP = 2.0**0.25  # of the map's extent: moving figures don't change its resolution each frame
+_STEP = 2.0**0.25  # factor on the map's extent, so that moving figures keep its resolution
 _TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1.0]])
 
 
@@ -56,13 +56,13 @@ class ShadowPass:
         Parameters
         ----------
         draw : callable
-            Draws what casts shadows, with a view and a fragment shader.
+            Draws the shadow casters, with a view and a fragment shader.
         spheres : (N, 4)
-            Bounds of all that: centres and radii, scene space; at least one.
+            Bounds of the casters: centres and radii, scene space; at least one.
         direction : (3,)
             Towards the light, unit length, scene space.
         strength : float
-            0 to 1: fraction of the light that a shadow takes away.
+            0 to 1: fraction of the light that a shadow removes.
         """
         view, extent = light_view(spheres, direction, self.side)
         self._framebuffer.use()
@@ -130,7 +130,7 @@ def parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
     axes : (3, 3)
         Right, up and backward as rows, scene space.
     middle : (3,)
-        Of the box, along these axes.
+        Centre of the box, along these axes.
     halves : (3,)
         Half its sides.
     """

@@ -91,7 +91,7 @@ class PosedMesh:
         Parameters
         ----------
         pose : Pose or None
-            None leaves the mesh in its binding space.
+            None leaves the mesh in its bind pose.
         skinning : Skinning or str
             Skinning settings, or just a key of ``viewer.rig.skinning.METHODS``.
         """

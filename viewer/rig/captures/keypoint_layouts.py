@@ -120,7 +120,7 @@ TITLES: dict[int, tuple[str, ...]] = {
 }
 """Layouts by their number of keypoints; the first is the default for its number."""
 
-# Keypoints that SMPLify-X and EasyMocap fit to a joint of another name.
+# Keypoints that SMPLify-X and EasyMocap fit to a joint with a different name.
 _SAME = {"mid_hip": "pelvis"}
 _ALIKE = (
     "neck left_shoulder left_elbow left_wrist left_hip left_knee left_ankle right_shoulder "

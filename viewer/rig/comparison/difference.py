@@ -61,7 +61,7 @@ class Difference:
     mismatches : tuple of Diagnostic
         Items that only one figure has, such as joints or frames; no tolerance applies to them.
     notes : tuple of Diagnostic
-        Remarks on the method of comparison.
+        Notes on the method of comparison.
     size : float
         Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
     unit : str

@@ -18,7 +18,7 @@ _KEYS = {
     "DOF": ("D001.dofs", "D002.dofs-by-index"),
     "point": ("D001.points", "D002.points-by-index"),
 }
-"""Messages about each kind of item: names without a partner, and no name in common."""
+"""Messages about each kind of item: unmatched names, and no names in common."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class Pairs:
     names : tuple of N str
         Names in the first list.
     mismatches, notes : tuple of Diagnostic
-        Names without a partner; remarks on partners that were not matched by name.
+        Unmatched names; notes on items that were not matched by name.
     """
 
     first: Ints
@@ -53,7 +53,7 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     Returns
     -------
     Pairs
-        With a mismatch for joints without a partner, and for partners with different parents; a
+        With a mismatch for unmatched joints, and for matched joints with different parents; a
         note if their order differs, as skins and clips refer to joints by index.
     """
     pairs = pair_names(_unique_labels(first), _unique_labels(second), "joint")

@@ -41,7 +41,7 @@ class Steps:
     first_frame : int
         Number of the first frame.
     mismatches, notes : tuple of Diagnostic
-        DOFs or motions that only one has; remarks on the choice of steps.
+        DOFs or motions that only one has; notes on the choice of steps.
     own : (Pose or None, Pose or None)
         Initial poses of figures without motion.
     """
@@ -176,7 +176,7 @@ def _random_dofs(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> 
     free = np.where(is_rotation, _FREE, reach)
     low = np.maximum(limits[:, :, 0].max(axis=0), -free)
     high = np.minimum(limits[:, :, 1].min(axis=0), free)
-    # If the limits lie entirely outside the default range, the range shrinks to their closer end.
+    # If the limits lie entirely outside the default range, it shrinks to their closer end.
     low, high = np.minimum(low, limits[:, :, 1].min(axis=0)), np.maximum(high, low)
     fractions = np.random.default_rng(0).random((count, len(rows)))
     return np.clip(low + fractions * (high - low), limits[0, :, 0], limits[0, :, 1])

@@ -24,14 +24,14 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     first, second : Skin
         Influences of the same V vertices.
     pairs : Pairs
-        Matched joints; weights of joints without a partner count in full.
+        Matched joints; weights of unmatched joints count in full.
 
     Returns
     -------
     (V,)
         0 for equal rows, regardless of the order of influences and of duplicate joints.
     """
-    # Joints of the second without a partner get indices that the first does not use.
+    # Unmatched joints of the second get indices that the first does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
     return row_norms(

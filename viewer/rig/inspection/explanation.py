@@ -70,7 +70,7 @@ class Explanation:
     skinning : Skinning
         Skinning options.
     stored : (3,)
-        Position in the file, binding space.
+        Position in the file, bind pose.
     shaped : (3,)
         After the figure's blend shapes.
     rest : (3,)
@@ -82,7 +82,7 @@ class Explanation:
     weights : (K,)
         w_i, after pruning and normalising if enabled.
     matrices : (K, 4, 4)
-        M_i: skinning matrices, binding space to figure space.
+        M_i: skinning matrices, bind pose to figure space.
     images : (K, 3)
         M_i p: the vertex transformed by each joint alone.
     terms : (K, 3)

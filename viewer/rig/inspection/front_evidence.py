@@ -69,7 +69,7 @@ def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -
 def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     """Return evidence from the ends of an animal: heads are ahead of its centre, tails behind.
 
-    A head above the centre, as in people, is no evidence.
+    A head directly above the centre, as in people, gives no evidence.
     """
     words = [word for _, word in sided_words(names)]
     heads = [j for j, word in enumerate(words) if word.startswith("head")]
@@ -140,7 +140,7 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
         return np.zeros(3)
     way = positions[soles].mean(axis=0) - positions[ankles].mean(axis=0)
     way[planes[0]] = 0.0
-    # Soles that extend ahead of the ankles by 2 % of the height or more are full evidence.
+    # Soles that extend ahead of the ankles by 2 % of the height or more count as full evidence.
     way = _horizontal(way, up) / (2.0 * _LEAST * tall)
     return way / max(float(np.linalg.norm(way)), 1.0)
 

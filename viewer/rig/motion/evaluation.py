@@ -178,7 +178,7 @@ def frames_of(
     """
     skeleton = figure.skeleton
     if skeleton is None:
-        raise RigError(f"figure {figure.name} has no skeleton to move")
+        raise RigError(f"figure {figure.name} has no skeleton to animate")
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     pose = figure_pose(figure) if base is None else base
     if isinstance(motion, Clip):

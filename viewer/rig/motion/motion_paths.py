@@ -66,7 +66,7 @@ def motion_path(
     figure : Figure
         With a skeleton, or made of points for a ``PointClip``.
     motion : Motion
-        Of that figure.
+        Motion of that figure.
     joints : sequence of N int
         Joints, or points of a ``PointClip``.
     times : (F,), optional
@@ -79,7 +79,7 @@ def motion_path(
     Raises
     ------
     RigError
-        If the motion does not fit the figure.
+        If the motion does not match the figure.
     """
     times = path_times(motion) if times is None else np.asarray(times, dtype=np.float64)
     chosen: Ints = np.asarray(joints, dtype=np.int32)
@@ -117,7 +117,7 @@ def segments(path: MotionPath) -> tuple[Floats, Floats, Ints]:
     points : (S, 2, 3)
         Both ends, figure space.
     times : (S, 2)
-        Of both ends.
+        Times of both ends.
     which : (S,) int32
         Index of the path, 0 to N - 1.
     """

@@ -189,7 +189,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     figure : Figure
         With a mesh.
     pose : Pose or None
-        None for the mesh in its binding space.
+        None for the mesh in the bind pose.
     skinning : Skinning
         How the mesh is drawn.
 

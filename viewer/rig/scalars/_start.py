@@ -35,7 +35,7 @@ def informative_field(figure: Figure) -> str:
 def informative_quantity(key: str, figures: Iterable[Figure]) -> str:
     """Return the name of a quantity with the first joint or field that is not 0 everywhere.
 
-    The key of a quantity without joint or field is its name already.
+    For quantities without a joint or field, the key is already the name.
     """
     for figure in figures:
         if key == "weight" and (joint := most_influential(figure)) >= 0:

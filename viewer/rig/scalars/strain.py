@@ -84,7 +84,7 @@ def _edge_changes(asked: Asked) -> tuple[Ints, Floats]:
 
 
 def _rest_and_posed(asked: Asked) -> tuple[Floats, Floats]:
-    """Return the vertices in binding space, and as posed in a figure of scale 1."""
+    """Return the vertices in the bind pose, and as posed in a figure of scale 1."""
     assert asked.pose is not None  # required by the quantity
     rest = shaped(asked.figure, asked.pose.shape_weights).require_mesh()
     pose = replace(asked.pose, figure_scale=1.0)

@@ -114,7 +114,7 @@ def deform(
     Parameters
     ----------
     figure : Figure
-        With a mesh. Without skeleton or skin the mesh is returned in its binding space.
+        With a mesh. Without skeleton or skin the mesh is returned in the bind pose.
     pose : Pose, optional
         DOFs in lengths and radians; the file's own pose if omitted.
     method : str or Skinning
@@ -174,7 +174,7 @@ def skinned(
     skin : Skin
         As stored.
     rest : (N, 3)
-        Vertices in binding space, with pose correctives.
+        Vertices in the bind pose, with pose correctives.
     palette : (J, 4, 4)
         Skinning matrices.
     skinning : Skinning
