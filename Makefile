@@ -2,7 +2,8 @@
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
 #   make quick  run those that neither draw nor start programs, in about a minute
-# Others: make lint, make bench, make golden [NAME...], make manual, make figure, make clean.
+# Others: make lint, make bench, make golden [NAME...], make manual, make gallery,
+# make figure, make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -21,7 +22,7 @@ PICTURES := $(wordlist 2,$(words $(MAKECMDGOALS)),$(MAKECMDGOALS))
 $(PICTURES): ; @:
 endif
 
-.PHONY: run test quick lint bench golden manual figure system clean
+.PHONY: run test quick lint bench golden manual gallery figure system clean
 
 # A window may open even where pictures cannot be drawn without one: go on either way.
 run: $(READY)

@@ -81,6 +81,7 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "media/cell_labels.py",
         "media/image.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",

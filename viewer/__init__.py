@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from viewer.rig.mesh import Mesh
     from viewer.rig.motion.clip import Channel, Clip
     from viewer.rig.motion.clip_sampling import evaluate, sample
+    from viewer.rig.motion.onion import onion
     from viewer.rig.pose import Pose, rest_pose
     from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
     from viewer.rig.retargeting.mirror import mirror_pose
@@ -68,6 +69,7 @@ __all__ = [
     "joint_matrices",
     "load",
     "mirror_pose",
+    "onion",
     "record_of",
     "render",
     "rest_pose",
@@ -106,6 +108,7 @@ _HOMES = {
     "joint_matrices": "rig.skinning",
     "load": "loading",
     "mirror_pose": "rig.retargeting.mirror",
+    "onion": "rig.motion.onion",
     "record_of": "rig.posing.pose_record",
     "render": "rendering.offscreen",
     "rest_pose": "rig.pose",

@@ -1,4 +1,4 @@
-"""Numbered images and contact sheets; digits without a font."""
+"""Numbered images and contact sheets."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from viewer.errors import OutputError, ViewerError
-from viewer.media.digits import digits, write_number
+from viewer.media.cell_labels import write_label
 from viewer.media.picture_sinks import PictureSink, SheetSink, sheet_layout
 
 
@@ -15,45 +15,26 @@ def plain(color, size=(40, 30)):
     return np.full((size[1], size[0], 4), color, dtype=np.uint8)
 
 
-def test_digits_are_distinct_and_look_like_digits():
-    glyphs = [digits(number) for number in range(10)]
-    assert all(glyph.shape == (7, 5) for glyph in glyphs)
-    assert len({glyph.tobytes() for glyph in glyphs}) == 10
-    shown = [["".join(" #"[int(dot)] for dot in row) for row in glyph] for glyph in glyphs]
-    one, seven, eight = shown[1], shown[7], shown[8]
-    assert one[0] == "  #  " and one[-1] == " ### "
-    assert seven[0] == "#####" and seven[-1].count("#") == 1
-    assert eight == eight[::-1]
+def test_label_is_white_on_a_dark_tag_in_the_lower_left_corner():
+    pixels = plain((200, 200, 200, 255), (60, 40))
+    write_label(pixels, "17")
+    # Letters of 9 pixels with a margin of 3; 62 % of the tag's grey of 16 covers the picture.
+    assert pixels[-1, 0].tolist() == [86, 86, 86, 255] == pixels[-15, 0].tolist()
+    assert pixels[-16, 0].tolist() == [200, 200, 200, 255]
+    assert pixels[-12:-3, 3:16, 0].max() > 220
+    assert (pixels[:, 30:] == 200).reshape(-1, 4)[:, :3].all()
 
 
-def test_frame_number_is_drawn_digit_by_digit():
-    number = digits(407)
-    assert number.shape == (7, 17)
-    for place, digit in enumerate((4, 0, 7)):
-        assert (number[:, 6 * place : 6 * place + 5] == digits(digit)).all()
-    assert not number[:, [5, 11]].any()
-
-
-def test_frame_number_is_white_in_the_lower_left_corner():
-    pixels = plain((100, 100, 100, 255), (60, 40))
-    write_number(pixels, 1)
-    # One pixel per dot and a margin of two: 9 x 11 pixels, 45 % of the gray shows through.
-    assert pixels[-11, 0].tolist() == [45, 45, 45, 255]
-    assert pixels[-12, 0].tolist() == [100, 100, 100, 255] == pixels[-1, 9].tolist()
-    ink = (pixels[-9:-2, 2:7, 0] == 255).tolist()
-    assert ink == digits(1).tolist()
-
-
-def test_frame_number_is_visible_on_transparent_images():
+def test_label_is_visible_on_transparent_images():
     pixels = plain((0, 0, 0, 0), (60, 40))
-    write_number(pixels, 1)
-    assert pixels[-1, 0].tolist() == [0, 0, 0, 140]  # 55 % of 255
-    assert pixels[-9, 4].tolist() == [255, 255, 255, 255]
+    write_label(pixels, "1")
+    assert pixels[-1, 0].tolist() == [16, 16, 16, 158]  # 62 % of 255
+    assert pixels[-12:-3, :, 3].max() > 220
 
 
-def test_frame_number_that_does_not_fit_is_left_out():
+def test_label_that_does_not_fit_is_left_out():
     pixels = plain((9, 9, 9, 255), (12, 10))
-    write_number(pixels, 123456)
+    write_label(pixels, "123456")
     assert (pixels == plain((9, 9, 9, 255), (12, 10))).all()
 
 
@@ -100,21 +81,37 @@ def test_sheet_layout_fills_the_image(size, count, wanted):
 
 def test_sheet_shows_every_frame_in_its_cell(tmp_path):
     path = tmp_path / "sheet.png"
-    sink = SheetSink(path, (121, 92), [0, 7, 14])
-    assert (sink.columns, sink.rows, sink.cell, sink.size) == (2, 2, (60, 46), (120, 92))
+    sink = SheetSink(path, (122, 93), [0, 7, 14])
+    # A gutter of one pixel between two cells of 60 x 46.
+    assert (sink.columns, sink.rows, sink.cell, sink.size) == (2, 2, (60, 46), (121, 93))
     colors = [(200, 0, 0, 255), (0, 200, 0, 255), (0, 0, 200, 255)]
     for frame, color in enumerate(colors):
         sink.write(frame, plain(color, sink.cell))
     assert not path.exists()
     sink.close()
     sheet = np.array(Image.open(path).convert("RGBA"))
-    assert sheet.shape == (92, 120, 4) and sink.n_bytes == path.stat().st_size
-    cells = sheet[:46, :60], sheet[:46, 60:], sheet[46:, :60]
+    assert sheet.shape == (93, 121, 4) and sink.n_bytes == path.stat().st_size
+    cells = sheet[:46, :60], sheet[:46, 61:], sheet[47:, :60]
     for frame, (cell, color) in enumerate(zip(cells, colors, strict=True)):
         expected = plain(color, sink.cell)
-        write_number(expected, (0, 7, 14)[frame])
+        write_label(expected, str((0, 7, 14)[frame]))
         assert (cell == expected).all()
-    assert (sheet[46:, 60:] == colors[0]).all()  # empty: the first frame's background
+    assert (sheet[46] == 255).all() and (sheet[:, 60] == 255).all()
+    assert (sheet[47:, 61:] == 255).all()  # no frame
+
+
+def test_gutters_of_transparent_frames_are_transparent(tmp_path):
+    sink = SheetSink(tmp_path / "sheet.png", (122, 93), [0, 1])
+    for frame in range(2):
+        sink.write(frame, plain((0, 0, 0, 0), sink.cell))
+    sink.close()
+    sheet = np.array(Image.open(tmp_path / "sheet.png").convert("RGBA"))
+    assert not sheet[:, sink.cell[0] : sink.cell[0] + sink.gutter].any()
+
+
+def test_cells_have_the_aspect_of_what_they_show():
+    assert sheet_layout((900, 300), 8, 0.4) == (8, 1)
+    assert sheet_layout((900, 600), 8, 4.0) == (2, 4)
 
 
 def test_aborted_sheet_leaves_no_file(tmp_path):
@@ -128,5 +125,5 @@ def test_cells_that_are_too_small_are_refused(tmp_path):
     with pytest.raises(ViewerError) as caught:
         SheetSink(tmp_path / "sheet.png", (64, 48), range(100))
     assert str(caught.value) == (
-        "contact sheet: 100 frames in 64 x 48 pixels are 6 x 4 each, which is too small"
+        "contact sheet: 100 frames in 64 x 48 pixels are 5 x 3 each, which is too small"
     )

@@ -52,8 +52,9 @@ class PictureKeys:
             self._options = copy.deepcopy(options)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        # Motion paths show a window of the motion around the current time.
-        time = state.scene.time if options.path_joints else None
+        # Motion paths show a window of the motion around the current time, cameras its image.
+        shows_images = camera.fixed is not None or options.cameras
+        time = state.scene.time if options.path_joints or shows_images else None
         actors = self._actors(state.scene.actors)
         selected = (state.chosen_actor, state.selected_joint)
         drawn_over = marks, ghost, *annotations
@@ -70,7 +71,8 @@ class PictureKeys:
                 self._places.append(NumberKey(*arrays))
             else:
                 self._places[row] = self._places[row].updated(*arrays)
-            look = (actor, actor.figure, actor.is_drawn, actor.color, actor.clip, actor.offset)
+            look = (actor, actor.figure, actor.is_drawn, actor.color, actor.opacity)
+            motion = actor.clip, actor.offset
             pose = None if actor.pose is None else pose_key(actor.pose)
-            found.append((look, self._places[row], pose))
+            found.append((look, motion, self._places[row], pose))
         return tuple(found)

@@ -87,6 +87,12 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         help="layout of captured keypoints, if their number is ambiguous",
     )
     group.add_argument(
+        "--images",
+        metavar="FOLDER",
+        help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, beside "
+        "the capture)",
+    )
+    group.add_argument(
         "--legacy-expression",
         action="store_true",
         help="apply expressions to SMPL-X columns 10 to 19, as EasyMocap does",
@@ -113,6 +119,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         layout=arguments.layout or "",
         legacy_expression=arguments.legacy_expression,
         drives=not arguments.beside,
+        images=None if arguments.images is None else Path(arguments.images),
     )
 
 

@@ -12,6 +12,7 @@ from viewer.errors import ViewerError
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
+from viewer.rendering.camera_notes import image_notes, lens_notes
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import (
     BACKGROUNDS,
@@ -22,7 +23,6 @@ from viewer.rendering.options import (
     DisplayOptions,
 )
 from viewer.rendering.passes.ground_pass import parse_color
-from viewer.rendering.pinhole import distortion_error
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
@@ -41,8 +41,8 @@ _SWITCHES = (
     ("xray", "draw bones visible through the skin"),
     ("joint-names", "label joints, where labels do not overlap"),
     ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
+    ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
 )
-_VISIBLE = 0.5  # pixels of the camera's own pictures: smaller errors are invisible
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
@@ -236,24 +236,27 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         xray=arguments.xray,
         joint_names=arguments.joint_names,
         joint_axes=arguments.joint_axes,
+        cameras=arguments.cameras,
     )
     set_scalar(arguments, options)
     return options
 
 
-def lens_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
-    """Return a message about a calibrated camera's visible lens distortion, which is not drawn.
+def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> list[str]:
+    """Return messages about calibrated cameras: their images, and lens distortion.
 
     Raises ViewerError if there is no such camera, or its files lack the size of its images.
     """
-    if arguments.view is None:
-        return []
-    view = _find_view(scene, arguments.view)
-    error = distortion_error(view)
-    if error < _VISIBLE:
-        return []
-    name = printable(view.name, 40)
-    return [f"camera {name}: its lens distortion of up to {error:.1f} pixels is not drawn"]
+    seen = None if arguments.view is None else _find_view(scene, arguments.view)
+    drawn = scene.views if options.cameras else [view for view in [seen] if view is not None]
+    notes = [note for view in drawn for note in image_notes(scene, view)]
+    if seen is not None:
+        notes += lens_notes(scene, seen)
+    if options.cameras and not scene.views:
+        notes.append("--cameras: no file has calibrated cameras")
+    if arguments.images is not None and scene.images is None:
+        notes.append("--images: no file is a capture with calibrated cameras")
+    return notes
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:

@@ -16,13 +16,14 @@ from viewer.commands._scene import (
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
+from viewer.commands._sequence.shots import Request, shots_of
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
+    camera_notes,
     camera_of,
     display_of,
     hide_parts,
-    lens_notes,
     parse_size,
     warn_of_missing,
 )
@@ -32,6 +33,7 @@ from viewer.interrupts import deferred
 from viewer.media.video_kinds import VIDEOS
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera
+from viewer.rendering.camera_views import with_cameras
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
@@ -84,7 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
     if request is None or request.kind != "pictures":
         check_targets([output], inputs_of(arguments), arguments.force)
     options = display_of(arguments)
-    if arguments.quality is None and (request is not None or arguments.panels):
+    is_still = request is None or request.kind == "onion"
+    if arguments.quality is None and (not is_still or arguments.panels):
         options.quality = "normal"
     _check_device(arguments.gpu)
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
@@ -92,8 +95,10 @@ def run(arguments: argparse.Namespace) -> int:
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
     print_warnings(choose_subject(scene, options))
-    print_warnings(warn_of_missing(scene, options) + lens_notes(arguments, scene))
-    if request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
+    print_warnings(warn_of_missing(scene, options) + camera_notes(arguments, scene, options))
+    if request is not None and request.kind == "onion":
+        _draw_onion(request, arguments, scene, options, size)
+    elif request is not None and (request.is_certain or any(a.clip for a in scene.actors)):
         line = draw_sequence(request, arguments, scene, options, size)
         print(line, file=summary_stream(output))
     else:
@@ -117,8 +122,8 @@ def _draw_still(
     output = Path(arguments.output)
     check_targets([output], inputs_of(arguments, scene), arguments.force)
     points = scene_points(scene, options.show)
-    camera = camera_of(arguments, scene, points, size)
     box = bounding_box(points)
+    camera = camera_of(arguments, scene, with_cameras(scene, options, points), size)
     if arguments.panels:
         fits = arguments.distance is None and arguments.view is None
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
@@ -130,6 +135,32 @@ def _draw_still(
     colors = scalar_text(scene, options)
     line = f"{printable(output)}: {size[0]} x {size[1]}{grid}{colors}"
     print(line, file=summary_stream(output))
+
+
+def _draw_onion(
+    request: Request,
+    arguments: argparse.Namespace,
+    scene: Scene,
+    options: DisplayOptions,
+    size: tuple[int, int],
+) -> None:
+    """Draw poses of a motion in one picture."""
+    from viewer.formats import save_image
+    from viewer.rig.motion.onion import onion
+
+    shots = shots_of(request, arguments, scene)
+    check_targets([request.output], inputs_of(arguments, scene), arguments.force)
+    print_warnings(shots.notes)
+    poses = onion(scene, shots.times.tolist(), interpolate=arguments.interpolate_gaps)
+    points = scene_points(poses, options.show)
+    camera = camera_of(arguments, poses, with_cameras(poses, options, points), size)
+    is_chosen = arguments.quality is not None
+    box = bounding_box(points)
+    pixels = draw_scene(poses, size, camera, options, box, arguments.gpu, is_chosen)
+    save_image(request.output, pixels)
+    frames = ", ".join(map(str, shots.numbers))
+    line = f"{printable(request.output)}: {size[0]} x {size[1]}, poses of frames {frames}"
+    print(line, file=summary_stream(request.output))
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:

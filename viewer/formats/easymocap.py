@@ -6,6 +6,7 @@
     out/keypoints3d/000000.json   3D keypoints of the same frames
     out/smpl/01/000000.json       fits of single views: the first view is read
     intri.yml, extri.yml          cameras, in that folder or one of the two above it
+    images/01/000000.jpg          their images, the same
 
     frame    [person, …]  or  {"annots": [person, …], …}
     person   {"id": 0, "Rh": [[3]], "Th": [[3]], "poses": [[P]], "shapes": [[10]],
@@ -18,10 +19,13 @@ V = R(Rh) X(poses, shapes) + Th, rotated about the model's origin. The files hav
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._easymocap.cameras import find_cameras
 from viewer.formats._easymocap.files import find_frames
+from viewer.formats._easymocap.images import find_images
 from viewer.formats._easymocap.reading import Options, Reading
 from viewer.formats._source import Source
 from viewer.media.file_names import folder_name
@@ -60,6 +64,7 @@ def open_capture(
     up: str = "",
     legacy_expression: bool = False,
     layout: str = "",
+    images: Path | None = None,
 ) -> Capture:
     """Open a recording.
 
@@ -80,6 +85,8 @@ def open_capture(
     layout : str
         Layout of keypoints, see ``keypoint_layout``, to choose between layouts with the same
         number of points: ``"h36m"``, ``"panoptic"``.
+    images : Path, optional
+        Folder of the cameras' image folders; by default ``images`` beside the recording.
 
     Returns
     -------
@@ -90,7 +97,7 @@ def open_capture(
     Raises
     ------
     FormatError
-        If there are no frames, or no person in any of them.
+        If there are no frames, no person in any of them, or no camera in the given folder.
     """
     files = find_frames(source)
     options = Options(
@@ -100,7 +107,12 @@ def open_capture(
     if not any(part.bodies or part.points for part in looking.parts()):
         raise _refusal(source, len(files.frames), looking.first_fault)
     folder = files.folders[0].path.absolute()
-    views, notes = find_cameras([folder, *folder.parents][:_LEVELS], source.max_size)
+    parents = [folder, *folder.parents][:_LEVELS]
+    views, notes = find_cameras(parents, source.max_size)
+    frames = range(files.first_frame, files.first_frame + files.n_frames)
+    found = find_images(parents, views, frame_rate, frames, images)
+    if found is not None:
+        views = tuple(found.sized(view) for view in views)
     return Capture(
         options.name,
         files.n_frames,
@@ -110,6 +122,7 @@ def open_capture(
         views,
         looking.body_layout.model if looking.body_layout else "",
         tuple(notes),
+        found,
     )
 
 

@@ -95,7 +95,7 @@ def begin(
     _place_side_by_side(cast)
     found = (*contents.diagnostics, *cast.diagnostics)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
-    scene.files = contents.files
+    scene.files, scene.images = contents.files, cast.images
     if settings is not None and settings.model is not None:
         scene.files += (settings.model,)
     return scene, cast.builders

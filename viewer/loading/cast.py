@@ -11,6 +11,7 @@ from viewer.rig.scene import Actor, free_title
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.captures.camera_images import CameraImages
     from viewer.rig.captures.camera_view import CameraView
 
 __all__ = ["Cast"]
@@ -32,6 +33,8 @@ class Cast:
         Captures that are still being read.
     views : list of CameraView
         Calibrated cameras, in scene space.
+    images : CameraImages or None
+        Their images: those of the first capture that has some.
     diagnostics : list of Diagnostic
         Messages from assembling the scene.
     """
@@ -41,6 +44,7 @@ class Cast:
     placed: list[bool] = field(default_factory=list)
     builders: list[Builder] = field(default_factory=list)
     views: list[CameraView] = field(default_factory=list)
+    images: CameraImages | None = None
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:

@@ -178,6 +178,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             up=settings.up,
             legacy_expression=settings.legacy_expression,
             layout=settings.layout,
+            images=settings.images,
         )
     return read(source)
 

@@ -212,6 +212,7 @@ def _begin_capture(
     builder.place(up)
     to_capture = builder.placement[:3, :3].T
     cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
+    cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)

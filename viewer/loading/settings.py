@@ -33,6 +33,8 @@ class MotionSettings:
         Whether expressions drive SMPL-X columns 10 to 19, as in EasyMocap.
     drives : bool
         Whether a BVH drives a figure opened with it, instead of being shown beside it.
+    images : Path or None
+        Folder of the image folders of a capture's cameras; None for ``images`` beside it.
     """
 
     model: Path | None = None
@@ -43,3 +45,4 @@ class MotionSettings:
     layout: str = ""
     legacy_expression: bool = False
     drives: bool = True
+    images: Path | None = None

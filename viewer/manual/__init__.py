@@ -22,6 +22,7 @@ PAGES = {
     "window": "panels, tools and the mouse",
     "python": "the Python API",
     "formats": "what is read and written, and what each format keeps",
+    "gallery": "pictures of bundled data, and the commands that drew them",
     "troubleshooting": "installation, drawing, exit codes",
     "keys": "reference: keys and shortcuts",
     "codes": "reference: findings of lint",

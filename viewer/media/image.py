@@ -19,7 +19,7 @@ from viewer.rig.arrays import Bytes
 if TYPE_CHECKING:
     from PIL import Image
 
-__all__ = ["decode_picture", "encode_png", "is_picture", "save_image"]
+__all__ = ["decode_picture", "encode_png", "is_picture", "picture_dimensions", "save_image"]
 
 _MAX_PIXELS = 16384 * 16384
 _REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # raised by Pillow
@@ -65,6 +65,17 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
     except (*_REFUSALS, Image.DecompressionBombError) as problem:
         values = {"reason": str(problem)}
         raise FormatError(Diagnostic("F001.picture", path, values=values)) from None
+
+
+def picture_dimensions(path: Path) -> tuple[int, int] | None:
+    """Return the width and height of a picture, without decoding it; None if it is unreadable."""
+    from PIL import Image
+
+    try:
+        with Image.open(path, formats=_FORMATS) as picture:
+            return picture.size
+    except (*_REFUSALS, Image.DecompressionBombError):
+        return None
 
 
 def _open(data: bytes) -> Image.Image:

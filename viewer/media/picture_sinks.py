@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.errors import ViewerError
-from viewer.media.digits import write_number
+from viewer.media.cell_labels import write_label
 from viewer.media.image import save_image
 from viewer.rig.arrays import Bytes
 
@@ -19,6 +19,8 @@ __all__ = ["PictureSink", "SheetSink", "sheet_layout"]
 _MOST_WORKERS = 4  # images that are compressed at the same time
 _SMALLEST_CELL = 16  # pixels
 _CELL_ASPECT = 4.0 / 3.0
+_GUTTER = 0.006  # between cells, relative to the picture's shorter side
+_WHITE = (255, 255, 255, 255)
 
 
 class PictureSink:
@@ -71,7 +73,9 @@ class PictureSink:
 
 
 class SheetSink:
-    """Writes one image of all frames, row by row, with a number in each cell.
+    """Writes one image of all frames, row by row, with gutters and a number in each cell.
+
+    Gutters and unused cells are white, or transparent if the frames are.
 
     Parameters
     ----------
@@ -80,12 +84,16 @@ class SheetSink:
     size : (int, int)
         Largest width and height of the image, in pixels.
     numbers : sequence of int
-        Number of each frame, drawn into its cell.
+        Number of each frame, written into its cell.
+    aspect : float
+        Preferred width / height of a cell: that of what the frames show.
 
     Attributes
     ----------
     columns, rows : int
         Number of cells across and down.
+    gutter : int
+        Pixels between cells; none around them.
     cell : (int, int)
         Width and height of a cell: the size of the frames.
     size : (int, int)
@@ -101,11 +109,18 @@ class SheetSink:
 
     n_samples = 0
 
-    def __init__(self, path: Path, size: tuple[int, int], numbers: Sequence[int]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        size: tuple[int, int],
+        numbers: Sequence[int],
+        aspect: float = _CELL_ASPECT,
+    ) -> None:
         self.path, self.numbers, self.workers, self.n_bytes = path, numbers, 1, 0
-        self.columns, self.rows = sheet_layout(size, len(numbers))
-        self.cell = size[0] // self.columns, size[1] // self.rows
-        self.size = self.columns * self.cell[0], self.rows * self.cell[1]
+        self.columns, self.rows = columns, rows = sheet_layout(size, len(numbers), aspect)
+        self.gutter = gap = max(round(_GUTTER * min(size)), 1)
+        self.cell = (size[0] + gap) // columns - gap, (size[1] + gap) // rows - gap
+        self.size = columns * (self.cell[0] + gap) - gap, rows * (self.cell[1] + gap) - gap
         if min(self.cell) < _SMALLEST_CELL:
             raise ViewerError(
                 f"contact sheet: {len(numbers)} frames in {size[0]} x {size[1]} pixels are "
@@ -119,14 +134,14 @@ class SheetSink:
     def write(self, frame: int, pixels: Bytes) -> None:
         """Put a frame into its cell; see ``viewer.rendering.recorder.Sink``."""
         if self._sheet is None:
-            # Unused cells have the colour of the background.
             self._sheet = np.empty((self.size[1], self.size[0], 4), dtype=np.uint8)
-            self._sheet[:] = pixels[0, 0]
+            self._sheet[:] = _WHITE if pixels[0, 0, 3] == 255 else 0
         row, column = divmod(frame, self.columns)
         width, height = self.cell
-        cell = self._sheet[row * height : (row + 1) * height, column * width : (column + 1) * width]
+        top, left = row * (height + self.gutter), column * (width + self.gutter)
+        cell = self._sheet[top : top + height, left : left + width]
         cell[:] = pixels
-        write_number(cell, self.numbers[frame])
+        write_label(cell, str(self.numbers[frame]))
 
     def close(self) -> None:
         """Write the image.
@@ -144,19 +159,21 @@ class SheetSink:
         self._sheet = None
 
 
-def sheet_layout(size: tuple[int, int], count: int) -> tuple[int, int]:
+def sheet_layout(
+    size: tuple[int, int], count: int, wanted: float = _CELL_ASPECT
+) -> tuple[int, int]:
     """Return the best number of columns and rows for a number of frames.
 
-    Cells with an aspect ratio near 4 : 3 are preferred, and few empty ones.
+    Cells with an aspect ratio near ``wanted`` are preferred, and few empty ones.
 
-    >>> sheet_layout((1280, 720), 12), sheet_layout((1280, 720), 1)
-    ((4, 3), (1, 1))
+    >>> sheet_layout((1280, 720), 12), sheet_layout((1280, 720), 12, 0.5)
+    ((4, 3), (6, 2))
     """
 
     def badness(columns: int) -> float:
         rows = math.ceil(count / columns)
         aspect = (size[0] / columns) / (size[1] / rows)
-        return abs(math.log(aspect / _CELL_ASPECT)) + (columns * rows - count) / count
+        return abs(math.log(aspect / wanted)) + (columns * rows - count) / count
 
     columns = min(range(1, count + 1), key=badness)
     return columns, math.ceil(count / columns)

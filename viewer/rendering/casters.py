@@ -37,6 +37,9 @@ class Casters:
         All actors of the scene.
     options : DisplayOptions
         Display options.
+    threshold : float
+        Actors of this opacity or less are omitted, 0 to 1. Averaged over passes with evenly
+        spread thresholds, a translucent actor casts a shadow as strong as itself.
     """
 
     programs: Programs
@@ -46,16 +49,21 @@ class Casters:
     meshes: Meshes
     actors: Sequence[Actor]
     options: DisplayOptions
+    threshold: float = 0.5
 
     def draw(self, view: View, fragment: str) -> None:
         """Draw everything solid with a fragment shader that needs no material."""
         options = self.options
         for actor, mesh in self.meshes.singles:
+            if actor.opacity <= self.threshold:
+                continue
             placement = placement_of(actor, options)
             self.mesh_pass.draw_shape(mesh, placement, view, options, fragment)
         for actors, instances in self.meshes.instanced:
             draw_instance_shapes(self.programs, instances, actors, view, options, fragment)
         for actor in self.actors:
+            if actor.opacity <= self.threshold:
+                continue
             # Over a skin, a skeleton is an overlay.
             if shows_skeleton(actor, options) and not shows_mesh(actor.figure, options):
                 skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)

@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.near_names import did_you_mean, name_hint
-from viewer.rendering.camera import Camera, fit
+from viewer.rendering.camera import Camera, camera_axes, fit
 from viewer.rendering.recorder import Follow, Recording, copied, pose_scene
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box
@@ -24,7 +24,9 @@ __all__ = [
     "follow_candidates",
     "frame_motion",
     "frames_looked_at",
+    "level_shifts",
     "outermost",
+    "seen_aspect",
 ]
 
 _MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # used for fitting
@@ -44,8 +46,7 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     Returns
     -------
     points : (N, 3)
-        The outermost points of these frames, scene space; relative to the followed actor if the
-        camera follows one.
+        The outermost points of these frames, scene space; relative to the camera if it moves.
     box : (2, 3)
         Bounds of all points in the scene: the recording's ``box``.
     """
@@ -62,10 +63,52 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
         if follow is not None:
             place = followed_point(scene.actors[follow.actor], follow.joint)
             shift = shift if place is None else place - follow.origin
+        elif recording.shifts is not None:
+            shift = recording.shifts[index]
         clouds.append(points - shift)
     if not clouds:
         return np.zeros((1, 3)), np.zeros((2, 3))
     return np.concatenate(clouds), bounding_box(np.concatenate(boxes))
+
+
+def level_shifts(recording: Recording) -> Floats:
+    """Return how far the actors have moved over the ground in each frame, scene units: (F, 3).
+
+    A camera with these shifts shows all frames at one scale and with one ground line.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its camera, box and shifts are not used.
+    """
+    scene = copied(recording.scene)
+    shifts = np.zeros((recording.n_frames, 3))
+    before: dict[int, Floats] = {}
+    for frame, seconds in enumerate(recording.times.tolist()):
+        pose_scene(scene, recording, seconds)
+        places = {i: followed_point(actor) for i, actor in enumerate(scene.actors)}
+        now = {i: place for i, place in places.items() if place is not None}
+        # Actors that enter or leave do not move the camera.
+        steps = [now[i] - before[i] for i in now if i in before]
+        shifts[frame] = shifts[max(frame - 1, 0)] + (np.mean(steps, axis=0) if steps else 0.0)
+        before |= now
+    shifts[:, 1 if scene.up == "y" else 2] = 0.0
+    return shifts
+
+
+def seen_aspect(camera: Camera, points: Floats) -> float:
+    """Return the width / height of points as a camera sees them from far away.
+
+    Parameters
+    ----------
+    camera : Camera
+        Only its direction is used.
+    points : (N, 3)
+        Scene space.
+    """
+    right, up, _ = camera_axes(camera)
+    wide, high = (float(np.ptp(points @ axis)) for axis in (right, up))
+    return wide / high if wide > 0.0 and high > 0.0 else 1.0
 
 
 def _looked_at(recording: Recording) -> list[int]:

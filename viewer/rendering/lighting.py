@@ -110,6 +110,7 @@ class Lighting:
             Strength of shadows and occlusion, 0 to 1.
         """
         options, shadow, occlusion = casters.options, None, None
+        casters = replace(casters, threshold=sample.threshold)
         if self._spheres is not None and options.lights.key.strength > 0.0:
             direction = tilted(key_direction(view, options.lights), sample.light)
             shadow = self._shadow_pass(size).draw(

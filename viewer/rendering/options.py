@@ -176,6 +176,10 @@ class DisplayOptions:
     joint_names, joint_axes : bool
         Label the joints, omitting labels that would overlap; draw the axes of the joint spaces
         (x red, y green, z blue).
+    cameras : bool
+        Draw the frusta of calibrated cameras, with their images if there are some.
+    image_brightness : float
+        Of the image behind the scene when looking through a calibrated camera, 0 to 1; 0 hides it.
     outline : bool
         Outline the selected joint, or else the selected actor, in pictures.
     """
@@ -213,6 +217,8 @@ class DisplayOptions:
     xray: bool = False
     joint_names: bool = False
     joint_axes: bool = False
+    cameras: bool = False
+    image_brightness: float = 0.6
     outline: bool = False
 
     @property

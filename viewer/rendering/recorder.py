@@ -132,6 +132,9 @@ class Recording:
         the last: 360 gives a seamless loop.
     follow : Follow or None
         Actor or joint that the camera follows.
+    shifts : (F, 3) or None
+        Displacement of the camera in each frame, scene units; None if it follows an actor or
+        stays.
     selected : (int, int)
         Index of an actor and of its highlighted joint, as in ``Renderer.draw``.
     annotations : callable or None
@@ -148,6 +151,7 @@ class Recording:
     interpolate: bool = False
     turntable: float = 0.0
     follow: Follow | None = None
+    shifts: Floats | None = None
     selected: tuple[int, int] = (0, -1)
     annotations: Callable[[Scene, tuple[int, int]], Sequence[Annotation]] | None = None
 
@@ -357,4 +361,6 @@ class _Cameras:
             place = followed_point(scene.actors[follow.actor], follow.joint)
             self._shift = self._shift if place is None else place - follow.origin
             camera.target = camera.target + self._shift
+        elif recording.shifts is not None:
+            camera.target = camera.target + recording.shifts[frame]
         return camera

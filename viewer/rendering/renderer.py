@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.camera_views import (
+    draw_image_behind,
+    draw_image_planes,
+    frusta_of,
+    reach_of,
+)
 from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_writes
@@ -39,6 +45,7 @@ from viewer.rendering.shown import (
     update_meshes,
     update_skeletons,
 )
+from viewer.rendering.translucent import draw_translucent
 from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
@@ -148,7 +155,7 @@ class Renderer:
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
-        view = view_of(camera, target.size, box)
+        view = view_of(camera, target.size, reach_of(scene, camera.fixed, options, box))
         meshes = self._update(scene, view, options, selected)
         casters = Casters(
             self.programs, self.mesh_pass, self.late, self.buffers, meshes, scene.actors, options
@@ -163,7 +170,11 @@ class Renderer:
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
-        over = Overlays(self.marks, self.ghost, self.annotations)
+        over = Overlays(
+            self.marks,
+            self.ghost,
+            (*frusta_of(scene, camera.fixed, options, box, target.size), *self.annotations),
+        )
         self.names_left_out = draw_overlays(
             self.late, over, scene, view, options, target.size, selected
         )
@@ -184,7 +195,13 @@ class Renderer:
         strength: float,
     ) -> None:
         """Draw everything that is part of the scene, from the background on."""
+        if options.background == "environment":
+            self.late.backdrop_pass.draw(view, options.lights)
+        else:
+            self.ground_pass.draw_background(options.background)
+        draw_image_behind(self.late, scene, view, options, target.size)
         self._draw_meshes(meshes, view, options)
+        draw_image_planes(self.late, scene, view, options, box)
         skeletons = [
             (actor, selected[1] if index == selected[0] else -1)
             for index, actor in enumerate(scene.actors)
@@ -197,6 +214,7 @@ class Renderer:
             self.lighting.draw_ground(view, box, strength)
         if options.grid:
             self.ground_pass.draw_grid(view, box, options.background)
+        draw_translucent(self.mesh_pass, meshes, view, options)
         self._draw_blended(meshes, view, options)
         for actor in filter(has_points, scene.actors):
             points = self.buffers.points_of(actor)
@@ -205,7 +223,7 @@ class Renderer:
         for actor, joint in skeletons:
             if shows_mesh(actor.figure, options):
                 opacity = self.buffers.skeleton(actor).opacity(options)
-                self._draw_skeleton(actor, view, options, joint, opacity)
+                self._draw_skeleton(actor, view, options, joint, opacity, overlays=True)
         for actor in scene.actors:
             if has_markers(actor, options):
                 self._draw_markers(actor, view, options)
@@ -293,13 +311,9 @@ class Renderer:
         return meshes
 
     def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        """Draw background and surfaces."""
-        if options.background == "environment":
-            self.late.backdrop_pass.draw(view, options.lights)
-        else:
-            self.ground_pass.draw_background(options.background)
+        """Draw opaque surfaces, and the lines on them."""
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
-        for actor, mesh in meshes.singles:
+        for actor, mesh in meshes.opaque:
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
@@ -319,7 +333,7 @@ class Renderer:
     def _draw_layer(
         self, meshes: Meshes, view: View, options: DisplayOptions, blended: bool
     ) -> None:
-        for actor, mesh in meshes.singles:
+        for actor, mesh in meshes.opaque:
             if mesh.mesh.is_blended or not blended:
                 placement = placement_of(actor, options)
                 self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended)
@@ -354,15 +368,18 @@ class Renderer:
         options: DisplayOptions,
         selected: int,
         opacity: float,
+        overlays: bool = False,
     ) -> None:
         skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
-        self.joint_pass.draw(skeleton, placement, view, options, selected, opacity, actor.color)
+        how = selected, opacity * actor.opacity, actor.color, overlays
+        self.joint_pass.draw(skeleton, placement, view, options, *how)
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
         markers = self.buffers.keypoints_of(actor)
         markers.update(actor.require_pose(), options.skinning)
         # Marker positions already include the placement of the pose.
-        self.late.keypoint_pass.draw(markers, actor.placement, view, options)
+        at = actor.placement
+        self.late.keypoint_pass.draw(markers, at, view, options, actor.opacity)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed mesh, created on first use; its figure must have a mesh."""

@@ -29,11 +29,14 @@ class Sample:
         A point of the key light's disc, of radius 1.
     phase : float
         Of the pattern of directions in which occlusion is searched, 0 to 1.
+    threshold : float
+        Opacity above which actors cast shadows, 0 to 1.
     """
 
     shift: tuple[float, float] = (0.0, 0.0)
     light: tuple[float, float] = (0.0, 0.0)
     phase: float = 0.0
+    threshold: float = 0.5
 
 
 def n_passes(options: DisplayOptions) -> int:
@@ -45,7 +48,7 @@ def sample(index: int, count: int) -> Sample:
     """Return one of ``count`` passes: Halton points in the pixel, a spiral over the light.
 
     >>> sample(0, 1)
-    Sample(shift=(0.0, 0.0), light=(0.0, 0.0), phase=0.0)
+    Sample(shift=(0.0, 0.0), light=(0.0, 0.0), phase=0.0, threshold=0.5)
     """
     if count == 1:
         return Sample()
@@ -54,6 +57,7 @@ def sample(index: int, count: int) -> Sample:
         (_radical_inverse(index + 1, 2) - 0.5, _radical_inverse(index + 1, 3) - 0.5),
         (radius * math.cos(angle), radius * math.sin(angle)),
         index / count,
+        (_radical_inverse(index, 2) + 0.5 / count) % 1.0,
     )
 
 

@@ -47,6 +47,11 @@ class Meshes:
     def __bool__(self) -> bool:
         return bool(self.singles or self.instanced)
 
+    @property
+    def opaque(self) -> list[tuple[Actor, PosedMesh]]:
+        """Opaque meshes that are drawn singly."""
+        return [single for single in self.singles if single[0].opacity == 1.0]
+
 
 def prepare_meshes(
     buffers: ActorBuffers, actors: Sequence[Actor], options: DisplayOptions

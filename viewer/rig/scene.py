@@ -33,6 +33,7 @@ __all__ = [
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from viewer.rig.captures.camera_images import CameraImages
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
@@ -69,6 +70,8 @@ class Actor:
         Track number in a capture of several people; negative without a track.
     color : (r, g, b) or None
         Linear, 0 to 1; None for the default colour.
+    opacity : float
+        Below 1 it is drawn translucently, as one layer: nothing inside it shows.
     points : (K, 4) or None
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
@@ -85,6 +88,7 @@ class Actor:
     offset: float = 0.0
     person: int | None = None
     color: tuple[float, float, float] | None = None
+    opacity: float = 1.0
     points: Floats | None = None
     is_present: bool = True
     called: str = ""
@@ -174,6 +178,8 @@ class Scene:
         Up axis; None for that of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
+    images : CameraImages or None
+        Their images, if there are some.
     time : float or None
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
@@ -186,6 +192,7 @@ class Scene:
     views: tuple[CameraView, ...] = ()
     time: float | None = None
     files: tuple[Path, ...] = ()
+    images: CameraImages | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:

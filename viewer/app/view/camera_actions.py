@@ -9,9 +9,8 @@ from viewer.app.core.state import AppState
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
 from viewer.errors import ViewerError
-from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, look_from
-from viewer.rendering.pinhole import distortion_error
+from viewer.rendering.camera_notes import image_notes, lens_notes
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import Front
 from viewer.rig.mesh import bounding_box, box_size
@@ -94,9 +93,8 @@ def look_through(state: AppState, index: int) -> None:
     seen.front = state.camera.front
     for name in Camera.__slots__:
         setattr(state.camera, name, getattr(seen, name))
-    error = distortion_error(view)
-    if error >= 0.5:
-        state.say(f"The lens of {printable(view.name)} distorts images by up to {error:.1f} pixels")
+    for note in (*image_notes(state.scene, view), *lens_notes(state.scene, view)):
+        state.say(note[0].upper() + note[1:])
 
 
 def toggle_projection(state: AppState) -> None:

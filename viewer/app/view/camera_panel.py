@@ -78,6 +78,13 @@ def _draw_views(state: AppState) -> None:
     note_item(state, "Calibrated camera")
     if changed:
         look_through(state, chosen - 1)
+    options = state.options
+    options.cameras = checkbox(state, "Show cameras", options.cameras)
+    explain("frusta of the calibrated cameras, with their images")
+    if fixed is not None and state.scene.images is not None:
+        options.image_brightness = slider(
+            state, "Image brightness", options.image_brightness, 0.0, 1.0, "%.2f", _CLAMP
+        )
 
 
 def _digits(size: float) -> str:

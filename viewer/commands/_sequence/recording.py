@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 _FIELD = re.compile(r"\{frame[:!}]")
 _MOST_CELLS = 1000
+_MOST_POSES = 100
+_NARROW, _WIDE = 0.4, 2.5  # aspect ratios of the cells of contact sheets
 
 
 def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +49,14 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         "--contact-sheet",
         type=int,
         metavar="N",
-        help="one image of N numbered frames, evenly spaced over the motion",
+        help="one image of N numbered frames, evenly spaced over the motion, at one scale and "
+        "with one ground line",
+    )
+    group.add_argument(
+        "--onion",
+        type=int,
+        metavar="N",
+        help="one image of N poses in place, evenly spaced over the motion, earlier ones fainter",
     )
     group.add_argument(
         "--speed",
@@ -91,6 +100,8 @@ def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
     asks = arguments.frames is not None or arguments.turntable is not None
     if arguments.contact_sheet is not None:
         return "sheet", True
+    if arguments.onion is not None:
+        return "onion", True
     if _FIELD.search(str(output)):
         return "pictures", True
     if output.suffix.lower() == ".gif":
@@ -111,6 +122,7 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
                 raise ViewerError(f"--frames and --{option}: expected one of them, found both")
     if arguments.follow is not None and not kind:
         raise ViewerError("--follow: expected a video, contact sheet or numbered images")
+    _check_onion(arguments, kind)
     for option in ("speed", "video-quality"):
         given = getattr(arguments, option.replace("-", "_"))
         if given is not None and kind != "video":
@@ -128,6 +140,20 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
         raise ViewerError(
             "--contact-sheet: expected an image file name, such as .png, found a video"
         )
+
+
+def _check_onion(arguments: argparse.Namespace, kind: str) -> None:
+    poses, suffix = arguments.onion, Path(arguments.output).suffix.lower()
+    if poses is None:
+        return
+    for option in ("contact_sheet", "turntable", "follow", "frame", "time"):
+        if getattr(arguments, option) is not None:
+            name = option.replace("_", "-")
+            raise ViewerError(f"--onion and --{name}: expected one of them, found both")
+    if not 2 <= poses <= _MOST_POSES:
+        raise ViewerError(f"--onion: expected 2 to {_MOST_POSES} poses, found {poses}")
+    if suffix in (".mp4", ".webm"):
+        raise ViewerError("--onion: expected the name of a picture, such as .png, found a video")
 
 
 def _check_name(name: str) -> None:
@@ -169,6 +195,8 @@ def draw_sequence(
     Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
     Raises OutputError if a file already exists, or cannot be written.
     """
+    from viewer.rendering.camera_views import with_cameras
+    from viewer.rendering.framing import fit_turntable, frame_motion, seen_aspect
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record
@@ -176,10 +204,16 @@ def draw_sequence(
     shots = shots_of(request, arguments, scene)
     outputs = _outputs(request, shots)
     check_targets(outputs, inputs_of(arguments, scene), arguments.force)
-    sink = _sink(request, arguments, options, shots, outputs, size)
+    recording = _recording(request, arguments, scene, shots, options)
+    points, recording.box = frame_motion(recording)
+    points = with_cameras(scene, options, points)
+    aspect = seen_aspect(camera_of(arguments, scene, points, size), points)
+    sink = _sink(request, arguments, options, shots, outputs, size, aspect)
     print_warnings([*shots.notes, *_follow_notes(scene, arguments), *getattr(sink, "notes", [])])
-    frame_size = getattr(sink, "cell", size)
-    recording = _recording(arguments, scene, shots, options, frame_size)
+    recording.size = frame_size = getattr(sink, "cell", size)
+    recording.camera = camera_of(arguments, scene, points, frame_size)
+    if arguments.distance is None:
+        fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
     title = f"drawing {printable(outputs[0].name)}"
     hold()
     with Offscreen(arguments.gpu) as offscreen, offscreen.context:
@@ -213,6 +247,7 @@ def _sink(
     shots: Shots,
     outputs: list[Path],
     size: tuple[int, int],
+    aspect: float,
 ) -> PictureSink | SheetSink | VideoSink:
     if request.kind == "video":
         from viewer.media.video import VideoSink
@@ -223,37 +258,36 @@ def _sink(
     from viewer.media.picture_sinks import PictureSink, SheetSink
 
     if request.kind == "sheet":
-        return SheetSink(outputs[0], size, shots.numbers)
+        return SheetSink(outputs[0], size, shots.numbers, min(max(aspect, _NARROW), _WIDE))
     return PictureSink(outputs)
 
 
 def _recording(
+    request: Request,
     arguments: argparse.Namespace,
     scene: Scene,
     shots: Shots,
     options: DisplayOptions,
-    size: tuple[int, int],
 ) -> Recording:
-    """Return the recording, its camera framing the whole motion."""
+    """Return the recording, without its camera, box and size."""
     from viewer.rendering.camera import Camera
-    from viewer.rendering.framing import find_follow, fit_turntable, frame_motion
+    from viewer.rendering.framing import find_follow, level_shifts
     from viewer.rendering.recorder import Recording
 
     recording = Recording(
         scene,
         shots.times,
         Camera(up=scene.up),
-        size,
+        (1, 1),
         options,
         moves=shots.moves,
         interpolate=arguments.interpolate_gaps,
         turntable=shots.turntable,
         follow=None if arguments.follow is None else find_follow(scene, arguments.follow),
     )
-    points, recording.box = frame_motion(recording)
-    recording.camera = camera_of(arguments, scene, points, size)
-    if arguments.distance is None:
-        fit_turntable(recording.camera, points, size[0] / size[1], shots.turntable)
+    is_free = arguments.follow is None and arguments.view is None
+    if request.kind == "sheet" and is_free and shots.moves:
+        recording.shifts = level_shifts(recording)
     return recording
 
 

@@ -36,8 +36,8 @@ class Request:
 
     Attributes
     ----------
-    kind : "pictures", "video" or "sheet"
-        One file per frame, one video file, or one image of all frames.
+    kind : "pictures", "video", "sheet" or "onion"
+        One file per frame, one video file, one image of all frames in cells, or in one place.
     output : Path
         As given; includes ``{frame}`` for images.
     range : Range or None
@@ -134,7 +134,10 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
     seconds = len(places) / rates.drawn
     if request.kind == "sheet":
         places = _spread(places, arguments.contact_sheet, moves)
-        notes += _too_few(len(places), arguments.contact_sheet)
+        notes += _too_few("contact-sheet", len(places), arguments.contact_sheet)
+    if request.kind == "onion":
+        places = _spread(places, arguments.onion, moves)
+        notes += _too_few("onion", len(places), arguments.onion)
     # A rotation longer than the motion repeats its frames.
     is_counted = moves and (request.turntable is None or request.turntable.seconds is None)
     first = numbering.first if is_counted else 0
@@ -209,12 +212,12 @@ def _spread(places: Floats, count: int, moves: bool) -> Floats:
     return places[chosen]
 
 
-def _too_few(found: int, wanted: int) -> list[str]:
-    """Return a message if there are fewer frames than cells; none is shown twice."""
+def _too_few(option: str, found: int, wanted: int) -> list[str]:
+    """Return a message if there are fewer frames than requested; none is shown twice."""
     if found == wanted:
         return []
     frames = "is 1 frame" if found == 1 else f"are {found} frames"
-    return [f"--contact-sheet: there {frames}, not {wanted}; none is shown twice"]
+    return [f"--{option}: there {frames}, not {wanted}; none is shown twice"]
 
 
 def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:

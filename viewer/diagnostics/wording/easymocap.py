@@ -5,6 +5,9 @@ _RECORD = "{item:+{}: }{problem}"
 MESSAGES = {
     # Frame files
     "F001.capture-folder": "{item:text}: cannot be read: {reason:text}",
+    "F001.camera-images": "expected a folder of images for a camera ({names:list}), found none",
+    "F001.camera-images-cameras": "images need calibrated cameras: intri.yml and extri.yml next to "
+    "the recording, found none",
     "F002.capture-frames": "expected frame files (smpl_full, smplfull, smpl, keypoints3d: "
     "000000.json …), found none",
     "F002.capture-people": "expected people, found none in {n:#frame}",

@@ -117,6 +117,7 @@ class JointPass:
         selected: int = -1,
         opacity: float = 1.0,
         color: Color | None = None,
+        overlays: bool = False,
     ) -> None:
         """Draw a skeleton.
 
@@ -133,19 +134,21 @@ class JointPass:
         selected : int
             The joint to highlight, -1 for none.
         opacity : float
-            Below 1 the skeleton is one translucent layer over everything drawn before: boxes
-            often enclose the skin, and would hide it.
+            Below 1 the skeleton is one translucent layer.
         color : (r, g, b), optional
             Of all joints, linear; a colour for each joint if omitted.
+        overlays : bool
+            Draw a translucent skeleton over everything drawn before: boxes often enclose the skin,
+            which would hide them.
         """
-        overlays = opacity < 1.0
+        overlays = overlays and opacity < 1.0
         view = in_front(view) if overlays else view
         program = joint_program(
             self.programs, skeleton, options, "phong", "mesh", view.effects.defines
         )
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_joints, program, skeleton, *how)
-        if overlays:
+        if opacity < 1.0:
             # Only the nearest parts count: the others would show through them.
             draw_nearest(self.context, draw)
         else:
@@ -198,9 +201,10 @@ def draw_boxes(
     view: View,
     options: DisplayOptions,
     color: Color | None = None,
+    opacity: float = 1.0,
 ) -> None:
     """Draw boxes that were moved to where they belong."""
-    _set_up(program, boxes, placement, view, options, -1, 1.0, color)
+    _set_up(program, boxes, placement, view, options, -1, opacity, color)
     set_uniforms(program, {"u_only": -1})
     _draw_instances(program, boxes)
 

@@ -68,7 +68,12 @@ class KeypointPass:
         self.joints = joints
 
     def draw(
-        self, points: KeypointBuffers, placement: Floats, view: View, options: DisplayOptions
+        self,
+        points: KeypointBuffers,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        opacity: float = 1.0,
     ) -> None:
         """Draw the markers, in front of everything.
 
@@ -82,6 +87,8 @@ class KeypointPass:
             The camera's matrices.
         options : DisplayOptions
             Lights.
+        opacity : float
+            Of the markers.
         """
         program = self.joints.programs.drawing("joint", "phong", fragment="mesh")
-        draw_boxes(program, points.boxes, placement, in_front(view), options)
+        draw_boxes(program, points.boxes, placement, in_front(view), options, opacity=opacity)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from viewer.rendering.gpu.studio import Matcaps, Studio
     from viewer.rendering.passes.annotation_pass import AnnotationPass
     from viewer.rendering.passes.backdrop_pass import BackdropPass
+    from viewer.rendering.passes.camera_image_pass import CameraImagePass
     from viewer.rendering.passes.ghost_pass import GhostPass
     from viewer.rendering.passes.keypoint_pass import KeypointPass
     from viewer.rendering.passes.legend_pass import LegendPass
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
         | Studio
         | Matcaps
         | OutlinePass
+        | CameraImagePass
     )
 
 __all__ = ["LatePasses"]
@@ -132,6 +134,15 @@ class LatePasses:
         ghosts = GhostPass(self._context, self._programs, self._mesh_pass)
         self._made.append(ghosts)
         return ghosts
+
+    @cached_property
+    def camera_image_pass(self) -> CameraImagePass:
+        """Pass for the images of calibrated cameras."""
+        from viewer.rendering.passes.camera_image_pass import CameraImagePass
+
+        images = CameraImagePass(self._context, self._programs)
+        self._made.append(images)
+        return images
 
     @cached_property
     def studio(self) -> Studio:

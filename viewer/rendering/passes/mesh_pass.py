@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import moderngl
-import numpy as np
 
 from viewer.rendering.gpu.draw_state import sides
 from viewer.rendering.gpu.index_sets import IndexSet
@@ -56,6 +55,7 @@ class MeshPass:
         options: DisplayOptions,
         color: Color | None = None,
         blended: bool = False,
+        opacity: float = 1.0,
     ) -> None:
         """Draw the surface: its opaque or its blended triangles.
 
@@ -71,6 +71,8 @@ class MeshPass:
             Shading and lights.
         color : (r, g, b), optional
             Colour of untextured surfaces, linear; ``SKIN_COLOR`` if omitted.
+        opacity : float
+            Factor on the opacity of surfaces.
         """
         look = mesh.scalars.look if options.shading == "scalar" else None
         corners = "corners" if look is not None else ""
@@ -84,7 +86,11 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
         set_surface(program, mesh.mesh, options)
-        set_uniforms(program, {"u_color": SKIN_COLOR if color is None else color})
+        look_of = {
+            "u_color": SKIN_COLOR if color is None else color,
+            "u_opacity": opacity * surface_opacity(options),
+        }
+        set_uniforms(program, look_of)
         if look is not None:
             set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
@@ -106,34 +112,47 @@ class MeshPass:
         draw_solid(self.array(mesh, program, indices), indices)
 
     def draw_lines(
-        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        opacity: float = 1.0,
     ) -> None:
         """Draw the requested edges and normals over the surface."""
         self.context.depth_func = "<="
         if options.wireframe:
-            self.draw_edges(mesh, placement, view, options)
+            self.draw_edges(mesh, placement, view, options, opacity)
         shape = mesh.mesh.figure.mesh
         if options.normals and shape is not None:
-            self.draw_normals(mesh, placement, view, box_size(bounding_box(shape.positions)))
+            size = box_size(bounding_box(shape.positions))
+            self.draw_normals(mesh, placement, view, size, opacity)
         self.context.depth_func = "<"
 
     def draw_edges(
-        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        opacity: float = 1.0,
     ) -> None:
         """Draw the edges of all triangles over the surface."""
         program = self.programs.drawing("edge", fragment="line")
         set_model(program, view, placement, mesh.center)
-        program["u_line_color"] = _premultiplied(_EDGE_COLOR)
+        program["u_line_color"] = _premultiplied(_EDGE_COLOR, opacity)
         self.context.wireframe = True
         indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
         self.array(mesh, program, indices).render(moderngl.TRIANGLES)
         self.context.wireframe = False
 
-    def draw_normals(self, mesh: PosedMesh, placement: Floats, view: View, size: float) -> None:
+    def draw_normals(
+        self, mesh: PosedMesh, placement: Floats, view: View, size: float, opacity: float = 1.0
+    ) -> None:
         """Draw a line along every vertex normal; ``size`` is that of the figure."""
         program = self.programs.drawing("line")
         set_model(program, view, placement, mesh.center)
-        program["u_line_color"] = _premultiplied(_NORMAL_COLOR)
+        program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)
         program["u_length"] = _NORMAL_LENGTH * size
         content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
         array = self._arrays_of(mesh).get(program, lambda: content)
@@ -226,5 +245,7 @@ def draw_solid(array: moderngl.VertexArray, indices: IndexSet, instances: int = 
             )
 
 
-def _premultiplied(color: tuple[float, float, float, float]) -> tuple[float, ...]:
-    return tuple(np.multiply(color, (color[3], color[3], color[3], 1.0)))
+def _premultiplied(color: tuple[float, float, float, float], opacity: float) -> tuple[float, ...]:
+    alpha = opacity * color[3]
+    red, green, blue = (alpha * channel for channel in color[:3])
+    return red, green, blue, alpha

@@ -134,13 +134,15 @@ class PointBuffers:
         shown = (points[:, 3] > 0.0) & (points[:, 3] >= min_confidence)
         self.center = bounding_box(points[shown, :3]).mean(axis=0) if shown.any() else np.zeros(3)
         ends, opacity = self._capsules(points, shown)
+        opacity = opacity * actor.opacity
         toward = (view.matrix @ placement)[2, :3]
         depth = (points[ends, :3].mean(axis=1) - self.center) @ toward
         # Opaque capsules first, then translucent ones from back to front.
         order = np.lexsort((depth, np.where(opacity < _CERTAIN, 1, 0)))
         certain = opacity[order] >= _CERTAIN
         order[certain] = np.sort(order[certain])
-        key = (points.tobytes(), min_confidence, actor.color, order.tobytes(), id(actor.clip))
+        look = actor.color, actor.opacity
+        key = (points.tobytes(), min_confidence, look, order.tobytes(), id(actor.clip))
         if key != self._key:
             self._write(actor, points, ends[order], opacity[order])
             self.elements = self._numbers[order]

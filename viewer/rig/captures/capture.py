@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from viewer.diagnostics import Diagnostic
+from viewer.rig.captures.camera_images import CameraImages
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
@@ -54,6 +55,8 @@ class Capture:
         The axis that points up in the world; empty to guess from the first bodies.
     views : tuple of CameraView
         Calibrated cameras.
+    images : CameraImages or None
+        Their images, if there are some.
     model : str
         The member of the SMPL family that its bodies use, e.g. ``"SMPL+H"``; empty for none.
     warnings : tuple of Diagnostic
@@ -68,3 +71,4 @@ class Capture:
     views: tuple[CameraView, ...] = ()
     model: str = ""
     warnings: tuple[Diagnostic, ...] = ()
+    images: CameraImages | None = None

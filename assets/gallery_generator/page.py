@@ -1,0 +1,41 @@
+"""The manual's page about the gallery."""
+
+from __future__ import annotations
+
+import textwrap
+
+from gallery_generator.pictures import COMMON, PICTURES
+
+__all__ = ["file_name", "page"]
+
+_HEAD = """<!-- Written by assets/make_gallery.py: make gallery -->
+
+# Gallery
+
+Pictures from bundled data alone, and the commands that drew them, with the options
+`{common}`. `make gallery` draws them again, and
+fails if 0.1 % of the pixels are burnt or black. `walk` and `capture` are synthetic recordings in
+EasyMocap's layout, `scan.obj` a person without a rig, `body.npz` the bundled body;
+`assets/gallery_generator/` makes them.
+"""
+_WIDTH = 96
+
+
+def file_name(name: str) -> str:
+    """Return the file of a picture; that of the window is also the README's."""
+    return "window.png" if name == "window" else f"gallery_{name}.png"
+
+
+def page() -> str:
+    """Return the page as Markdown."""
+    parts = [_HEAD.format(common=COMMON)]
+    for name, picture in PICTURES.items():
+        text = textwrap.fill(picture.text, _WIDTH)
+        parts.append(f"\n## {picture.title}\n\n{text}\n")
+        parts.append(f"\n![{picture.title}](../../assets/pictures/{file_name(name)})\n")
+        if picture.commands:
+            lines = "\n".join([*picture.commands[:-1], f"{picture.commands[-1]} -o {name}.png"])
+            parts.append(f"\n```sh\n{lines}\n```\n")
+        else:
+            parts.append("\nDrawn with Python: `assets/gallery_generator/pictures.py`.\n")
+    return "".join(parts)

@@ -1,0 +1,74 @@
+"""Draw the gallery: pictures in assets/pictures and the page viewer/manual/gallery.md.
+
+Run ``make gallery``, or ``python assets/make_gallery.py [NAME ...]`` for some of the pictures. All
+is made from bundled data. Pictures with burnt or black areas are refused.
+"""
+
+import contextlib
+import io
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from gallery_generator.inputs import make_inputs
+from gallery_generator.page import file_name, page
+from gallery_generator.pictures import PAPER, PICTURES
+from gallery_generator.saturation import MOST, saturated_fraction
+
+from viewer.loading import bundled_body
+from viewer.rendering.passes.ground_pass import parse_color
+
+_HERE = Path(__file__).resolve().parent
+_MOST_BYTES = 1_500_000  # of all pictures together
+_COLORS = 256
+
+
+def main(names: list[str]) -> int:
+    """Draw the named pictures, or all and the page; return the exit code."""
+    unknown = [name for name in names if name not in PICTURES]
+    if unknown:
+        sys.stderr.write(f"no picture {', '.join(unknown)}; there are {', '.join(PICTURES)}\n")
+        return 2
+    faults, total = 0, 0
+    with tempfile.TemporaryDirectory() as made, contextlib.chdir(made):
+        folder = Path(made)
+        (folder / "body.npz").write_bytes(bundled_body().read_bytes())
+        make_inputs(folder)
+        for name in names or PICTURES:
+            pixels = PICTURES[name].pixels(folder)
+            paper = tuple(round(255 * channel) for channel in parse_color(PAPER))
+            burnt = saturated_fraction(pixels, paper, PICTURES[name].has_data)
+            faults += burnt > MOST
+            path = _HERE / "pictures" / file_name(name)
+            path.write_bytes(_small(pixels))
+            total += path.stat().st_size
+            sys.stdout.write(
+                f"{name}: {path.stat().st_size} bytes, {100 * burnt:.3f} % saturated\n"
+            )
+    if not names:
+        (_HERE.parent / "viewer" / "manual" / "gallery.md").write_text(page(), "utf-8")
+    if faults:
+        sys.stderr.write(f"{faults} pictures have more than {100 * MOST:g} % saturated pixels\n")
+    if total > _MOST_BYTES:
+        sys.stderr.write(f"the pictures have {total} bytes, more than {_MOST_BYTES}\n")
+    return 1 if faults or total > _MOST_BYTES else 0
+
+
+def _small(pixels: np.ndarray) -> bytes:
+    """Return a picture as a PNG of 256 colours."""
+    picture = Image.fromarray(pixels).convert("RGB")
+    palette = picture.quantize(_COLORS, Image.Quantize.MEDIANCUT)
+    # Pillow dithers only towards a given palette.
+    picture = picture.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+    stream = io.BytesIO()
+    picture.save(stream, "PNG", optimize=True)
+    return stream.getvalue()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,15 @@
+#version 330
+// A rectangle that shows part of a calibrated camera's image plane.
+
+uniform vec4 u_corner;      // clip space: position of the upper left corner
+uniform vec4 u_right;       // from there to the upper right corner
+uniform vec4 u_down;        // and to the lower left one
+uniform vec4 u_pixels;      // ideal pixels at the upper left and the lower right corner
+
+out vec2 v_pixel;           // of a camera without distortion; 0, 0 is the centre of the first one
+
+void main() {
+    vec2 place = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    v_pixel = mix(u_pixels.xy, u_pixels.zw, place);
+    gl_Position = u_corner + place.x * u_right + place.y * u_down;
+}

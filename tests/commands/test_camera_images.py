@@ -1,0 +1,106 @@
+"""``viewer render --view`` and ``--cameras`` with the images of a capture's cameras."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from formats.capture_files import points, write_frames
+from PIL import Image
+
+import viewer
+from viewer.cli import run
+from viewer.rendering.overlay.frusta import frustum_corners
+
+pytestmark = pytest.mark.slow
+
+K1 = 0.2
+SIDE = 101  # pixels of the cameras' images
+CENTER = 50.0
+FOCAL = 100.0
+
+
+def matrix(key, rows, columns, data):
+    head = f"{key}: !!opencv-matrix\n  rows: {rows}\n  cols: {columns}\n  dt: d\n"
+    return f"{head}  data: [{data}]\n"
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """One camera at (0, -5, 0) that looks along +y, z up; images of frames 0 and 2."""
+    folder = tmp_path / "take"
+    write_frames(folder / "keypoints3d", {frame: [points(0)] for frame in range(3)})
+    head = '%YAML:1.0\n---\nnames: [ "01" ]\n'
+    lens = f"{FOCAL}, 0., {CENTER}, 0., {FOCAL}, {CENTER}, 0., 0., 1."
+    inner = matrix("K_01", 3, 3, lens) + matrix("dist_01", 1, 5, f"{K1}, 0., 0., 0., 0.")
+    (folder / "intri.yml").write_text(f"{head}{inner}H_01: {SIDE}\nW_01: {SIDE}\n")
+    outer = matrix("Rot_01", 3, 3, "1., 0., 0., 0., 0., -1., 0., 1., 0.")
+    (folder / "extri.yml").write_text(head + outer + matrix("T_01", 3, 1, "0., 0., 5."))
+    images = folder / "images" / "01"
+    images.mkdir(parents=True)
+    for number in (0, 2):
+        pixels = np.full((SIDE, SIDE, 3), 100 + 50 * number, dtype=np.uint8)
+        # The lens draws the direction (0.4, 0), ideal pixel 90, at 0.4 (1 + k1 0.16) = 0.4128.
+        pixels[:, 91:92] = 0
+        Image.fromarray(pixels).save(images / f"{number:06}.png")
+    return folder
+
+
+def drawn(recording, out, *options):
+    size = f"{SIDE}x{SIDE}"
+    still = ("--view", "01", "--no-grid", "--size", size, "--samples", "1", "--force")
+    assert run(["render", str(recording), "-o", str(out), *still, *options]) == 0
+    return np.array(Image.open(out).convert("RGB")).astype(int)
+
+
+def test_image_is_behind_the_scene_without_its_distortion(recording, tmp_path, capsys):
+    pixels = drawn(recording, tmp_path / "a.png", "--frame", "0")
+    row = pixels[int(CENTER), :, 0]
+    # Dimmed to 60 %; the line is where a camera without distortion sees it.
+    assert row[2] == 60 and int(np.argmin(row[80:])) + 80 == 90
+    error = capsys.readouterr().err
+    assert "images/01: 1 of 3 frames have no image: 1\n" in error
+    assert "its lens distortion of up to 7.1 pixels is removed from its images\n" in error
+    assert drawn(recording, tmp_path / "a.png", "--frame", "2")[50, 2, 0] == 120
+
+
+def test_frame_without_image_has_the_background(recording, tmp_path):
+    pixels = drawn(recording, tmp_path / "a.png", "--frame", "1", "--background", "#ff0000")
+    assert pixels[2, 2].tolist() == [255, 0, 0]
+
+
+def test_images_of_another_shape_are_said_and_not_drawn(recording, tmp_path, capsys):
+    for path in (recording / "images" / "01").iterdir():
+        Image.new("RGB", (60, 30), (9, 9, 9)).save(path)
+    pixels = drawn(recording, tmp_path / "a.png", "--background", "#ff0000", "--frame", "0")
+    assert pixels[2, 2].tolist() == [255, 0, 0]
+    error = capsys.readouterr().err
+    assert "its images have 60 x 30 pixels, the calibration 101 x 101: they do not match" in error
+
+
+def test_images_come_from_another_folder(recording, tmp_path, capsys):
+    (recording / "images").rename(tmp_path / "elsewhere")
+    elsewhere = ("--images", str(tmp_path / "elsewhere"))
+    assert drawn(recording, tmp_path / "a.png", *elsewhere, "--frame", "0")[50, 2, 0] == 60
+    out = str(tmp_path / "b.png")
+    assert run(["render", str(recording), "-o", out, "--images", str(recording)]) == 2
+    expected = "take: expected a folder of images for a camera (01), found none\n"
+    assert capsys.readouterr().err.endswith(expected)
+
+
+def test_frustum_shows_the_image_where_the_camera_looks(recording, tmp_path):
+    view = viewer.load(recording).views[0]
+    # At 2 in front of (0, -5, 0): half of 101 pixels at 100 a unit is 1.01, to the left and up.
+    corners = frustum_corners(view, 2.0)
+    np.testing.assert_allclose(corners[0], [-1.01, -3.0, 1.01], atol=1e-12)
+    np.testing.assert_allclose(corners[2], [1.01, -3.0, -1.01], atol=1e-12)
+    out = tmp_path / "c.png"
+    options = ("--cameras", "--no-grid", "--front", "-y", "--azimuth", "180", "--frame", "2")
+    assert run(["render", str(recording), "-o", str(out), "--size", "480x360", *options]) == 0
+    pixels = np.array(Image.open(out).convert("RGB")).astype(int)
+    assert (pixels == 200).all(axis=2).sum() > 20  # its image's grey
+
+
+def test_damaged_image_is_said_and_not_drawn(recording, tmp_path, capsys):
+    (recording / "images" / "01" / "000000.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    drawn(recording, tmp_path / "a.png", "--frame", "0")
+    assert "camera 01: its first image is not readable" in capsys.readouterr().err

@@ -1,0 +1,148 @@
+"""Image folders of a capture: ``images/<camera>/000000.jpg``, one folder per camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
+from viewer.media.image import decode_picture, picture_dimensions
+from viewer.phrases import listed, printable
+from viewer.rig.captures.camera_images import CameraImage
+from viewer.rig.captures.camera_view import CameraView
+
+__all__ = ["ImageFolders", "find_images"]
+
+_FOLDER = "images"
+_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
+_MOST_NAMED = 5  # missing frames in a message
+
+
+class ImageFolders:
+    """Images in folders; the last one that each camera showed is kept.
+
+    Parameters
+    ----------
+    folders : mapping of str to Path
+        Folder of each camera.
+    frame_rate : float
+        Frames per second.
+    frames : range
+        Numbers of the capture's frames.
+    """
+
+    def __init__(self, folders: dict[str, Path], frame_rate: float, frames: range) -> None:
+        self._rate, self._frames = frame_rate, frames
+        self._files = {name: _numbered(folder) for name, folder in folders.items()}
+        self._folders = folders
+        self._shown: dict[str, tuple[int, CameraImage | None]] = {}
+        self._faults: dict[Path, str] = {}
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the cameras that have images."""
+        return tuple(name for name, files in self._files.items() if files)
+
+    def at(self, camera: str, seconds: float) -> CameraImage | None:
+        """Return the image at a time, see ``viewer.rig.captures.camera_images``."""
+        files = self._files.get(camera, {})
+        number = self._frames.start + round(seconds * self._rate)
+        known = self._shown.get(camera)
+        if known is not None and known[0] == number:
+            return known[1]
+        image = self._read(files[number]) if number in files else None
+        self._shown[camera] = number, image
+        return image
+
+    def _read(self, path: Path) -> CameraImage | None:
+        try:
+            return CameraImage(decode_picture(path, path.read_bytes()))
+        except FormatError as problem:
+            self._faults[path] = str(problem)
+        except OSError as problem:
+            values = {"reason": str(problem.strerror or problem)}
+            self._faults[path] = str(Diagnostic("F001.picture", path, values=values))
+        return None
+
+    def size_of(self, camera: str) -> tuple[int, int] | None:
+        """Return the size of a camera's first image, pixels; None if it has none."""
+        files = self._files.get(camera, {})
+        return picture_dimensions(files[min(files)]) if files else None
+
+    def sized(self, view: CameraView) -> CameraView:
+        """Return a camera with the size of its images if the calibration lacks it."""
+        size = None if view.size is not None else self.size_of(view.name)
+        return view if size is None else replace(view, size=size)
+
+    def notes_of(self, camera: str) -> list[str]:
+        """Return messages about a camera's missing or unreadable images."""
+        notes = [text for path, text in self._faults.items() if path in self._paths(camera)]
+        missing = [number for number in self._frames if number not in self._files.get(camera, {})]
+        if missing and camera in self._folders:
+            folder = printable(self._folders[camera])
+            named = listed([str(number) for number in missing], _MOST_NAMED)
+            which = f"{len(missing)} of {len(self._frames)} frames have no image: {named}"
+            notes.append(f"{folder}: {which}")
+        return notes
+
+    def _paths(self, camera: str) -> set[Path]:
+        return set(self._files.get(camera, {}).values())
+
+
+def find_images(
+    parents: Sequence[Path],
+    views: Sequence[CameraView],
+    frame_rate: float,
+    frames: range,
+    given: Path | None = None,
+) -> ImageFolders | None:
+    """Return the images of calibrated cameras; None if there are none.
+
+    Parameters
+    ----------
+    parents : sequence of Path
+        Folders whose ``images`` is searched, in this order.
+    views : sequence of CameraView
+        The cameras, whose names are those of the folders.
+    frame_rate : float
+        Frames per second.
+    frames : range
+        Numbers of the capture's frames.
+    given : Path, optional
+        Folder to use instead.
+
+    Raises
+    ------
+    FormatError
+        If the given folder has none of the cameras.
+    """
+    for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
+        folders = {view.name: parent / view.name for view in views if _is_name(view.name)}
+        there = {name: folder for name, folder in folders.items() if folder.is_dir()}
+        if there:
+            return ImageFolders(there, frame_rate, frames)
+    if given is not None:
+        values = {"names": [view.name for view in views]}
+        key = "F001.camera-images" if views else "F001.camera-images-cameras"
+        raise FormatError(Diagnostic(key, given, values=values))
+    return None
+
+
+def _is_name(name: str) -> bool:
+    """Return whether a camera's name is that of a folder, and leads nowhere else."""
+    return Path(name).name == name
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
+    """Return the images of a folder by frame number."""
+    try:
+        files = sorted(folder.iterdir())
+    except OSError:
+        return {}  # reported as missing frames
+    return {
+        int(path.stem): path
+        for path in files
+        if path.suffix.lower() in _SUFFIXES and path.stem.isdecimal() and path.stem.isascii()
+    }

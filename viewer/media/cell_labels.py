@@ -1,0 +1,47 @@
+"""Labels in the cells of contact sheets; Pillow is imported on first use."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Bytes
+
+__all__ = ["write_label"]
+
+_SMALLEST = 9  # height of letters, pixels; smaller ones cannot be read
+_LETTERS = 1 / 14  # height of letters, relative to the cell's shorter side
+_INK, _PAPER = 255.0, 16.0  # grey of letters and of the tag behind them
+_PAPER_OPACITY = 0.62
+
+
+def write_label(pixels: Bytes, text: str) -> None:
+    """Write a short text on a dark translucent tag into the lower left corner of a picture.
+
+    Parameters
+    ----------
+    pixels : (H, W, 4) uint8
+        Straight alpha; changed in place, unchanged if the text does not fit.
+    text : str
+        One line.
+    """
+    from PIL import Image, ImageDraw, ImageFont
+
+    height, width = pixels.shape[:2]
+    letters = max(round(_LETTERS * min(height, width)), _SMALLEST)
+    font = ImageFont.load_default(letters)
+    margin = max(letters // 3, 2)
+    across, down = int(np.ceil(font.getlength(text))) + 2 * margin, letters + 2 * margin
+    if across > width or down > height:
+        return
+    tag = Image.new("L", (across, down))
+    ImageDraw.Draw(tag).text((margin, down / 2), text, 255, font, anchor="lm")
+    ink = np.array(tag)[..., None] / 255.0
+    corner = pixels[height - down :, :across]
+    # Premultiplied, so that the tag is also right over a transparent picture.
+    under = corner.astype(np.float64)
+    under[..., :3] *= under[..., 3:] / 255.0
+    for color, opacity in ((_PAPER, _PAPER_OPACITY), (_INK, ink)):
+        under = (1.0 - opacity) * under + opacity * np.array([color, color, color, 255.0])
+    alpha = under[..., 3:]
+    corner[..., :3] = np.rint(under[..., :3] * 255.0 / alpha)
+    corner[..., 3:] = np.rint(alpha)

@@ -1,0 +1,104 @@
+"""Calibrated cameras in a picture: the image behind the scene, and frusta with their images."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rendering.options import DisplayOptions
+from viewer.rendering.overlay.annotation import Annotation
+from viewer.rendering.overlay.frusta import frusta_annotation, frusta_points, frustum_depth
+from viewer.rendering.passes.late_passes import LatePasses
+from viewer.rendering.pinhole import picture_size
+from viewer.rendering.view import View
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_images import CameraImage
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import Scene
+
+__all__ = [
+    "draw_image_behind",
+    "draw_image_planes",
+    "drawn_cameras",
+    "fits",
+    "frusta_of",
+    "reach_of",
+    "with_cameras",
+]
+
+_TOLERANCE = 0.01  # relative difference of aspect ratios: one pixel of a small image
+
+
+def drawn_cameras(
+    scene: Scene, view_through: CameraView | None, options: DisplayOptions
+) -> list[CameraView]:
+    """Return the cameras whose frusta are drawn: not the one that is looked through."""
+    if not options.cameras:
+        return []
+    return [camera for camera in scene.views if camera is not view_through]
+
+
+def reach_of(
+    scene: Scene, view_through: CameraView | None, options: DisplayOptions, box: Floats
+) -> Floats:
+    """Return the box of a scene and its drawn cameras, for the depth range: (2, 3)."""
+    cameras = drawn_cameras(scene, view_through, options)
+    return bounding_box(np.concatenate([box, frusta_points(cameras, box)])) if cameras else box
+
+
+def frusta_of(
+    scene: Scene,
+    view_through: CameraView | None,
+    options: DisplayOptions,
+    box: Floats,
+    size: tuple[int, int],
+) -> list[Annotation]:
+    """Return the annotation of the drawn frusta, if there are some."""
+    cameras = drawn_cameras(scene, view_through, options)
+    return [frusta_annotation(cameras, box, size)] if cameras else []
+
+
+def _image(scene: Scene, camera: CameraView) -> CameraImage | None:
+    """Return a camera's image at the scene's time if it has the calibration's aspect ratio."""
+    if scene.images is None:
+        return None
+    image = scene.images.at(camera.name, scene.time or 0.0)
+    return image if image is not None and fits(camera, image.pixels.shape[1::-1]) else None
+
+
+def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
+    """Return whether images of a size have the aspect ratio of a camera's calibration."""
+    width, height = picture_size(camera)
+    return abs(size[0] * height / (size[1] * width) - 1.0) <= _TOLERANCE
+
+
+def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Floats:
+    """Return the points to frame: those of the figures, and of the cameras' frusta if drawn."""
+    cameras = drawn_cameras(scene, None, options)
+    if not cameras:
+        return points
+    return np.concatenate([points, frusta_points(cameras, bounding_box(points))])
+
+
+def draw_image_behind(
+    late: LatePasses, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
+) -> None:
+    """Draw the image of the camera that is looked through, if there is one."""
+    camera = view.camera.fixed
+    if camera is None or options.image_brightness <= 0.0 or scene.images is None:
+        return
+    image = _image(scene, camera)
+    if image is not None:
+        late.camera_image_pass.draw_behind(camera, image, size, options.image_brightness)
+
+
+def draw_image_planes(
+    late: LatePasses, scene: Scene, view: View, options: DisplayOptions, box: Floats
+) -> None:
+    """Draw the images of the cameras whose frusta are drawn."""
+    if scene.images is None:
+        return
+    for camera in drawn_cameras(scene, view.camera.fixed, options):
+        image = _image(scene, camera)
+        if image is not None:
+            late.camera_image_pass.draw_plane(camera, image, view, frustum_depth(box), 1.0)

@@ -1,0 +1,37 @@
+"""Images that the calibrated cameras of a capture recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from viewer.rig.arrays import Bytes
+
+__all__ = ["CameraImage", "CameraImages"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraImage:
+    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, as the lens drew it."""
+
+    pixels: Bytes
+
+
+class CameraImages(Protocol):
+    """Source of images, which are read when they are drawn."""
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the cameras that have images."""
+
+    def at(self, camera: str, seconds: float) -> CameraImage | None:
+        """Return the image of a camera at a time of the scene; None if there is none.
+
+        The same object is returned as long as the image is the same. Faults of files are notes.
+        """
+
+    def size_of(self, camera: str) -> tuple[int, int] | None:
+        """Return the width and height of a camera's images, pixels; None if it has none."""
+
+    def notes_of(self, camera: str) -> list[str]:
+        """Return messages about a camera's missing or unusable images, one line each."""
