@@ -148,7 +148,7 @@ def test_unknown_letters_are_refused_and_known_ones_are_not(capsys, rig, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "choices", "meant"),
     [
-        (["render", "--shading", "phonk"], "phong, normals, ", "phong"),
+        (["render", "--shading", "phonk"], "phong, pbr, matcap, normals, ", "phong"),
         (["info", "--method", "dbs"], "lbs, dqs, mix", "lbs or dqs"),
         (["lint", "--fail-on", "warn"], "error, warning, note, never", "warning"),
         (["rig", "--scale", "unifrom"], "uniform, ", "uniform"),

@@ -23,6 +23,7 @@ from PIL import Image
 import viewer
 from viewer.app.view.picks import vertex_at
 from viewer.rendering.camera import facing_camera, fit
+from viewer.rendering.options import DisplayOptions
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import scene_points
 
@@ -161,12 +162,18 @@ def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure)
     scene = viewer.load(*figure)
     camera = facing_camera(guess_front(scene), scene.up)
     fit(camera, scene_points(scene), width / height)
-    assert (saved == viewer.render(scene, (width, height), camera)).all()
-    # And the window shows these pixels, but for tools at the upper edge, messages at the lower.
-    shown = app.screen()
+    options = DisplayOptions(quality="final")
+    assert (saved == viewer.render(scene, (width, height), camera, options)).all()
+    # The window shows these pixels, except for tools at the top and messages at the bottom, as soon
+    # as it has drawn all passes.
     x, y = map(int, places[1][:2])
     rows = slice(120, height - 120)
-    assert (shown[y : y + height, x : x + width][rows] == saved[rows, :, :3]).mean() > 0.999
+
+    def agrees() -> bool:
+        shown = app.screen()[y : y + height, x : x + width]
+        return bool((shown[rows] == saved[rows, :, :3]).mean() > 0.999)
+
+    _wait_for(agrees, "the same pixels in the window")
     app.key("ctrl+q")
     app.finish()
 

@@ -270,7 +270,7 @@ def test_input_is_never_replaced(tmp_path, capsys):
     assert (tmp_path / "smpl.npz").read_bytes() == kept
     rig = write_twist(tmp_path)
     assert run(["convert", rig[1], rig[0], "-o", str(tmp_path / "twist.skin"), "--force"]) == 5
-    assert "twist.skel: is an input file" in capsys.readouterr().err
+    assert "twist.skel: input files are never overwritten" in capsys.readouterr().err
 
 
 def test_several_actors_become_numbered_files(tmp_path, capsys):

@@ -77,10 +77,10 @@ def check_command(command: list[str], inputs: Inputs, folder: Path, refuse) -> N
         target.rmdir()
         for path in inputs.read_by(command):
             target.symlink_to(path)
-            refuse([*command, "--force"], f"{target}: is an input file")
+            refuse([*command, "--force"], f"{target}: input files are never overwritten")
             target.unlink()
         target.hardlink_to(inputs.read_by(command)[0])
-        refuse([*command, "--force"], f"{target}: is an input file")
+        refuse([*command, "--force"], f"{target}: input files are never overwritten")
         target.unlink()
     assert not contents(folder)
     assert {path: path.read_bytes() for path in inputs.all} == before
@@ -113,7 +113,7 @@ def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
         # The mesh's own texture is read without being named.
         for path in (*inputs.of_roof[:2], mesh.with_name("mesh_0.png")):
             target.symlink_to(path)
-            refuse([*command, "--force"], f"{target}: is an input file")
+            refuse([*command, "--force"], f"{target}: input files are never overwritten")
             target.unlink()
 
 
@@ -156,7 +156,7 @@ def test_one_existing_frame_stops_the_whole_sequence(inputs, folder, refuse):
 def test_folder_of_frames_is_an_input(inputs, folder, refuse):
     recording = Path(inputs.recording[0])
     command = ["convert", *inputs.recording, "-o"]
-    refuse([*command, str(recording), "--force"], "is an input folder")
+    refuse([*command, str(recording), "--force"], "input folders are never overwritten")
     refuse(
         [
             "convert",
@@ -169,7 +169,7 @@ def test_folder_of_frames_is_an_input(inputs, folder, refuse):
         "input",
     )
     (folder / "link").symlink_to(recording)
-    refuse([*command, f"{folder}/link", "--force"], "is an input folder")
+    refuse([*command, f"{folder}/link", "--force"], "input folders are never overwritten")
     (folder / "file").write_bytes(b"precious")
     refuse([*command, f"{folder}/file"], f"{folder}/file: expected a folder")
     assert run([*command, f"{folder}/new"]) == 0

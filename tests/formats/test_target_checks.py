@@ -91,7 +91,7 @@ def test_writing_into_an_input_folder_is_refused_by_name(tmp_path):
     (tmp_path / "take" / "smpl").mkdir(parents=True)
     target = tmp_path / "take" / "smpl" / "smpl"
     words = refused(target, [tmp_path / "take" / "smpl"], True, check_folder_target)
-    assert words.startswith(f"{tmp_path}/take/smpl: is an input folder")
+    assert words.startswith(f"{tmp_path}/take/smpl: nothing is written into input folders")
 
 
 @pytest.mark.parametrize("name", ["in", "in/smpl", "link"])
@@ -100,7 +100,7 @@ def test_input_folder_is_not_replaced(tmp_path, name):
     (tmp_path / "link").symlink_to("in")
     target = tmp_path / "in" / "smpl"
     words = refused(target, [tmp_path / name], True, check_folder_target)
-    assert words.startswith(f"{target}: is an input folder")
+    assert words.startswith(f"{target}: input folders are never overwritten")
     assert "input" in refused(tmp_path / "link" / "smpl", [target], True, check_folder_target)
 
 

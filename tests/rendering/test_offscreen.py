@@ -214,9 +214,9 @@ def work():
     thread = threading.Thread(target=lambda: viewer.render(scene, (64, 48)))
     thread.start()
     thread.join()
-for i in range(15):
+for i in range(25):
     work()
-    if i == 4:
+    if i == 14:
         before = resident()
 print(resident() - before)
 """

@@ -203,7 +203,8 @@ def test_opened_folder_is_never_replaced(bodies, tmp_path):
     (tmp_path / "out" / "smpl").mkdir(parents=True)
     bodies.state.paths = (tmp_path / "out",)
     save_motion(bodies.state, tmp_path / "out", everyone=True)
-    assert bodies.state.error.startswith(f"{tmp_path / 'out' / 'smpl'}: is an input folder")
+    folder = tmp_path / "out" / "smpl"
+    assert bodies.state.error.startswith(f"{folder}: input folders are never overwritten")
     assert bodies.state.job is None
 
 

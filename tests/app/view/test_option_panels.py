@@ -86,7 +86,7 @@ def test_shadings_show_what_they_need(tall):
     assert tall.state.options.matcap == "chrome"
     tall.pick("Shading", list(SHADING_CHOICES).index("pbr"))
     before = tall.scene_picture()
-    tall.drag("Metallic", 1.3, "Metallic")
+    tall.drag("Metallic", 1.3)
     assert tall.state.options.metallic == 1.0
     assert (tall.scene_picture() != before).any()
     assert "Matcap" not in tall.state.item_rects

@@ -57,7 +57,7 @@ def test_blend_slider_mixes_from_either_method(skinning):
 
 
 def test_blend_drag_is_one_undo_step(skinning):
-    skinning.drag("DQS fraction", 0.75, "DQS fraction")
+    skinning.drag("DQS fraction", 0.75)
     assert skinning.undo_steps == 1
     skinning.key("z", "ctrl")
     assert _chosen(skinning) == Skinning()
@@ -83,7 +83,7 @@ def test_engine_box_limits_to_four_influences_and_back(wide):
 
 
 def test_influences_slider_acts_only_with_the_box_checked(wide):
-    wide.drag("Influences", 0.0, "Influences")
+    wide.drag("Influences", 0.0)
     assert _chosen(wide).max_influences == 0
     whole = wide.scene_picture()
     wide.click("engine")

@@ -265,7 +265,7 @@ def test_pinning_is_not_an_undo_step(pinned):
     assert pinned.undo_steps == 0
 
 
-@pytest.mark.parametrize(("width", "digits"), [(480, 3), (960, 4), (1100, 4), (1280, 4)])
+@pytest.mark.parametrize(("width", "digits"), [(480, 4), (960, 3), (1100, 4), (1280, 4)])
 def test_panel_needs_no_sideways_scrolling(drive, rig, texts, width, digits):
     hand = drive(*rig, size=(width, 640), samples=1)
     pin_vertex(hand.state, 0, 4)
