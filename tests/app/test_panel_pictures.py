@@ -155,7 +155,7 @@ def test_interface_matches_golden_images(drive, rig, name):
 def test_body_panels_match_golden_images(drive_body, name):
     kind, prepare = BODIES[name]
     hand = drive_body(kind, size=BODY_SIZE)
-    hand.state.of(ShownPanels).closed.add("joints")  # its times differ between runs
+    hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
 
