@@ -42,7 +42,7 @@ def newly_outside(
     target : Mesh
         The mesh that was rigged.
     joints : (J, 3) or None
-        In the target's frame; None if they are the template's.
+        Joint positions in the target's frame; None if they are the template's.
     transferred : (J,) bool or None
         Joints that are expected inside, unlike those of a part that the target lacks. None for all.
     """
@@ -83,11 +83,11 @@ def check_lines(
     figure : Figure
         Provides joint names.
     guarded : (V,) bool
-        From ``invert_skinning``.
+        Result of ``invert_skinning``.
     out : tuple of int
-        From ``newly_outside``.
+        Result of ``newly_outside``.
     residual : float
-        From ``residual_of``.
+        Result of ``residual_of``.
     """
     lines = []
     if out:
@@ -107,7 +107,7 @@ def check_lines(
 
 
 def with_joint_name(line: Diagnostic, figure: Figure) -> Diagnostic:
-    """Replace the number of a joint in a message with its name."""
+    """Replace the index of a joint in a message with its name."""
     skeleton, joint = figure.skeleton, line.values.get("joint")
     if skeleton is None or not isinstance(joint, int):
         return line

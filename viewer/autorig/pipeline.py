@@ -34,7 +34,7 @@ def transfer(
     pose : Pose
         Poses and shapes the template approximately like the target.
     target : Mesh
-        Not changed: posed by ``Rigged.pose``, the figure reproduces the target.
+        Not modified; the new figure, posed by ``Rigged.pose``, reproduces it.
     settings : TransferSettings, optional
         The robust method with its default limits if omitted.
     report : callable, optional

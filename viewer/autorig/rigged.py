@@ -96,7 +96,7 @@ def clip_for(rigged: Rigged, clip: Clip | SampledClip) -> Clip | SampledClip:
     Raises
     ------
     RigError
-        If it is a clip of another skeleton.
+        If the clip is for a different skeleton.
     """
     skeleton = rigged.figure.require_skeleton()
     return transfer_clip(

@@ -297,14 +297,14 @@ def read(source: Source) -> Content:
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     """Write a clip, a pose, or the part of a figure that the format of the suffix holds.
 
-    A file of that name is replaced.
+    An existing file is replaced.
 
     Parameters
     ----------
     content : Figure, Clip or PoseRecord
         Content of the file.
     path : str or Path
-        Its suffix chooses the format.
+        Its suffix determines the format.
 
     Raises
     ------

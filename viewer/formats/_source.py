@@ -283,7 +283,7 @@ class Source:
         return b"" if first is None else self.data[first.start() : first.start() + size]
 
     def looks_like(self) -> str | None:
-        """Return the apparent kind of a file in no supported text format, e.g. ``"gzip data"``."""
+        """Return the apparent type of a file in no supported text format, e.g. ``"gzip data"``."""
         head = self.head(_LOOK)
         if not head:
             return "only white space" if self.data else "an empty file"

@@ -49,7 +49,7 @@ def filled_normals(
 
 
 def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
-    """Return the numbers of polygons by size: ``"2 quads, 1 with 5 or more corners"``."""
+    """Return polygon counts by size: ``"2 quads, 1 with 5 or more corners"``."""
     sizes = [counted(int((counts == size).sum()), name) for size, name in _SIZES.items()]
     large = int((counts > 4).sum())
     parts = [text for text in sizes if not text.startswith("0 ")]

@@ -314,7 +314,7 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
     Raises
     ------
     UnsupportedFormatError
-        If it is a figure, or channels are missing or in another order.
+        If the content is a figure, or channels are missing or in a different order.
     OutputError
         If the file cannot be written.
     """

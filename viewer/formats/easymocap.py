@@ -6,7 +6,7 @@
     out/keypoints3d/000000.json   3D keypoints of the same frames
     out/smpl/01/000000.json       fits of single views: the first view is read
     intri.yml, extri.yml          cameras, in that folder or one of the two above it
-    images/01/000000.jpg          their images, the same
+    images/01/000000.jpg          camera images, in one of the same folders
 
     frame    [person, …]  or  {"annots": [person, …], …}
     person   {"id": 0, "Rh": [[3]], "Th": [[3]], "poses": [[P]], "shapes": [[10]],
@@ -86,7 +86,7 @@ def open_capture(
         Layout of keypoints, see ``keypoint_layout``, to choose between layouts with the same
         number of points: ``"h36m"``, ``"panoptic"``.
     images : Path, optional
-        Folder of the cameras' image folders; by default ``images`` beside the recording.
+        Folder of the cameras' image folders; by default ``images`` next to the recording.
 
     Returns
     -------

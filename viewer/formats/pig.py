@@ -11,7 +11,7 @@
     body_parts.txt V x 1, body_part_defs.txt, sym.txt V x 1                 optional
     reduced_ids.txt R x 1, reduced_faces.txt N x 3                          optional
 
-A pose is 190 numbers: translation (3), 62 x 3 rotations, scale. The root's rotation is angles
+A pose has 190 values: translation (3), 62 x 3 rotations, scale. The root's rotation is angles
 about z, y and x, all others are rotation vectors. Scale and translation come last, about the
 origin.
 """
@@ -298,7 +298,7 @@ def _regressor(parts: dict[str, Part], n_joints: int, n_vertices: int) -> JointR
 
 
 def _column(parts: dict[str, Part], name: str, rows: int, end: int, noun: str) -> Ints | None:
-    """Return an optional column with one number per vertex."""
+    """Return an optional column with one value per vertex."""
     if name not in parts:
         return None
     part = parts[name]

@@ -6,7 +6,7 @@
     line     = "comment" text | "element" name count | "property" type name
              | "property" "list" type type name
 
-Used are x y z, nx ny nz, and s t (or u v, texture_u texture_v) of ``vertex``; the corners
+Properties used: x y z, nx ny nz, s t (or u v, texture_u texture_v) of ``vertex``; the corners
 (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers per corner, of ``face``. A
 comment ``TextureFile`` names a texture image. Polygons are triangulated; other data is ignored with
 a warning that names it.

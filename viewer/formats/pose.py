@@ -8,17 +8,17 @@
             "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …], "up": "y",
             "dof_layout": word}
     .npz   the same arrays, dof_names and dofs apart
-    .txt   the model's own numbers, separated by white space: 190 for PIG, 72 for SMPL …
+    .txt   the model's own pose vector, separated by white space: 190 values for PIG, 72 for SMPL …
 
-``joint_turns`` are rotations as quaternions in the figure's axes, for figures with other DOFs than
-``dof_layout`` names. Figures with the same DOFs use ``dofs``, edited or not, and the transforms
-below them, ``joint_rotations`` and ``joint_shifts``: rotations and shifts of joints relative to
-their parents, written only if not at rest.
+``joint_turns`` are rotations as quaternions in the figure's axes, for figures whose DOFs differ
+from those that ``dof_layout`` identifies. Figures with the same DOFs use ``dofs``, edited or not,
+and the transforms below them, ``joint_rotations`` and ``joint_shifts``: joint rotations and
+translations relative to the parents, written only if not at rest.
 
-Both kinds of named values may instead contain one frame of smplx's parameters: ``global_orient``,
-``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``, ``leye_pose``, ``reye_pose``,
-``poses``, ``betas``, ``expression``, ``transl`` or ``trans``; in addition ``use_pca`` and
-``flat_hand_mean``.
+Both formats with named values may instead contain one frame of smplx's parameters:
+``global_orient``, ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``,
+``leye_pose``, ``reye_pose``, ``poses``, ``betas``, ``expression``, ``transl`` or ``trans``; in
+addition ``use_pca`` and ``flat_hand_mean``.
 """
 
 from __future__ import annotations
@@ -294,7 +294,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     content : PoseRecord
         Pose to write; other content is refused.
     path : str or Path
-        ``.json``, ``.npz``, or ``.txt`` for the model's own numbers alone.
+        ``.json``, ``.npz``, or ``.txt`` for the model's own pose vector alone.
 
     Raises
     ------

@@ -53,7 +53,7 @@ def read(source: Source) -> NamedFiles:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar or names no file.
+        With file and line, if the text breaks the grammar or does not name a file.
     """
     words = list(_WORD.finditer(source.data))
     words.reverse()

@@ -124,7 +124,7 @@ def _mesh(source: Source, archive: Archive, used: list[str]) -> Mesh:
 
 
 def _parents(archive: Archive, used: list[str]) -> Ints:
-    """Return each joint's parent; the root's has four spellings."""
+    """Return each joint's parent; the root's is encoded in four ways."""
     table = archive.array("kintree_table").values()
     if table.ndim not in (1, 2) or (table.ndim == 2 and len(table) != 2) or table.size == 0:
         raise archive.fault(

@@ -66,11 +66,11 @@ class Figure:
     body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
         Further annotations of the mesh.
     symmetry : (V,) int32 or None
-        Mirror partner of each vertex.
+        Mirror counterpart of each vertex.
     points : PointLayout or None
         Layout of a figure that consists of captured keypoints only.
     fields : tuple of VertexField
-        Precomputed numbers of the vertices, to be shown as colours.
+        Precomputed values per vertex, to be shown as colours.
     facts : tuple of (str, str or Diagnostic)
         Findings of the reader for ``viewer info``, each a heading and a text.
     """

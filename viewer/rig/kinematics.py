@@ -27,7 +27,7 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
     Pointer doubling: every pass multiplies each joint's matrix by that of the ancestor it points
-    to and then takes over that ancestor's pointer, so a chain of n joints takes log2(n) passes
+    to and then adopts that ancestor's pointer, so a chain of n joints takes log2(n) passes
     (Hillis and Steele 1986).
 
     Parameters

@@ -12,15 +12,15 @@ from viewer.rig.arrays import Bytes, Floats, frozen
 __all__ = ["ALPHA_MODES", "TEXTURES", "WRAPS", "Material", "Texture"]
 
 ALPHA_MODES = ("opaque", "mask", "blend")
-"""Alpha ignored; below the cutoff cut out; mixed with what is behind."""
+"""Alpha ignored; cut out below the cutoff; blended with the background."""
 
 WRAPS = ("clamp", "repeat", "mirror")
-"""Texture coordinates outside 0 to 1: the edge, the image again, or mirrored every other time."""
+"""Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
-    """A image, and how it is placed and sampled.
+    """An image, and how it is placed and sampled.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Texture:
         Pixels with alpha, first row at v = 1; sRGB in textures of colours, linear in others;
         None if it could not be read.
     channel : int
-        Column of ``image`` that textures of one number are read from.
+        Column of ``image`` that single-channel textures are read from.
     uv_set : int
         0 for ``Mesh.uvs``, 1 for ``Mesh.second_uvs``.
     transform : (2, 3)
@@ -92,27 +92,27 @@ class Material:
     metallic, roughness : float
         0 to 1; roughness is perceptual, the square root of the GGX width.
     metallic_texture, roughness_texture : Texture or None
-        One number each, often two channels of one image.
+        One channel each, often two channels of one image.
     normal_texture : Texture or None
         Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1.
     normal_scale : float
-        Factor on their red and green parts.
+        Multiplier for the red and green components of the normals.
     occlusion_texture : Texture or None
-        Fraction of the surrounding light that arrives: one number.
+        Fraction of the ambient light that arrives: one channel.
     occlusion_strength : float
         0 to 1.
     emissive : (r, g, b)
-        Light that the surface gives off, linear, may exceed 1.
+        Emitted light, linear; may exceed 1.
     emissive_texture : Texture or None
-        Its colour, sRGB.
+        Colour of the emitted light, sRGB.
     alpha_mode : str
         Entry of ``ALPHA_MODES``.
     alpha_cutoff : float
-        Least opacity that is drawn with the mode ``"mask"``.
+        Minimum opacity that is drawn in the mode ``"mask"``.
     double_sided : bool
         Whether back faces are drawn: the counter-clockwise side is the front.
     unlit : bool
-        Whether the base colour is shown as it is.
+        Whether the base colour is shown without lighting.
     is_physical : bool
         Whether the file describes the surface by metallic and roughness, or as unlit.
     """
@@ -155,7 +155,7 @@ class Material:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the name and one opaque picture describe the material in full."""
+        """Whether the name and one opaque image fully describe the material."""
         base = self.base_texture
         return (
             not set(self.textures) - {"base_texture"}

@@ -43,7 +43,7 @@ class Mesh:
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
     second_uvs : (U, 2) or None
-        Another texture coordinate for each row of ``uvs``, for textures that name this set.
+        A second texture coordinate for each row of ``uvs``, for textures that name this set.
     """
 
     positions: Floats

@@ -74,8 +74,8 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     Raises
     ------
     RigError
-        If a vertex index lies outside the mesh, or the figure has no mesh, or shapes of another
-        kind.
+        If a vertex index lies outside the mesh, or the figure has no mesh, or has blend shapes
+        other than morphs.
     """
     if not targets:
         return figure
@@ -144,5 +144,5 @@ def _check_vertices(target: MorphTarget, figure: Figure, count: int) -> None:
 
 
 def _refusal(key: str, target: MorphTarget, figure: Figure, **values: Any) -> RigError:
-    """Return the error that a target does not match a figure."""
+    """Return the error for a target that does not match a figure."""
     return RigError(Diagnostic(key, values={"morph": target.name, "figure": figure.name, **values}))

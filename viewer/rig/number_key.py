@@ -32,7 +32,7 @@ class NumberKey:
         self._parts = tuple(map(bytearray, arrays))
 
     def updated(self, *arrays: Floats) -> NumberKey:
-        """Return the key of the arrays' present contents: this one if they are the same bit by bit.
+        """Return the key of the arrays' present contents: this one if they are bitwise equal.
 
         Arrays are compared without copying, and only those that changed are copied.
         """

@@ -1,4 +1,4 @@
-"""Formatting of numbers and angles for display."""
+"""Number and angle formatting for display."""
 
 from __future__ import annotations
 

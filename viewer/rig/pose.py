@@ -103,7 +103,7 @@ class PoseKey(NamedTuple):
 
 
 def pose_key(pose: Pose) -> PoseKey:
-    """Return a key that identifies the pose. It copies no number unless one has changed."""
+    """Return a key that identifies the pose. Nothing is copied unless a value has changed."""
     return PoseKey(pose.skinning_key, pose.figure_scale, tuple(pose.figure_translation.tolist()))
 
 

@@ -61,7 +61,7 @@ class Actor:
     clip : Motion or None
         Its motion, which ``viewer.rig.motion.evaluation.pose_actor`` evaluates.
     placement : (4, 4)
-        Figure space to scene.
+        Figure space to scene space.
     visible : bool
         Whether it is drawn.
     offset : float
@@ -77,7 +77,7 @@ class Actor:
     is_present : bool
         Whether its clip covers the current time.
     called : str
-        Name of the recording that was opened for it; empty to use the figure's name.
+        Name of the recording opened for this actor; empty to use the figure's name.
     """
 
     figure: Figure
@@ -100,7 +100,7 @@ class Actor:
 
     @property
     def name(self) -> str:
-        """Label in menus and files: the title, and the part of the recording that it is."""
+        """Label in menus and files: the title, and which part of the recording it is."""
         is_part = self.called and self.figure.points is not None
         name = f"{self.title} {self.figure.name}" if is_part else self.title
         return name if self.person is None else f"{name} {person_name(self.person)}"
@@ -179,7 +179,7 @@ class Scene:
     views : tuple of CameraView
         Calibrated cameras of a capture.
     images : CameraImages or None
-        Their images, if there are some.
+        Images of the cameras, if available.
     time : float or None
         Current time of its motions, seconds; None for their start.
     files : tuple of Path

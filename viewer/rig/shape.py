@@ -66,7 +66,7 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
 
 
 def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = None) -> Figure:
-    """Return the figure with another rest mesh and the joints regressed from it.
+    """Return the figure with a new rest mesh and the joints regressed from it.
 
     Without a joint regressor the joints keep their positions. Rest rotations never change.
 
@@ -194,7 +194,7 @@ def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True)
     Returns
     -------
     (V, 3)
-        Binding space.
+        In the bind pose.
     """
     if not correct or figure.correctives is None or figure.skeleton is None:
         return mesh.positions

@@ -22,7 +22,7 @@ def fit_axes(
 ) -> Similarity:
     """Fit a separate scale along each axis.
 
-    Each iteration solves for factors f, a shift t and, if asked, a small rotation w that minimise
+    Each iteration solves for factors f, a shift t and, optionally, a small rotation w that minimise
     sum (n . (x - q))^2 + 1e-5 |x - q|^2 with x = f R p + f' (w x R p) + t, or with the template's
     axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all
     unknowns.
@@ -69,7 +69,7 @@ def fit_axes(
 def _columns(
     points: Floats, rotation: Floats, before: Floats, rotations: bool, own: bool
 ) -> Floats:
-    """Return the derivatives of points by factors, shift and rotation: (N, 3, 6 or 9)."""
+    """Return the Jacobian of points by factors, shift and rotation: (N, 3, 6 or 9)."""
     if own:
         scaled = points[:, None, :] * rotation
         arms, lift = (points * before) @ rotation.T, np.ones(3)

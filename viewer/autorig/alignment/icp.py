@@ -68,7 +68,7 @@ class Side(Protocol):
 
 
 class Cloud:
-    """A mesh as a dense point cloud: a fast search, off by up to half the spacing.
+    """A mesh as a dense point cloud: a fast search, accurate to half the point spacing.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def slide(
 ) -> Similarity:
     """Improve a good alignment by point-to-plane distances, which let surfaces slide.
 
-    Each iteration solves the linearised problem: with x = aligned p, c the middle of all x and
+    Each iteration solves the linearised problem: with x = aligned p, c the mean of all x and
     x' = x + w x (x - c) + u (x - c) + v, minimise sum (n . (x' - q))^2 + 1e-5 |x' - q|^2 over
     the rotation w, the shift v and the relative change of scale u. The second term prevents
     unbounded sliding.
@@ -293,7 +293,7 @@ def _kept(
 
 
 def _rotated(similarity: Similarity, normals: Floats) -> Floats:
-    # Normals rotate by the inverse transpose.
+    # Normals transform by the inverse transpose.
     return unit(((normals / similarity.own_factors) @ similarity.rotation.T) / similarity.factors)
 
 

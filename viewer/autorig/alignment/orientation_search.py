@@ -71,7 +71,7 @@ def axis_rotations(
     Parameters
     ----------
     template_up : "y" or "z"
-        The axis that points up in the template. Y-up figures face +z, z-up ones +x.
+        Up axis of the template. Y-up figures face +z, z-up ones +x.
     up, facing : str, optional
         One of ``AXES`` each: where the template's up and forward axes are mapped.
 
@@ -124,7 +124,7 @@ def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bo
     rotations : list of (3, 3)
         From ``axis_rotations``.
     scaled : bool
-        Whether other units are tried as well.
+        Whether scales between units are tried as well.
 
     Returns
     -------

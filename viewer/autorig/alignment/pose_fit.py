@@ -1,4 +1,4 @@
-"""Fit of a template's pose and proportions to a target, by joint rotations and limb scales.
+"""Fit a template's pose and proportions to a target, by joint rotations and limb scales.
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
@@ -59,7 +59,7 @@ class Fitted:
     pose : Pose
         DOFs are within their limits; the remainder is in the joints' quaternions.
     similarity : Similarity
-        From the posed figure to the target.
+        Map from the posed figure to the target.
     rotated : (J, 3)
         Total rotation vectors of the joints, radians.
     grown : (2, J)
@@ -84,7 +84,7 @@ def fit_pose(
 ) -> Fitted:
     """Rotate a template's joints and scale its limbs until its surface matches the target's.
 
-    Limbs of a symmetric template are scaled alike on both sides.
+    Limbs of a symmetric template are scaled equally on both sides.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """One iteration of fitting a template: the linear problem for joint rotations and limb scales.
 
-With x a vertex aligned with the target, m the mean of all, c_j a joint, w_vj the weight of
+With x a vertex aligned with the target, m the mean of all x, c_j a joint, w_vj the weight of
 vertex v, s_vj the sum of its weights for joint j and all below it, and P_j the projection onto
 the limb's axis::
 
@@ -8,8 +8,8 @@ the limb's axis::
     x'  = x + w x (x - m) + t + u (x - m) + sum_j s_vj w_j x (x - c_j)
             + sum_j (l_j P_j + g_j (1 - P_j)) e_j
 
-The rotations w_j, growths l_j along and g_j across the limbs, and w, t and u of the whole, minimise
-the mean of
+The rotations w_j, growths l_j along and g_j across the limbs, and w, t and u of the
+whole figure, minimise the mean of
 
     (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
     h |x' - q|^2        over vertices and the target's points closest to them, in any direction
@@ -88,13 +88,13 @@ class PoseStep:
     Attributes
     ----------
     middle : (3,)
-        Centre of rotation and growth of the whole.
+        Centre of the whole figure's rotation and scaling.
     rotation, shift : (3,)
-        Rotation vector and shift of the whole; the shift in the target's unit.
+        Rotation vector and shift of the whole figure; the shift in the target's unit.
     growth : float
-        Logarithm of the whole's scale.
+        Logarithm of the whole figure's scale.
     rotation_vectors : (J, 3)
-        Rotation vectors of the joints, 0 for roots, which rotate with the whole.
+        Rotation vectors of the joints, 0 for roots, which rotate with the whole figure.
     limb_growths : (2, J)
         Logarithms of the limbs' scales: along, across.
     """
@@ -139,15 +139,15 @@ def solve_step(
     parents : (J,)
         -1 for roots.
     pairs : Pairs
-        One pair at least.
+        At least one pair.
     size : float
-        Of the target.
+        Size of the target.
     rotated : (J, 3)
-        Sum of the rotations of former iterations, radians.
+        Sum of the rotations of previous iterations, radians.
     grown : (2, J)
-        Sum of the limbs' growths.
+        Sum of the limbs' growths in previous iterations.
     scales : bool
-        Whether the whole and limbs may grow.
+        Whether the figure and its limbs may be scaled.
 
     Returns
     -------
@@ -230,7 +230,7 @@ def _reach(frame: _Frame, vertices: Ints, spokes: Floats) -> Floats:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Return a x b (..., 3); ``numpy.cross`` takes three times as long on so many."""
+    """Return a x b (..., 3); ``numpy.cross`` takes three times as long on arrays this large."""
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3

@@ -2,7 +2,7 @@
 
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
 similarity aligns one with the other. So if the alignment leaves a large error, pose and proportions
-are fitted too, and kept if that removes most of the error. A figure in another pose also looks
+are fitted too, and kept if that removes most of the error. A figure in a different pose also looks
 nearly the same from behind: if the alignment is ambiguous, both facings are fitted.
 """
 
@@ -40,7 +40,7 @@ __all__ = ["PosedAlignment", "align_posed"]
 
 _CLOSE = 0.002  # misfit over size up to which joints are not rotated
 # Fraction of the misfit that may remain if rotated joints are to be kept: clothes fit a
-# little better with a bent body, but only a figure in another pose fits much better.
+# little better with a bent body, but only a figure in a different pose fits much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
 # A misfit above the first after a joint was rotated by more than the second indicates a different
 # kind of figure: a fox fitted to a pig bends its spine until its legs meet any surface.
@@ -63,7 +63,7 @@ class PosedAlignment:
     Attributes
     ----------
     alignment : Alignment
-        Of the template in ``pose``.
+        Alignment of the template in ``pose``.
     figure : Figure
         The template, with scaled limbs if needed.
     pose : Pose
@@ -111,7 +111,7 @@ def align_posed(
     template : Figure
         With mesh, skeleton and skin, and its shape applied.
     pose : Pose
-        Of the template, without shape weights.
+        Pose of the template, without shape weights.
     target : Mesh
         With triangles.
     settings : AlignmentSettings
@@ -254,7 +254,7 @@ def _stretched(
 
 
 def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
-    """Return whether a stretched template leaves a much smaller error than another."""
+    """Return whether a stretched template leaves a much smaller error than the other alignment."""
     gap = misfit(stretched.alignment, False)
     return gap <= _STRETCH_LEFT * misfit(other.alignment, False)
 

@@ -31,7 +31,7 @@ class Limbs:
     Attributes
     ----------
     weights : (V, J)
-        Of the skin, normalised to a sum of 1 per vertex.
+        Weights of the skin, normalised to a sum of 1 per vertex.
     fractions : (V, J)
         Sums of the weights of a joint and all below it.
     axes : (J, 3)
@@ -50,7 +50,7 @@ def limbs_of(figure: Figure) -> Limbs:
     """Return a figure's limbs.
 
     An axis points from the joint to those below it, each weighted by its fraction of the mesh,
-    or to the mean of the vertices of a last joint.
+    or, for a leaf joint, to the mean of its vertices.
 
     Parameters
     ----------

@@ -23,11 +23,11 @@ class Similarity:
     Attributes
     ----------
     scale : float
-        Common to all axes.
+        Scale common to all axes.
     rotation : (3, 3)
-        Proper, applied first.
+        Proper rotation, applied after ``own_factors``.
     shift : (3,)
-        In the unit of the target space.
+        Translation in the unit of the target space.
     factors : (3,)
         Further scales along the axes of the target space; their product is 1.
     own_factors : (3,)

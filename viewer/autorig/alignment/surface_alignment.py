@@ -50,7 +50,7 @@ _IN_PLACE = 0.03  # misfit over size up to which a mesh may be in place already
 _SURELY = 0.003  # mean distance over size up to which no search is made
 _SLIDING = 0.02  # misfit over size up to which sliding refines the fit
 # Fraction of that misfit that a search must reach to move the mesh after all: a part of a figure
-# fits nearly as well in many other positions, the whole of it does not.
+# fits nearly as well in many other positions, a whole figure does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
 PART = 0.05
 """Fraction of the size: if template points are farther than this, the target is only a part."""
@@ -82,7 +82,7 @@ class AlignmentSettings:
     Attributes
     ----------
     up, facing : str or None
-        The target's axes, of ``orientation_search.AXES``; None to detect them.
+        The target's axes, from ``orientation_search.AXES``; None to detect them.
     scale : str
         One of ``SCALES``.
     landmarks : (N, 2, 3) or None
@@ -91,7 +91,7 @@ class AlignmentSettings:
     refines : bool
         Whether closest points refine landmarks or the result of the search.
     matrix : (4, 4) or None
-        A given alignment, as dragged in the window: nothing is searched.
+        A given alignment, such as one set by hand in the window; it replaces the search.
     samples : int
         Points distributed over each surface for which closest points on the other are searched.
         The run time of a fit is proportional to it.
@@ -160,7 +160,7 @@ class Alignment:
         similarity : Similarity
             Placement of the template.
         how : str
-            See above.
+            As in the attribute of this name.
         """
         size = target.size
         gaps = gaps_between(template, target, similarity)
@@ -359,5 +359,5 @@ def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
 
 
 def _by_axis(numbers: Floats) -> dict[str, float]:
-    """Return three numbers as values of a message, by axis."""
+    """Return three values as parameters of a message, by axis."""
     return dict(zip("xyz", numbers.tolist(), strict=True))

@@ -35,8 +35,8 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     Returns
     -------
     (V,) bool
-        Those of islands with a negative volume, sum a . (b x c) / 6 about their middle, which are
-        closed except for small holes, or have more than half of the area.
+        Vertices of islands with a negative volume, sum a . (b x c) / 6 about their middle, that
+        are closed except for small holes, or have more than half of the area.
     """
     count = target.n_islands
     of = target.islands[target.triangles[:, 0]]

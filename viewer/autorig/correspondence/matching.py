@@ -86,7 +86,7 @@ class Matches:
 
 
 class Template:
-    """The surface that others are matched to, aligned with them.
+    """The template's surface, to which targets are matched, aligned with the target.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ def _nearest(points: Floats, asked: Floats) -> tuple[Any, Floats]:
 
 
 def _keys(pairs: Ints, template: Welded) -> Ints:
-    """Return one number for each undirected pair of the template's vertices."""
+    """Return a unique integer for each undirected pair of the template's vertices."""
     low, high = pairs.min(axis=1).astype(np.int64), pairs.max(axis=1)
     keys: Ints = low * len(template.positions) + high
     return keys

@@ -44,7 +44,7 @@ def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
 def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSamples:
     """Return evenly distributed points of a surface, deterministically.
 
-    Positions along the cumulative area are evenly spaced, so every triangle gets its part, rounded
+    Positions along the cumulative area are evenly spaced, so every triangle gets its share, rounded
     up or down. Within a triangle the point is a (1 - sqrt u) + b sqrt u (1 - v) + c v sqrt u
     (Turk 1990), with u and v from the R2 sequence (multiples of the plastic number's powers).
 
@@ -55,7 +55,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
     triangles : (T, 3)
         Vertex indices.
     count : int
-        N.
+        Number of points, N.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def even_vertices(positions: Floats, triangles: Ints, count: int) -> Ints:
     triangles : (T, 3)
         Vertex indices.
     count : int
-        Maximum number.
+        Maximum number of vertices.
 
     Returns
     -------

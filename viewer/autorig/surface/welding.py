@@ -1,4 +1,4 @@
-"""Welding of a mesh into connected surfaces: coincident vertices joined, islands labelled.
+"""Weld a mesh into connected surfaces: coincident vertices joined, islands labelled.
 
 Files repeat a vertex along seams of texture coordinates and hard edges. Problems solved on a
 surface must not treat these as borders, or the mesh would tear there.
@@ -29,7 +29,7 @@ class Welded:
     positions : (W, 3)
         Position of the first of the vertices that were joined.
     triangles : (F, 3) int32
-        Those with three different corners.
+        Triangles with three different corners.
     vertices : (V,) int32
         The welded vertex of each vertex of the mesh.
     islands : (W,) int32
@@ -98,7 +98,7 @@ def islands(n_vertices: int, triangles: Ints) -> Ints:
     Returns
     -------
     (V,) int32
-        Numbers from 0, in the order of their first vertices.
+        Labels from 0, in the order of their first vertices.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     links = edges(triangles)

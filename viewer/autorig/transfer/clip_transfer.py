@@ -27,7 +27,7 @@ def transfer_clip(
     """Return a clip of the template for the rigged target.
 
     Angles are unchanged; lengths are scaled with the figure, so that a path takes the same number
-    of steps. The clip keeps the template's own axes, including its up axis.
+    of footsteps. The clip keeps the template's own axes, including its up axis.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def transfer_clip(
     length_scale : float
         Target units per unit of the template's figure space, 1 if nothing was scaled.
     figure_scale : float
-        The scale of the whole figure in the template's pose: the target's lengths already
+        Scale of the whole figure in the template's pose: the target's lengths already
         include it.
     path_scale : float or None
         Replaces ``length_scale`` for the figure's translation and its roots, which scale with the

@@ -58,7 +58,7 @@ def transfer_correctives(
         return None
     factors = scale * _fade(matched, positions, target_triangles)
     transferred = np.empty((len(offsets), len(positions), 3))
-    # One axis at a time, as all three at once would take three times the memory.
+    # One corrective at a time, which bounds the memory of the temporaries.
     for row, direction in zip(transferred, offsets, strict=True):
         np.multiply(interpolate(points, triangles, direction), factors[:, None], out=row)
     return Correctives(transferred)

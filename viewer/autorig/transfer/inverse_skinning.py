@@ -56,14 +56,14 @@ def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedS
     positions : (V, 3)
         Posed vertices.
     skin : Skin
-        Of V vertices.
+        Skin of V vertices.
     palette : (J, 4, 4)
         Skinning matrices of the pose, bind to posed.
 
     Returns
     -------
     InvertedSkinning
-        In the bind space of the skin.
+        Vertices in the bind pose of the skin.
     """
     matrices = blended_matrices(skin, palette)
     linear = matrices[:, :, :3]

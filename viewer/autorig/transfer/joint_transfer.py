@@ -27,7 +27,7 @@ class TransferredJoints:
     Attributes
     ----------
     positions : (J, 3)
-        In the pose of the target.
+        Positions in the pose of the target.
     transferred : (J,) bool
         Joints moved by the surface around them; the others moved with their parents.
     measurable : (J,) bool
@@ -82,7 +82,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     Parameters
     ----------
     skin : Skin
-        Of the template.
+        Skin of the template.
     parents : (J,)
         -1 for roots.
 
@@ -126,11 +126,11 @@ def transfer_joints(
     Parameters
     ----------
     joints : (J, 3)
-        Posed and aligned with the target.
+        Joint positions, posed and aligned with the target.
     parents : (J,)
         -1 for roots; parents come first.
     regressor : JointRegressor
-        The model's own, or ``boundary_weights``.
+        The model's own regressor, or ``boundary_weights``.
     shifts : (V, 3)
         From ``surface_shifts``.
     matched : (V,) bool

@@ -1,4 +1,4 @@
-"""Fit of a skeleton to new proportions: same joints and DOFs, other distances between them."""
+"""Fit a skeleton to new proportions: same joints and DOFs, different bone lengths."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RestSkeleton:
         Its rest pose is that of the template, in the template's axes and the target's
         unit, so clips and poses of the template keep their meaning.
     inverse_bind : (J, 4, 4)
-        For the pose in which the template is bound.
+        Inverse bind matrices for the template's bind pose.
     pose : Pose
         Puts the joints at their positions in the target.
     root_scale : float
@@ -71,11 +71,11 @@ def fit_rest_skeleton(
     template : Figure
         With the pose's shape applied, with skeleton and skin.
     pose : Pose
-        Of the template.
+        Pose of the template.
     similarity : Similarity
-        From the posed template, with the pose's own scale and translation, to the target.
+        Map from the posed template, with the pose's own scale and translation, to the target.
     joints : (J, 3)
-        In the target's frame.
+        Joint positions in the target's frame.
     transferred : (J,) bool or None
         Joints that were measured on the target. A symmetric template then gives a symmetric
         skeleton: left and right offsets are averaged, or taken from the measured side.
@@ -219,7 +219,7 @@ def _rotate_roots(
         return skeleton, []
     limits = skeleton.dof_limits.copy()
     low, high = limits[rows[ball], 0], limits[rows[ball], 1]
-    # R(quaternion) R(DOFs) must give the wanted rotation: ball joints solve for the DOFs, other
+    # R(quaternion) R(DOFs) must give the target rotation: ball joints solve for the DOFs, other
     # joints keep them and solve for the quaternion.
     angles = _angles_within((np.swapaxes(beneath, 1, 2) @ wanted)[ball], low, high)
     pose.dofs[rows[ball]] = angles

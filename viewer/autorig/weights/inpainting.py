@@ -1,4 +1,4 @@
-"""Inpainting of missing weights, as smooth as the surface allows.
+"""Inpaint missing weights, as smoothly as the surface allows.
 
 Between known weights W_m the unknown ones W_u minimise trace(W^T Q W), Q = L + L M^-1 L, with
 the Laplacian L and vertex areas M (Abdrashitov et al. 2023)::
@@ -56,7 +56,7 @@ def inpaint(
     Returns
     -------
     weights : sparse (U, J) in rows
-        Of the unknown vertices in order. No weight is negative, rows add up to 1.
+        Weights of the unknown vertices, in order. No weight is negative, rows add up to 1.
     method : str
         Solver that succeeded: "direct" unless that failed.
 

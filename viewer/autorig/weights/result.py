@@ -61,7 +61,7 @@ class WeightTransfer:
         Vertices whose weights were solved for. Those neither matched nor inpainted belong to a
         rigid island.
     distances : (V,)
-        To the template, in the target's unit.
+        Distances to the template, in the target's unit.
     angles : (V,)
         Radians between the normals of both, 0 where the target has none.
     points : SurfacePoints or None
@@ -71,7 +71,7 @@ class WeightTransfer:
     rigid : RigidIslands
         Parts without any matched vertex.
     lines : tuple of Diagnostic
-        Messages for the user; joints by number, from 0.
+        Messages for the user; joints by index, from 0.
     """
 
     starts: Ints
@@ -122,7 +122,7 @@ def match_lines(found: Matches, inpainted: Bools, method: str) -> tuple[Diagnost
     Parameters
     ----------
     found : Matches
-        Of the welded vertices.
+        Matches of the welded vertices.
     inpainted : (W,) bool
         The vertices that were inpainted.
     method : str

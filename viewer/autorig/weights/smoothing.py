@@ -1,4 +1,4 @@
-"""Smoothing of weights along edges, around the vertices whose weights were inpainted."""
+"""Weight smoothing along edges, around the vertices whose weights were inpainted."""
 
 from __future__ import annotations
 

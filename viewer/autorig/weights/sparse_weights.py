@@ -24,7 +24,7 @@ def weight_matrix(skin: Skin, triangles: Ints) -> Any:
     skin : Skin
         Rows need not add up to 1; repeated weights for a joint are added, negative ones set to 0.
     triangles : (T, 3)
-        Of the same mesh. Vertices without triangles may have no weights.
+        Triangles of the same mesh. Vertices without triangles may have no weights.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def transferred_weights(
     template : Template
         Its surface, aligned with the target.
     weights : Skin
-        Of the template's vertices.
+        Weights of the template's vertices.
     positions : (V, 3)
         The target's vertices.
     triangles : (T, 3)
@@ -94,7 +94,7 @@ def transferred_weights(
     ------
     RigError
         If no vertex of the target meets the template, the target is a point, weights of the
-        template are missing, or SciPy is.
+        template are missing, or SciPy is missing.
     """
     source = weight_matrix(weights, template.triangles)
     size = box_size(bounding_box(positions))
@@ -151,7 +151,7 @@ def nearest_weights(
         The target's vertices.
     max_distance : float
         Fraction of the target's box diagonal up to which a vertex is reported as matched. It
-        changes no weight.
+        does not affect the weights.
 
     Returns
     -------

@@ -40,7 +40,7 @@ def open_archive(source: Source) -> Archive:
     Raises
     ------
     FormatError
-        If it is none of these, is damaged, or contains anything but data.
+        If the file is none of these, is damaged, or contains anything but data.
     """
     # Imported late, so that readers of other formats do not import them.
     from viewer.formats._archive.npz import open_npy, open_npz

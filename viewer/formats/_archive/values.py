@@ -34,7 +34,7 @@ __all__ = [
 
 _MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; meshes have far fewer vertices
 _WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
-"""Suffixes of the keys of phrases about arrays, by their kinds."""
+"""Suffixes of the keys of phrases about arrays, by numpy's kind letters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +187,7 @@ class Archive:
         return self._values[key]
 
     def array(self, key: str, shape: Axes | None = None, kinds: str = "biuf") -> Deferred:
-        """Return an array of the given shape and kind of numbers.
+        """Return an array of the given shape and kinds of values.
 
         Parameters
         ----------

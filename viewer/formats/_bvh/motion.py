@@ -27,7 +27,7 @@ _LINE = re.compile(rb"[^\r\n]+")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The numbers of all frames.
+    """The channel values of all frames.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     start : int
         Offset after the word MOTION; -1 for a file without one.
     n_channels : int
-        Numbers per frame, C.
+        Values per frame, C.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Body parameters of EasyMocap's records: layouts by length, and rows collected per person.
 
-The first three numbers of ``poses`` are the root's own rotation, which EasyMocap writes as 0:
+The first three values of ``poses`` are the root's own rotation, which EasyMocap writes as 0:
 ``Rh`` and ``Th`` move the body about the model's origin. Hand components of SMPL-X and MANO exclude
 the mean hand; those of SMPL+H include it.
 """
@@ -41,7 +41,7 @@ _SHAPES = 10  # shape components that precede the expression components in the l
 
 @dataclass(frozen=True, slots=True)
 class BodyLayout:
-    """Assignment of the numbers of ``poses`` to joints.
+    """Assignment of the values in ``poses`` to joints.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ _MOST_NAMED = 5  # missing frames in a message
 
 
 class ImageFolders:
-    """Images in folders; the last one that each camera showed is kept.
+    """Images in folders; the last one shown by each camera is cached.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class ImageFolders:
         return None
 
     def size_of(self, camera: str) -> tuple[int, int] | None:
-        """Return the size of a camera's first image, pixels; None if it has none."""
+        """Return the size of a camera's first image, pixels; None if it has no images."""
         files = self._files.get(camera, {})
         return picture_dimensions(files[min(files)]) if files else None
 
@@ -131,7 +131,7 @@ def find_images(
 
 
 def _is_name(name: str) -> bool:
-    """Return whether a camera's name is that of a folder, and leads nowhere else."""
+    """Return whether a camera's name is a plain folder name rather than a path."""
     return Path(name).name == name
 
 

@@ -1,4 +1,4 @@
-"""Options of the maps of a material library, before the name of the picture."""
+"""Options of the maps of a material library, before the name of the image."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _CHANNELS = {"r": 0, "g": 1, "b": 2, "m": 3, "l": 0, "z": 0}
 
 @dataclass(frozen=True, slots=True)
 class MapOptions:
-    """A map's picture, and how it is placed.
+    """A map's image, and how it is placed.
 
     Attributes
     ----------
     file : str
-        Name of the picture; empty if there is none.
+        File name of the image; empty if there is none.
     scale, offset : (u, v)
-        Texture coordinates times scale plus offset are the picture's.
+        Image coordinates are texture coordinates times scale plus offset.
     clamps : bool
-        Whether the picture ends at its edges, rather than repeats.
+        Whether the image is clamped at its edges rather than repeated.
     channel : int
-        Column of the pixels for maps of one number.
+        Column of the pixels for single-channel maps.
     strength : float
-        Factor on bumps.
+        Multiplier for bumps.
     """
 
     file: str
@@ -44,7 +44,7 @@ class MapOptions:
 
 
 def map_options(text: str) -> MapOptions:
-    """Return the options and the file of a map; the file's name may contain blanks.
+    """Return the options and the file of a map; the file's name may contain spaces.
 
     >>> map_options("-s 2 3 1 -clamp on -bm 0.5 two words.png")  # doctest: +NORMALIZE_WHITESPACE
     MapOptions(file='two words.png', scale=(2.0, 3.0), offset=(0.0, 0.0), clamps=True,
@@ -76,7 +76,7 @@ def map_options(text: str) -> MapOptions:
 
 
 def _vector(found: dict[str, list[str]], option: str) -> tuple[float, float]:
-    """Return the first two values of an option; what is left out has its default."""
+    """Return the first two values of an option; omitted ones have their default."""
     default = _VECTORS[option]
     values = [_number(word, default) for word in found.get(option, [])[:2]]
     u, v = [*values, default, default][:2]

@@ -1,4 +1,4 @@
-"""Material libraries (``.mtl``) that an ``.obj`` names.
+"""Material libraries (``.mtl``) that an ``.obj`` references.
 
 ::
 
@@ -10,9 +10,9 @@
 
 ``Pr``, ``Pm`` and ``norm`` are those of the PBR extension (Burley and others, 2013, as Blender and
 tinyobjloader write it). An option is a word that begins with ``-`` and its values: ``-o`` and
-``-s`` place the picture, ``-clamp`` ends it at its edges, ``-bm`` scales a map of normals,
-``-imfchan`` picks a channel. Maps of bumps (heights), specular colours, reflections and the rest of
-the extension are not drawn.
+``-s`` offset and scale the image, ``-clamp`` clamps it at its edges, ``-bm`` scales a normal map,
+``-imfchan`` picks a channel. Bump (height), specular and reflection maps and the rest of the
+extension are not drawn.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _NOT_DRAWN = (
 
 @dataclass(slots=True)
 class _Statements:
-    """What one ``newmtl`` states: numbers, and maps with their place in the library."""
+    """What one ``newmtl`` states: values, and maps with their location in the library."""
 
     library: Source
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
@@ -70,7 +70,7 @@ def read_libraries(
     source : Source
         The ``.obj``; warned of libraries, materials and images that are missing.
     libraries : list of (bytes, int)
-        What follows each ``mtllib``, and where.
+        Text after each ``mtllib``, and its offset.
     names : list of str
         The materials that faces use.
     """
@@ -94,7 +94,7 @@ def read_libraries(
 
 
 def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
-    """Return the libraries of one ``mtllib``: one whose name may hold blanks, or several."""
+    """Return the libraries of one ``mtllib``: one whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     names = [whole]
     path = referenced_path(source.path.parent, whole)
@@ -116,7 +116,7 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
 
 
 def _read(library: Source, known: dict[str, _Statements]) -> None:
-    """Record the statements of each material; the first material of a name counts."""
+    """Record the statements of each material; of several with one name, the first is used."""
     now: _Statements | None = None
     ignored: dict[str, int] = {}
     position = 0
@@ -143,7 +143,7 @@ def _read(library: Source, known: dict[str, _Statements]) -> None:
 
 
 def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
-    """Record the numbers of a colour or of one number, or warn that there are none."""
+    """Record the value of a colour or scalar, or warn that it is invalid."""
     lower = word.lower()
     is_color = lower in _COLORS
     words = rest.split()
@@ -180,7 +180,7 @@ def _material(
     parts: dict[str, Any] = dict(textures)
     for kind in ("roughness", "metallic"):
         if kind in numbers or f"{kind}_texture" in textures:
-            # A map without a factor counts in full.
+            # A map without a factor has full strength.
             parts[kind] = numbers.get(kind, (1.0,))[0]
     if "normal_texture" in stated.maps:
         parts["normal_scale"] = stated.maps["normal_texture"][0].strength
@@ -200,7 +200,7 @@ def _base_color(
 ) -> tuple[float, float, float, float] | None:
     """Return Kd and opacity; None if neither has an effect."""
     if has_texture and color == (0.0, 0.0, 0.0):
-        # Many exporters write a black Kd beside a picture, which they mean to be seen.
+        # Many exporters write a black Kd with a texture that is meant to be visible.
         color = None
     if (color is None or (has_texture and min(color) == 1.0)) and opacity == 1.0:
         return None
@@ -219,7 +219,7 @@ def _opacity(numbers: dict[str, tuple[float, ...]]) -> float:
     """Return d, or 1 - Tr without it."""
     if "opacity" in numbers:
         return numbers["opacity"][0]
-    # Some exporters take Tr for d: with Tr 1 a visible surface is meant.
+    # Some exporters write d as Tr: Tr 1 then means an opaque surface.
     return 1.0 - numbers.get("transparency", (0.0,))[0] or 1.0
 
 
@@ -237,10 +237,10 @@ def _texture(options: MapOptions, image: Bytes | None) -> Texture:
 
 def _with_opacity(base: Texture | None, cut: Texture) -> Texture:
     """Return the base texture with the opacity of a ``map_d``."""
-    assert cut.image is not None  # the caller looked
+    assert cut.image is not None  # checked by the caller
     opacity = cut.image[..., cut.channel]
     if cut.image[..., 3].min() < 255:
-        opacity = cut.image[..., 3]  # a picture with alpha: that is what is meant
+        opacity = cut.image[..., 3]  # if the image has alpha, it is the opacity
     if base is None or base.image is None:
         white = np.full((*opacity.shape, 3), 255, np.uint8)
         return replace(cut, image=np.dstack([white, opacity]), channel=0)

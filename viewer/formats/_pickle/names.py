@@ -85,7 +85,8 @@ def call(function: object, arguments: object) -> tuple[object, int]:
     Parameters
     ----------
     function : object
-        A ``StandIn``; anything else is refused. arguments : object
+        A ``StandIn``; anything else is refused.
+    arguments : object
         A tuple; anything else is refused.
     """
     if not isinstance(function, StandIn) or function.role not in _CALLS:

@@ -137,7 +137,7 @@ class Array:
     Attributes
     ----------
     shape : tuple of int
-        Of the stored values.
+        Shape of the stored values.
     dtype : dtype or None
         None if the array is not evaluated; then ``what`` says why.
     axes : tuple of int, optional
@@ -152,12 +152,12 @@ class Array:
     what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
-        """Set shape and values, which must have the same number of bytes.
+        """Set shape and values, whose sizes in bytes must agree.
 
         Raises
         ------
         MisfitError
-            If they differ.
+            If the sizes differ.
         """
         found = dtype.dtype()
         if found is None:

@@ -63,7 +63,7 @@ class Part:
     source : Source
         The file, which records errors.
     offset_of : callable or None
-        Returns the offset of a row in a text; None for archives, which have no lines.
+        Returns the offset of a row in a text file; None for archives, which have no lines.
     """
 
     name: str

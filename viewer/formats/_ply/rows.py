@@ -35,7 +35,7 @@ class Table:
     lists : dict of str to ((N,), (M,))
         List properties: the number of values of each row, and the values of all rows.
     offsets : (N,) or None
-        Offset of each row in a text.
+        Offset of each row; None in a binary file.
     is_first : bool
         Whether it is the first element of its name; further ones are read and dropped.
     """

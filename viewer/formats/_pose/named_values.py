@@ -82,7 +82,7 @@ class NamedValues:
         Raises
         ------
         FormatError
-            If a value is of another kind; gives the line of the first.
+            If a value is of a different kind; gives the line of the first.
         """
         value = self.values.get(key)
         try:
@@ -167,7 +167,7 @@ def _byte_offset(text: str, place: int) -> int:
 
 
 def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
-    """Return the indices of the first value of another kind in nested lists, and the value.
+    """Return the indices of the first value of a different kind in nested lists, and the value.
 
     The indices are None if there is no such value, so that the lists are ragged.
     """

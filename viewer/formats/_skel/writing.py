@@ -18,7 +18,7 @@ from viewer.rig.skeleton import Skeleton, joint_label
 __all__ = ["KEYWORDS", "UNLIMITED", "write"]
 
 UNLIMITED = 100_000.0
-"""The course's value for "no limit", which some files contain."""
+"""CSE169's value for "no limit", which some files contain."""
 
 KEYWORDS = frozenset(
     (b"offset", b"boxmin", b"boxmax", b"pose", b"rotxlimit", b"rotylimit", b"rotzlimit")

@@ -62,7 +62,7 @@ def model_shapes(
 
 
 def _shape_names(archive: Archive, count: int, used: list[str]) -> tuple[str, ...]:
-    """Return the names of the coefficients if the file has them, like the bundled body."""
+    """Return the names of the coefficients if the file has them, as the bundled body does."""
     if archive.has("shape_names"):
         values = archive.array("shape_names", (count,), "SU").values()
         used.append("shape_names")

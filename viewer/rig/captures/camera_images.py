@@ -12,13 +12,13 @@ __all__ = ["CameraImage", "CameraImages"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraImage:
-    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, as the lens drew it."""
+    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, not undistorted."""
 
     pixels: Bytes
 
 
 class CameraImages(Protocol):
-    """Source of images, which are read when they are drawn."""
+    """Source of camera images, which are read when they are drawn."""
 
     @property
     def cameras(self) -> tuple[str, ...]:
@@ -27,7 +27,7 @@ class CameraImages(Protocol):
     def at(self, camera: str, seconds: float) -> CameraImage | None:
         """Return the image of a camera at a time of the scene; None if there is none.
 
-        The same object is returned as long as the image is the same. Faults of files are notes.
+        The same object is returned as long as the image is the same. File errors become notes.
         """
 
     def size_of(self, camera: str) -> tuple[int, int] | None:

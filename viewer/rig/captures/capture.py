@@ -56,7 +56,7 @@ class Capture:
     views : tuple of CameraView
         Calibrated cameras.
     images : CameraImages or None
-        Their images, if there are some.
+        Images of the cameras, if available.
     model : str
         The member of the SMPL family that its bodies use, e.g. ``"SMPL+H"``; empty for none.
     warnings : tuple of Diagnostic

@@ -146,7 +146,7 @@ def keypoint_layout(count: int, title: str = "") -> PointLayout:
     Raises
     ------
     RigError
-        If the named layout does not exist or has another number of keypoints.
+        If the named layout does not exist or has a different number of keypoints.
 
     >>> keypoint_layout(17).title, keypoint_layout(17, "h36m").names[0]
     ('coco', 'mid_hip')

@@ -1,4 +1,4 @@
-"""Matching of two figures' joints by name, and the angle between rotations."""
+"""Match two figures' joints by name, and measure the angle between rotations."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Pairs:
 
 
 def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
-    """Match joints by name, or by index if no name matches and both have as many joints.
+    """Match joints by name, or by index if no name matches and the joint counts are equal.
 
     Parameters
     ----------

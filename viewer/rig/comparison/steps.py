@@ -81,9 +81,9 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
     """Choose the poses in which two actors are compared.
 
     Two motions are compared frame by frame at the frame rate of the first, each from its own
-    start, up to the end of the shorter. Figures at rest are compared in their files' own poses
+    start, up to the end of the shorter. Figures at rest are compared in the poses of their files
     and, for DOFs with the same names, in ``n_poses`` test poses within the limits of both. The
-    test poses are the same for the same names and limits.
+    test poses depend only on names and limits.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Normalisation of vectors."""
+"""Vector normalisation."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Facts about vertices and bodies, and explanations of where a vertex is."""
+"""Facts about vertices and bodies, and step-by-step explanations of a vertex's position."""

@@ -66,7 +66,7 @@ class Explanation:
     Attributes
     ----------
     vertex : int
-        Its index.
+        Index of the vertex.
     skinning : Skinning
         Skinning options.
     stored : (3,)
@@ -74,7 +74,7 @@ class Explanation:
     shaped : (3,)
         After the figure's blend shapes.
     rest : (3,)
-        p, after pose correctives too: the position before skinning.
+        p, after blend shapes and pose correctives: the position before skinning.
     joints : (K,)
         Joints of the effective influences, strongest first.
     names : tuple of K str
@@ -88,7 +88,7 @@ class Explanation:
     terms : (K, 3)
         w_i M_i p.
     linear : (3,)
-        Their sum: linear blend skinning; the rest position of a vertex without influence.
+        Sum of the terms: linear blend skinning; the rest position of a vertex without influence.
     dual : DualTerms or None
         For methods that use dual quaternions.
     skinned : (3,)

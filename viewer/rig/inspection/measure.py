@@ -44,7 +44,7 @@ def measure(figure: Figure) -> Measures:
     Raises
     ------
     RigError
-        If it has none.
+        If the figure has no mesh.
     """
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to measure")

@@ -1,4 +1,4 @@
-"""Skinning of a few vertices of a posed figure."""
+"""Skin a few vertices of a posed figure."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     Returns
     -------
     (N, 3)
-        Binding space.
+        In the bind pose.
     """
     rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:

@@ -38,7 +38,7 @@ class VertexFacts:
     uvs : (N, 2)
         Texture coordinates, several along a seam, those of the triangle first.
     body_part : str
-        Empty without one.
+        Body part; empty if there is none.
     joints : (K,)
         Joints of the effective influences of non-zero weight, by decreasing weight.
     names : tuple of K str
@@ -74,7 +74,7 @@ def vertex_facts(
     vertex : int
         Index.
     triangle : int
-        Triangle under the mouse, -1 for none.
+        Triangle under the cursor, -1 for none.
 
     Raises
     ------

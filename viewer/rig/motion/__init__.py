@@ -1,1 +1,1 @@
-"""Motion: clips, sampled animations, and the poses that they give at a time."""
+"""Motion: clips, sampled animations, and their poses at a given time."""

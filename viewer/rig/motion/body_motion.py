@@ -1,4 +1,4 @@
-"""Motions in the parameters of the SMPL family, and their conversion to clips of a figure."""
+"""Motions as SMPL-family parameters, and their conversion to clips of a figure."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class BodyMotion:
     vectors : (N, K, 3)
         Rotation vectors relative to the parent joint, radians.
     translations : (N, 3)
-        Of the body, metres.
+        Translation of the body, metres.
     about_origin : bool
         True: the root rotates about the figure's origin, V = R X + T, as in EasyMocap. False:
         about the rest pelvis, V = R (X - J0) + J0 + T, as in SMPL.
@@ -47,7 +47,7 @@ class BodyMotion:
     flat_hands : bool
         Whether ``hands`` are relative to the flat hand instead of the mean hand.
     up : "y", "z", "-y", "-z" or ""
-        The axis that points up in the world; empty if unknown.
+        World up axis; empty if unknown.
     facts : tuple of (str, str)
         Further facts from the file, for ``viewer info``.
     world_rotations : (N, 3) or None
@@ -103,7 +103,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     Returns
     -------
     clip : SampledClip
-        For ``figure``.
+        Motion of ``figure``.
     notes : list of Diagnostic
         Messages about data that could not be used.
 

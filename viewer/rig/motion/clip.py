@@ -86,7 +86,7 @@ class Channel:
 
 
 def _tangent(given: Tangent) -> Tangent:
-    """Return a rule unchanged, and a slope as a Python float, which is written with all digits."""
+    """Return a rule unchanged, and a slope as a Python float, which prints with full precision."""
     if given in TANGENT_RULES:
         return given
     if isinstance(given, str) or not math.isfinite(given):
@@ -134,8 +134,8 @@ def slopes(channel: Channel) -> Floats:
     Returns
     -------
     (N, 2)
-        Incoming and outgoing slope, value per second; 0 over a span without duration, and for
-        all keys at one time.
+        Incoming and outgoing slope, value per second; 0 over a span of zero duration, and if
+        all keys are simultaneous.
     """
     times, values = channel.times, channel.values
     count = len(times)
@@ -159,7 +159,7 @@ def _ratio(rise: Floats, run: Floats) -> Floats:
 
 
 def is_course_rig(skeleton: Skeleton) -> bool:
-    """Return whether a skeleton's DOFs are those that ``.anim`` channels move, in their order.
+    """Return whether a skeleton's DOFs are those of ``.anim`` channels, in that order.
 
     These are translation x, y, z of the root, then rotations x, y, z of joint 0, 1, 2 and so on.
     """
@@ -186,7 +186,7 @@ def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
 
 
 def _first_misfit(skeleton: Skeleton) -> Phrase:
-    """Return a description of the first joint whose DOFs are not those of a course rig."""
+    """Return a description of the first joint whose DOFs are not those of a ``.skel``-style rig."""
     for joint in range(skeleton.n_joints):
         kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
         if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
@@ -198,7 +198,7 @@ def _first_misfit(skeleton: Skeleton) -> Phrase:
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
-    """Raise if a clip was made for another skeleton.
+    """Raise if a clip was made for a different skeleton.
 
     Raises
     ------

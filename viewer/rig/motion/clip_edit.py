@@ -1,4 +1,4 @@
-"""Editing of keyed clips: every function returns a new channel or clip; the original is unchanged.
+"""Edit keyed clips: every function returns a new channel or clip; the original is unchanged.
 
 Keys keep their order and therefore their indices: a moved key stops at an unmoved neighbour.
 """
@@ -55,7 +55,7 @@ def add_key(
 
     Without value and tangents, a key between others preserves the curve exactly: it gets the slope
     of the curve there, and neighbours whose rules depend on adjacent keys keep their slopes as
-    numbers. An existing key at this time is changed instead.
+    explicit values. An existing key at this time is changed instead.
 
     Parameters
     ----------
@@ -212,11 +212,11 @@ def with_channel(clip: Clip, target: int, change: Callable[[Channel], Channel]) 
     Parameters
     ----------
     clip : Clip
-        Any.
+        Clip to edit.
     target : int
         Row of the DOF in the skeleton's table.
     change : callable
-        Returns the new channel for the old one.
+        Maps the old channel to the new one.
     """
     known = {channel.target for channel in clip.channels}
     if target not in known:
@@ -259,7 +259,7 @@ def key_pose(
     Parameters
     ----------
     clip : Clip
-        Of that skeleton; its range is extended to include the time.
+        Clip of that skeleton; its range is extended to include the time.
     skeleton : Skeleton
         Provides the limits.
     pose : Pose
@@ -298,7 +298,7 @@ def clip_from_frames(
     dofs : (F, D)
         Lengths and radians. A constant DOF gets a single key.
     times : (F,)
-        Seconds, rising.
+        Seconds, increasing.
     rule : Tangent
         Tangent rule on both sides of every key.
     present : (F,) bool, optional

@@ -1,4 +1,4 @@
-"""Values of keyed curves at given times, and the poses they give."""
+"""Values of keyed curves at given times, and the resulting poses."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["evaluate", "sample"]
 
 
 def evaluate(channel: Channel, times: Floats) -> Floats:
-    """Return a curve's values: cubic Hermite inside the keys, extrapolated outside.
+    """Return a curve's values: cubic Hermite between the keys, extrapolated outside.
 
     With u in 0..1 across a span of h seconds, v0 = h out0 and v1 = h in1, the value is
     ((a u + b) u + v0) u + p0, a = 2 p0 - 2 p1 + v0 + v1, b = -3 p0 + 3 p1 - 2 v0 - v1
-    (CSE169 course notes). On a key it is exactly the key's value.
+    (CSE169 course notes). At a key it is exactly the key's value.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
     time : float
         Seconds; before ``start`` and after ``end`` the curves extrapolate.
     out : Pose
-        Changed in place.
+        Modified in place.
     """
     targets, values = evaluate_all(clip, np.array([time]))
     out.dofs[targets] = values[0]

@@ -66,7 +66,7 @@ def _values(table: _Table, times: Floats) -> Floats:
     at_first, at_last = table.values[:, 0], table.values[every, table.last]
     is_flat = last - first <= SHORTEST
     inside, shift = _inside(table, times, first, last, np.where(is_flat, 1.0, last - first))
-    # End values are returned unchanged; of several keys at one time, the outermost counts.
+    # End values are returned unchanged; of simultaneous keys, the outermost is used.
     values = np.where(inside >= last, at_last, _hermite(table, inside))
     values = np.where((inside <= first) & (times < first), at_first, values) + shift
     return np.where(is_flat, at_last, values)

@@ -61,9 +61,9 @@ class Frames:
     translations : (F, J, 3)
         Offsets from the joints' rest translations, DOFs included.
     shape_weights : (F, S) or (1, S)
-        Of the figure's blend shapes; a single row applies to all frames.
+        Weights of the figure's blend shapes; a single row applies to all frames.
     figure_translations, figure_scales : (F, 3), (F,)
-        Of the whole figure.
+        Placement of the whole figure.
     """
 
     times: Floats
@@ -109,7 +109,7 @@ def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
     Parameters
     ----------
     actor : Actor
-        Its ``pose``, ``points`` and ``is_present`` change; without a clip nothing changes.
+        Its ``pose``, ``points`` and ``is_present`` are modified, unless it has no clip.
     time : float
         Seconds; the actor's own ``offset`` is subtracted.
     interpolate : bool
@@ -137,7 +137,7 @@ def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
 
 
 def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
-    """Apply all of a clip's data at one time except joint rotations to a pose, in place."""
+    """Apply a clip's data at one time, except joint rotations, to a pose in place."""
     if rows.translations is not None:
         pose.translations[:] = rows.translations[row]
     if rows.figure_translations is not None:
@@ -163,7 +163,7 @@ def frames_of(
     figure : Figure
         With a skeleton.
     motion : Clip or SampledClip
-        Of that skeleton.
+        Motion of that skeleton.
     times : (F,)
         Seconds on the motion's own clock.
     base : Pose, optional
@@ -263,7 +263,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     figure : Figure
         With a skeleton; joints follow the frames' shapes.
     frames : Frames
-        Of that figure.
+        Poses of that figure.
 
     Returns
     -------

@@ -112,7 +112,7 @@ def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        Of J joints.
+        With J joints.
     poses : sequence of A Pose
         DOFs in lengths and radians.
 
@@ -131,11 +131,11 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
     Parameters
     ----------
     skeleton : Skeleton
-        Of the figure, with its shape applied; all poses have this shape.
+        The figure's skeleton, with its shape applied; all poses have this shape.
     poses : sequence of A Pose
         DOFs in lengths and radians.
     rotations : (A, J, 3, 3), optional
-        Their ``local_rotations``, if already computed.
+        ``local_rotations`` of the poses, if already computed.
 
     Returns
     -------
@@ -166,11 +166,11 @@ def posed_worlds(
     Parameters
     ----------
     skeleton : Skeleton
-        Of the figure, with its shape applied; all poses have this shape.
+        The figure's skeleton, with its shape applied; all poses have this shape.
     poses : sequence of A Pose
         At least one; DOFs in lengths and radians.
     rotations : (A, J, 3, 3), optional
-        Their ``local_rotations``, if already computed.
+        ``local_rotations`` of the poses, if already computed.
 
     Returns
     -------

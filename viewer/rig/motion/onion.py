@@ -24,7 +24,7 @@ def onion(
     interpolate: bool = False,
     faintest: float = FAINTEST,
 ) -> Scene:
-    """Return a scene that shows a motion in one picture: its poses at several times.
+    """Return a scene that shows a motion in one image: its poses at several times.
 
     The opacity increases from the earliest pose to the last one, which is opaque.
 

@@ -1,4 +1,4 @@
-"""Sampled animations played at another frame rate."""
+"""Sampled animations played at a different frame rate."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["with_rate"]
 
 
 def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | PointClip:
-    """Return a clip with the same frames at another rate; its start time is unchanged.
+    """Return a clip with the same frames at a different rate; its start time is unchanged.
 
     Parameters
     ----------

@@ -143,14 +143,14 @@ def upright_animation(
     actor, rate, frames, interpolate
         As for ``sample_animation``. The actor's placement in the scene is ignored.
     keeps_world : bool
-        Keep the orientation of its own world, for formats that preserve a capture's numbers.
+        Keep the orientation of the actor's own world, for formats that preserve a capture's values.
 
     Returns
     -------
     animation : SampledAnimation
         The sampled frames.
     up : "y", "z", "-y" or "-z"
-        The axis that points up in them; the last two only if the world is kept.
+        Up axis of the frames; the last two only if ``keeps_world`` is True.
     """
     animation = sample_animation(actor, rate, frames, interpolate)
     up, hangs = own_up(scene, actor)

@@ -30,11 +30,11 @@ class SampledClip:
     translations : (N, J, 3) or None
         Offsets from the joints' rest translations.
     figure_translations : (N, 3) or None
-        Of the whole figure, after skinning.
+        Translations of the whole figure, after skinning.
     figure_scales : (N,) or None
-        Of the whole figure.
+        Scales of the whole figure.
     shape_weights : (N, S) or (1, S) or None
-        Of the figure's blend shapes; a single row applies to all frames. None keeps the pose's.
+        Blend shape weights; a single row applies to all frames. None keeps those of the pose.
     """
 
     name: str
@@ -98,7 +98,7 @@ class SampledRows:
 def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
     """Return a clip's data at given times: rotations along the shorter arc, the rest linearly.
 
-    Exactly on a frame the stored numbers are returned unchanged.
+    Exactly on a frame, the stored values are returned unchanged.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ def single_frame(
     rate : float
         Nominal frames per second of the animation.
     number : int
-        Number of the frame.
+        Frame number.
     time : float
         Time of the frame in seconds.
 
@@ -85,14 +85,14 @@ def upright_single_frame(
     actor, rate, number, time
         As for ``single_frame``. The actor's placement in the scene is ignored.
     keeps_world : bool
-        Keep the orientation of its own world, as in ``upright_animation``.
+        Keep the orientation of the actor's own world, as in ``upright_animation``.
 
     Returns
     -------
     animation : SampledAnimation
         One frame.
     up : "y", "z", "-y" or "-z"
-        The axis that points up in it; the last two only if the world is kept.
+        Up axis of the frame; the last two only if ``keeps_world`` is True.
     """
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
@@ -111,7 +111,7 @@ def pose_frames(
     figure : Figure
         With or without a skeleton.
     pose : Pose or None
-        Its pose; None for a figure without a skeleton.
+        Pose of the figure; None for a figure without a skeleton.
     is_present : bool
         Whether the actor is present in the frame.
     time : float
@@ -121,7 +121,7 @@ def pose_frames(
     place, scale = np.zeros((1, 3)), np.ones(1)
     rotated, moved = np.zeros((1, 0, 4)), np.zeros((1, 0, 3))
     if pose is not None:
-        weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing ones count as 0
+        weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing weights count as 0
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         if (pose.scales != skeleton.rest_scales).any():

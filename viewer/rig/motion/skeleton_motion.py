@@ -24,7 +24,7 @@ class SkeletonMotion:
     unit_note : Phrase or None
         How the figure's unit was guessed; None if it was not.
     up_notes : tuple of Phrase
-        How the up axis was guessed, and about contrary evidence.
+        How the up axis was guessed, and any contrary evidence.
     """
 
     figure: Figure

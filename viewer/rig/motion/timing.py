@@ -44,7 +44,7 @@ class Timing:
     start : float
         Seconds of the first frame.
     holds : bool
-        Before the first and after the last frame: True holds the end frames, False is absence.
+        Before the first and after the last frame: True holds the end frames, False means absent.
     """
 
     frame_rate: float

@@ -26,7 +26,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
     scene : Scene
         Provides the up axis.
     actor : Actor
-        Placed in it.
+        Placed in the scene.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     scene : Scene
         Provides the up axis.
     actor : Actor
-        In it; not changed.
+        Actor in the scene; not modified.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""Posing: records and vectors of poses, DOFs as text, inverse kinematics."""
+"""Posing: pose records and pose vectors, DOF values as text, inverse kinematics."""

@@ -1,4 +1,4 @@
-"""Values of DOFs as text, with angles in degrees."""
+"""DOF values as text, with angles in degrees."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MOST_DIGITS = 9  # decimals; more would show rounding errors of float64
 
 
 def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:
-    """Return a value of a DOF as text: ``"28.6°"``, or a length ``"0.25"``.
+    """Return a DOF value as text: ``"28.6°"``, or a length ``"0.25"``.
 
     Parameters
     ----------

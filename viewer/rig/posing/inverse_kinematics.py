@@ -39,7 +39,7 @@ class Reach:
     Attributes
     ----------
     dofs : (D,)
-        Of the whole skeleton; only rotations of the chain have changed.
+        DOFs of the whole skeleton; only rotations of the chain have changed.
     distance : float
         Remaining distance between the joint and its target, figure units.
     limited : (N,) int32

@@ -1,10 +1,10 @@
-"""Fit of a joint's DOFs to a given rotation, within their limits.
+"""Fit a joint's DOFs to a given rotation, within their limits.
 
 A joint's rotation relative to its parent is R(quaternion) E_n ... E_1, each E about one axis.
 Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan angles); the
 one within the limits that is closer to the present values is taken. Otherwise each DOF is set in
 turn to its optimum with the others fixed, repeatedly: with M the product of the factors around E_k
-and of the wanted rotation's transpose, the trace to maximise is
+and of the target rotation's transpose, the trace to maximise is
 
     trace(M E_k(t)) = M_kk + (M_ii + M_jj) cos t + (M_ij - M_ji) sin t,   (i, j) = (k + 1, k + 2)
 """
@@ -37,9 +37,9 @@ class RotationFit:
     Attributes
     ----------
     dofs : (D,)
-        Of the whole skeleton; only rotations of the joint have changed.
+        DOFs of the whole skeleton; only rotations of the joint have changed.
     error : float
-        Angle between the wanted rotation and the one reached, radians.
+        Angle between the target rotation and the one reached, radians.
     limited : (N,) int32
         Rotation DOFs of the joint that are at a limit, if there is an error.
     """
@@ -50,7 +50,7 @@ class RotationFit:
 
 
 def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
-    """Return the rows of a joint's rotation DOFs, the one that is applied first in front.
+    """Return the rows of a joint's rotation DOFs, in order of application.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     skeleton : Skeleton
         Provides the DOFs and their limits.
     pose : Pose
-        Of equal solutions the one closest to its DOFs is taken; not changed.
+        Among equally good solutions, the one closest to its DOFs is taken; not modified.
     joint : int
         The joint to rotate.
     rotation : (3, 3)

@@ -54,22 +54,22 @@ class PoseRecord:
     dofs : mapping of str to float
         By label, ``"left_knee.x"``: lengths and radians.
     vector : (N,) or None
-        The model's own pose numbers.
+        The model's own pose vector.
     parts : mapping of str to array
         Rotation vectors or hand coefficients by smplx's names: ``global_orient``,
         ``body_pose``, ``left_hand_pose`` …
     shape, expression : (N,) or None
         Weights of the first blend shapes of each group.
     translation : (3,) or None
-        Of the figure, after skinning.
+        Translation of the figure, after skinning.
     scale : float or None
-        Of the figure, after skinning.
+        Scale of the figure, after skinning.
     flat_hands : bool or None
         Whether hand poses are relative to the flat hand. None: only coefficients add the mean.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; None: unless there are 45 numbers.
+        Whether hand poses are coefficients; None: unless there are 45 values.
     joint_rotations : JointRotations or None
-        Used by a figure with other DOFs instead of the numbers: its joints of the same names are
+        Used instead of the values by a figure with different DOFs: joints of the same names are
         rotated equally; its placement, size and shape are unchanged. Figures with the same DOFs
         use everything else, as far as they have the blend shapes.
     line_of : callable or None
@@ -100,7 +100,7 @@ class PosePartError(RigError):
     part : str
         ``"dofs"``, ``"vector"``, ``"shape"``, ``"expression"`` or a name in ``parts``.
     name : str
-        Of the DOF, empty for other parts.
+        Name of the DOF; empty for other parts.
     """
 
     def __init__(self, problem: RigError, part: str, name: str = "") -> None:
@@ -118,14 +118,14 @@ def _part(part: str, name: str = "") -> Iterator[None]:
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
-    """Return a pose by DOF names and as the model's own numbers, both complete.
+    """Return a pose by DOF names and as the model's own vector, both complete.
 
     Parameters
     ----------
     figure : Figure
         With a skeleton.
     pose : Pose
-        Of that figure.
+        Pose of that figure.
     """
     skeleton = figure.require_skeleton()
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
@@ -212,7 +212,7 @@ def _take_over(work: Pose, pose: Pose) -> None:
 
 
 def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
-    """Return a message about parts of a record that a figure with other DOFs ignores."""
+    """Return a message about parts of a record that a figure with different DOFs ignores."""
     moves = DOF_KINDS[:3]
     moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
     shifts = record.joint_rotations is not None and record.joint_rotations.shifts.any()
@@ -276,7 +276,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Apply the model's own numbers, or the vector of another member of the SMPL family."""
+    """Apply the model's own pose vector, or that of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers

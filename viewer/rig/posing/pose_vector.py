@@ -31,18 +31,18 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseLayout:
-    """Positions of the numbers of one pose in a model's files.
+    """Layout of the pose vector in a model's files.
 
     Attributes
     ----------
     n_numbers : int
         Length of the vector.
     starts : (J,) int32
-        Index of the first of each joint's three rotation numbers.
+        Index of the first of each joint's three rotation values.
     is_euler : (J,) bool
         True: angles about z, y, x with R = Rz Ry Rx. False: a rotation vector.
     translation, scale : int
-        Index of the figure's translation (three numbers) and scale (one); -1 for none.
+        Index of the figure's translation (three values) and scale (one); -1 for none.
     """
 
     n_numbers: int
@@ -92,11 +92,11 @@ def set_joint_rotations(
     skeleton : Skeleton
         Holds the DOF table.
     pose : Pose
-        Changed.
+        Modified in place.
     joints : (N,)
         Joints to rotate.
     rotations : (N, 3, 3)
-        Rotation of each relative to its parent.
+        Rotation of each of these joints relative to its parent.
     clamp : bool
         Whether DOFs are clamped to their limits.
     """
@@ -120,14 +120,14 @@ def set_joint_rotations(
 
 
 def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
-    """Return each joint's three numbers in the convention of the model's files.
+    """Return each joint's three rotation values in the convention of the model's files.
 
     Parameters
     ----------
     layout : PoseLayout
         Specifies which joints use Euler angles.
     rotations : (J, 3, 3)
-        Of each joint relative to its parent.
+        Rotation of each joint relative to its parent.
 
     Returns
     -------
@@ -140,14 +140,14 @@ def own_numbers(layout: PoseLayout, rotations: Floats) -> Floats:
 
 
 def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return a pose as the model's own numbers.
+    """Return a pose as the model's own pose vector.
 
     Parameters
     ----------
     layout : PoseLayout or None
-        None for a model whose own numbers are its DOFs.
+        None for a model whose pose vector consists of its DOFs.
     skeleton : Skeleton
-        Of the figure.
+        The figure's skeleton.
     pose : Pose
         The pose to convert.
 
@@ -169,16 +169,16 @@ def write_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose) -> F
 
 
 def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vector: Floats) -> None:
-    """Set a pose from the model's own numbers, in place.
+    """Set a pose from the model's own pose vector, in place.
 
     Parameters
     ----------
     layout : PoseLayout or None
-        None for a model whose own numbers are its DOFs.
+        None for a model whose pose vector consists of its DOFs.
     skeleton : Skeleton
-        Of the figure.
+        The figure's skeleton.
     pose : Pose
-        Changed, except for its shape.
+        Modified, except for its shape.
     vector : (N,)
         Lengths and radians.
 

@@ -1,1 +1,1 @@
-"""Retargeting of motions and poses from one skeleton to another."""
+"""Retarget motions and poses from one skeleton to another."""

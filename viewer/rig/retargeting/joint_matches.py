@@ -56,7 +56,7 @@ def match_joints(
     mapping : mapping of str to str, optional
         Joint names of the source to joint names of the target.
     titles : (str, str)
-        Names of both in messages.
+        Names of the two skeletons in messages.
 
     Raises
     ------

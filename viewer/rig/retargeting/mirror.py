@@ -16,7 +16,7 @@ from viewer.rig.skeleton import Skeleton, clamp_dofs
 
 __all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose"]
 
-# Maximum distance of a joint from its partner's mirror image, as a fraction of the figure's size.
+# Maximum distance of a joint from its counterpart's mirror image, relative to the figure's size.
 _NEAR = 0.02
 
 
@@ -33,7 +33,7 @@ def mirror_axis(figure: Figure) -> int:
 
 
 def asymmetry(figure: Figure) -> Floats:
-    """Return the distance of each rest vertex from its partner's mirror image: (V,), figure units.
+    """Return each rest vertex's distance from its counterpart's mirror image: (V,), figure units.
 
     Raises
     ------
@@ -54,15 +54,15 @@ def _mirror_distances(figure: Figure, axis: int) -> Floats:
 
 
 def joint_partners(figure: Figure) -> Ints:
-    """Return each joint's partner on the other side, itself for a central joint: (J,) int32.
+    """Return each joint's mirror counterpart, itself for a central joint: (J,) int32.
 
-    The partner is the joint nearest to the mirrored position, among those at the same depth of
+    The counterpart is the joint nearest to the mirrored position, among those at the same depth of
     the hierarchy.
 
     Raises
     ------
     RigError
-        If a joint has no partner within 2 % of the figure's size.
+        If a joint has no counterpart within 2 % of the figure's size.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -89,7 +89,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     """Return the mirrored pose, with left and right exchanged.
 
     World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes its
-    partner's; rest rotations may therefore differ between the sides.
+    counterpart's; rest rotations may therefore differ between the sides.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     Returns
     -------
     Pose
-        Of the same shape; the figure's translation is mirrored too.
+        With the same shape; the figure's translation is mirrored too.
 
     Raises
     ------

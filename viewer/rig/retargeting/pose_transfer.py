@@ -1,6 +1,6 @@
 """Transfer of a pose to another figure whose joints have the same names.
 
-Joints are matched by name and take over their partner's rotation relative to the rest pose, in the
+Joints are matched by name and take the matching joint's rotation relative to the rest pose, in the
 figure's axes, so DOF orders, rest rotations and intermediate joints may differ. With the
 world rotations W of the pose and W0 of the skeleton with all DOFs at 0,
 
@@ -61,9 +61,9 @@ class JointRotations:
     up : str
         The figure's up axis, ``"y"`` or ``"z"``.
     layout : str
-        Result of ``dof_layout``: for figures with the same layout the DOFs' values are used.
+        Result of ``dof_layout``: figures with the same layout use the DOF values directly.
     rotations : (J, 4) or None
-        Base rotations, to which the DOFs are added, as in ``Pose``; None: those of the rest pose.
+        Base rotations, before the DOFs, as in ``Pose``; None: those of the rest pose.
     """
 
     figure: str
@@ -83,7 +83,7 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
     figure : Figure
         With a skeleton.
     pose : Pose
-        Of that figure.
+        Pose of that figure.
     """
     skeleton = figure.require_skeleton()
     relative = _figure_rotations(skeleton, pose) @ np.swapaxes(
@@ -111,7 +111,8 @@ def dof_layout(figure: Figure) -> str:
         With a skeleton.
     """
     skeleton = figure.require_skeleton()
-    rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0  # no -0
+    # Adding 0 turns -0 into 0.
+    rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0
     parts = (
         repr((skeleton.names, figure.up)).encode("utf-8", "surrogatepass"),
         *(
@@ -129,17 +130,17 @@ def has_layout_of(source: JointRotations, figure: Figure) -> bool:
     Parameters
     ----------
     source : JointRotations
-        Of the pose.
+        Joint rotations of the pose.
     figure : Figure
         With a skeleton.
     """
     skeleton = figure.require_skeleton()
-    # Files are edited by hand: an equal digest does not guarantee lists of the right length.
+    # Files may be edited by hand: an equal digest does not guarantee lists of the right length.
     return source.layout == dof_layout(figure) and source.names == skeleton.names
 
 
 def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
-    """Restore the base rotations and translations, to which the DOFs are added, in place.
+    """Restore the base rotations and translations beneath the DOFs, in place.
 
     They differ from the rest pose where a motion rotates a joint about axes that its DOFs lack.
     The stored world rotations are ignored: they are out of date once the DOFs are edited.
@@ -147,7 +148,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
     Parameters
     ----------
     skeleton : Skeleton
-        Of a figure with the source's layout.
+        Skeleton of a figure with the source's layout.
     pose : Pose
         Its DOFs are not changed.
     source : JointRotations
@@ -165,7 +166,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
 
 
 def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
-    """Return each target joint's partner: the source joint with its name.
+    """Return the match of each target joint: the source joint with its name.
 
     Parameters
     ----------
@@ -197,13 +198,13 @@ def rotate_joints(
     target : Figure
         With a skeleton.
     start : Pose
-        Of the target; not changed. Provides joints without a partner, placement, size, shape
+        Pose of the target; not modified. Provides unmatched joints, placement, size, shape
         and joint translations.
 
     Returns
     -------
     pose : Pose
-        Of the target, within its limits.
+        Pose of the target, within its limits.
     notes : list of Diagnostic
         Messages about the number of matched joints, unmatched ones, and unreachable rotations.
 

@@ -58,9 +58,9 @@ def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
     skeleton : Skeleton
         Any.
     to_common : (3, 3)
-        From its own axes to the common ones.
+        Rotation from its own axes to the common ones.
     up : "y" or "z"
-        Of the common axes.
+        Up axis of the common axes.
     """
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
@@ -76,11 +76,11 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
     Parameters
     ----------
     source, target : RestPose
-        Of skeletons with the same hierarchy.
+        Rest poses of skeletons with the same hierarchy.
     matches : Matches
-        Every joint has a partner.
+        Every joint has a match.
     parents : (J,)
-        Of the target.
+        Parents of the target's joints.
     """
     inner = np.flatnonzero(parents >= 0)
     bones = target.points[inner] - target.points[parents[inner]]
@@ -95,7 +95,7 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     """Return the rotations from the target's rest pose to the source's at every matched joint.
 
     Limbs and fingers: the bone is rotated to the source's direction by the smallest rotation from
-    the body's orientation, so without twist. Hands with fingers also align the line of knuckles.
+    the body's orientation, so without twist. Hands with fingers also align the knuckle line.
     Trunk and feet only follow the body, unless their directions differ by more than 25 degrees.
     The last joint of a limb follows the one before it.
 
@@ -106,12 +106,12 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     matches : Matches
         The joint pairs.
     parents : (J,)
-        Of the target.
+        Parents of the target's joints.
 
     Returns
     -------
     (J, 3, 3)
-        Rotations in the common axes; the identity for joints without a partner.
+        Rotations in the common axes; the identity for unmatched joints.
     """
     stands = _standing(source, target, matches)
     result = np.tile(np.eye(3), (len(parents), 1, 1))
@@ -178,7 +178,7 @@ def _directions(vectors: Floats) -> Floats:
 
 
 def _knuckles(matches: Matches, children: list[int], bones: tuple[Floats, Floats]) -> Floats | None:
-    """Return the rotation of a hand from the mean finger direction and the line of knuckles."""
+    """Return the rotation of a hand from the mean finger direction and the knuckle line."""
     rows = {matches.names[child].rpartition("_")[2]: row for row, child in enumerate(children)}
     fingers = [rows[f"{name}1"] for name in _FINGERS[:4] if f"{name}1" in rows]
     if "index1" not in rows or not ({"pinky1", "ring1"} & set(rows)):

@@ -1,4 +1,4 @@
-"""Retargeting of a motion to another skeleton: joints matched by name, rest poses aligned.
+"""Retarget a motion to another skeleton: joints matched by name, rest poses aligned.
 
 World rotations are transferred, not local ones, so that unmatched joints between two matched ones
 are included. With everything in the figure's axes, and rest rotations R_s and R_t of both::
@@ -48,14 +48,14 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
     motion : SkeletonMotion
         In any unit.
     factor : float
-        More than 0.
+        Positive.
     unit : str
         Unit of the scaled lengths, as in ``Figure.unit``.
 
     Raises
     ------
     RigError
-        If the factor is not above 0.
+        If the factor is not positive.
     """
     if not 0.0 < factor < np.inf:
         raise RigError(f"expected a factor above 0, found {factor:g}")
@@ -93,14 +93,14 @@ def retarget(
     motion : SkeletonMotion
         Skeleton and clip, up along y or z.
     figure : Figure
-        With a skeleton; its joints without a partner stay in their rest pose.
+        With a skeleton; its unmatched joints stay in their rest pose.
     mapping : mapping of str to str, optional
         From the motion's joint names to the figure's.
 
     Returns
     -------
     clip : SampledClip
-        For the figure. A skinned figure moves as a whole (``figure_translations``), a skeleton
+        For this figure. A skinned figure moves as a whole (``figure_translations``), a skeleton
         without a skin at its root.
     notes : list of Diagnostic
         Messages about matched and unmatched joints, and the scale of the path.

@@ -1,4 +1,4 @@
-"""Scalar quantities: a number per vertex of a posed figure, shown as a colour.
+"""Scalar quantities: one value per vertex of a posed figure, shown as a colour.
 
 A quantity is named by its key, followed by its joint or field if it has one: ``"stretch"``,
 ``"weight:left_knee"``, ``"weight:#4"``, ``"field:distance"``.
@@ -94,7 +94,7 @@ class Quantity:
 
     @property
     def takes_joint(self) -> bool:
-        """Whether the quantity is about one joint."""
+        """Whether the quantity refers to one joint."""
         return self.about == "joint"
 
     def shown(self, low: float, high: float) -> tuple[float, float]:
@@ -169,7 +169,7 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 def find_quantity(name: str) -> Quantity:
-    """Return the quantity of a name, with or without a joint or field.
+    """Return the quantity with a name, which may include a joint or field.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def menu_title(key: str, skinning: Skinning) -> str:
     key : str
         A key of ``SCALARS``.
     skinning : Skinning
-        Gives the number of influences.
+        Provides the number of influences.
     """
     if key != "pruning":
         return SCALARS[key].title
@@ -259,7 +259,7 @@ def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
     name : str
         Name of the quantity.
     figure : Figure
-        Gives the names of joints and fields.
+        Provides the names of joints and fields.
     skinning : Skinning
         How the mesh is drawn.
 

@@ -1,4 +1,4 @@
-"""Distances that a skinning option moves each vertex: method, influences, correctives."""
+"""Distances by which a skinning option moves each vertex: method, influences, correctives."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["asymmetry", "correctives", "methods", "normalized", "pruning"]
 def pruning(asked: Asked) -> Floats:
     """Return the distance between all influences and the strongest few: (V,), figure units."""
     count = influences_kept(asked.skinning)
-    # Relative to normalised weights, as the effect of normalising is a quantity of its own.
+    # Relative to normalised weights, as normalising has its own quantity.
     whole = replace(asked.skinning, max_influences=0, normalize=True)
     return _distance(asked, whole, replace(asked.skinning, max_influences=count))
 
@@ -35,13 +35,13 @@ def methods(asked: Asked) -> Floats:
 
 
 def correctives(asked: Asked) -> Floats:
-    """Return the distance that the pose correctives move each vertex: (V,), figure units."""
+    """Return the distance by which pose correctives move each vertex: (V,), figure units."""
     how = asked.skinning
     return _distance(asked, replace(how, correctives=True), replace(how, correctives=False))
 
 
 def asymmetry(asked: Asked) -> Floats:
-    """Return each vertex's distance from the mirror image of its partner: (V,), figure units."""
+    """Return each vertex's distance from its counterpart's mirror image: (V,), figure units."""
     figure, pose = asked.figure, asked.pose
     assert figure.symmetry is not None and pose is not None  # the quantity needs them
     positions = deform(figure, pose, asked.skinning)[0]

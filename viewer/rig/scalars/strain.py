@@ -1,7 +1,7 @@
 """Quantities of strain: relative change of edge lengths and triangle areas in a pose.
 
-The posed mesh, without the figure's own scale, is compared with the shaped mesh in its binding
-space.
+The posed mesh, without the figure's own scale, is compared with the shaped mesh in its
+bind pose.
 """
 
 from __future__ import annotations

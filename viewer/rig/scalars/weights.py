@@ -31,7 +31,7 @@ def weight(asked: Asked) -> Floats:
 
 
 def dominant(asked: Asked) -> Floats:
-    """Return the joint of the largest weight of each vertex: (V,), integral; -1 without one.
+    """Return the joint with the largest weight at each vertex: (V,), integral; -1 without one.
 
     Among equal weights the joint listed first wins.
     """
@@ -45,7 +45,7 @@ def dominant(asked: Asked) -> Floats:
 
 
 def influences(asked: Asked) -> Floats:
-    """Return the number of joints with a non-zero weight of each vertex: (V,), integral."""
+    """Return the number of joints with a non-zero weight at each vertex: (V,), integral."""
     skin = merged(asked.skin)
     counts = np.bincount(owners(skin)[skin.weights != 0.0], minlength=skin.n_vertices)
     return counts.astype(np.float64)

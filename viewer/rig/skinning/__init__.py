@@ -90,9 +90,9 @@ class Skinning:
     method : str
         A key of ``METHODS``.
     blend_factor : float
-        Blend factor of methods between two others, 0 to 1; of DQS in the method ``"mix"``.
+        For methods between two others, 0 to 1; in ``"mix"``, the share of DQS.
     max_influences : int
-        Keep only this many of the strongest, scaled to a sum of 1; 0 for all, as stored.
+        Keep only this many of the strongest influences, scaled to a sum of 1; 0 for all, as stored.
     normalize : bool
         Scale each vertex's weights to a sum of 1.
     correctives : bool

@@ -1,8 +1,8 @@
 """Dual quaternion skinning in two phases: blended stretch, then blended rigid motion.
 
 Kavan, Collins, Zara, O'Sullivan 2008, "Geometric Skinning with Approximate Dual Quaternion
-Blending", section 4.2: joints that scale are split into a stretch, blended linearly in binding
-space, and a rigid motion, blended as dual quaternions.
+Blending", section 4.2: joints that scale are split into a stretch, blended linearly in the
+bind pose, and a rigid motion, blended as dual quaternions.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def deform(
     Parameters
     ----------
     positions, normals : (V, 3)
-        Binding space.
+        In the bind pose.
     skin : Skin
         A vertex without influence stays at its bind position.
     palette : (J, 4, 4)

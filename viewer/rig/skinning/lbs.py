@@ -30,7 +30,7 @@ def deform(
     Parameters
     ----------
     positions, normals : (V, 3)
-        Binding space.
+        In the bind pose.
     skin : Skin
         Weights as stored; a vertex without influence stays at its bind position.
     palette : (J, 4, 4)
@@ -61,7 +61,7 @@ def move(
     Parameters
     ----------
     positions : (V, 3)
-        Binding space.
+        In the bind pose.
     skin : Skin
         Influences of V vertices.
     palette : (J, 4, 4)

@@ -24,7 +24,7 @@ def deform(
     Parameters
     ----------
     positions, normals : (V, 3)
-        Binding space.
+        In the bind pose.
     skin : Skin
         Influences of V vertices.
     palette : (J, 4, 4)
