@@ -384,6 +384,18 @@ def test_panels_draw_the_whole_interface(draw, rig, tmp_path):
     assert picture[240, 628, :3].max() < 100  # the panels are dark
 
 
+def test_panels_have_the_shadows_of_the_picture(rig, tmp_path):
+    pictures = []
+    for extra in ([], ["--no-shadows"]):
+        out = tmp_path / "panels.png"
+        command = ["render", *map(str, rig), "-o", str(out), "--panels", "--size", "480x320"]
+        assert run([*command, "--force", *extra]) == 0
+        pictures.append(np.array(Image.open(out).convert("RGB")).astype(int))
+    # Left of the panels; the shadow darkens the ground and nothing is brighter for it.
+    lit, shadowed = pictures[1][:, :200], pictures[0][:, :200]
+    assert (lit - shadowed).max() > 20 and (shadowed - lit).max() < 5
+
+
 def test_panels_keep_the_given_distance(rig, tmp_path):
     pictures = []
     for distance in ("2", "30"):

@@ -374,11 +374,15 @@ class Frame:
         """Return the last image of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
-        if self.pace.is_unfinished:  # a picture gets all its passes
+        self.finish_picture()
+        return self.target.read()
+
+    def finish_picture(self) -> None:
+        """Draw all passes, with full shadows, of an image that would improve in later frames."""
+        if self.target is not None and self.pace.is_unfinished:
             options = self.state.options
             self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))
             self.pace.restart()
-        return self.target.read()
 
     def release(self) -> None:
         """Release all GL objects, and end background work."""

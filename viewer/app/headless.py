@@ -99,6 +99,8 @@ class HeadlessApp:
         while self.state.of(Files).stream is None and not self.state.framing.is_settled:
             self.step(1)
         self.step(1)
+        # Frames in quick succession count as motion, in which slow drivers draw no shadows.
+        self.frame.finish_picture()
         pixels = self.pixels()
         pixels[..., 3] = 255
         return pixels
