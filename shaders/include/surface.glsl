@@ -1,5 +1,5 @@
 // The surface of the material that is drawn: its colour, opacity and normal. Files without more
-// than a picture per material are drawn without MATERIALS, which costs them nothing.
+// than an image per material are drawn without MATERIALS, which costs them nothing.
 
 in vec2 v_uv;
 in vec3 v_color;                // linear
@@ -22,7 +22,7 @@ uniform vec4 u_base_factor;     // linear
 uniform bool u_has_base_factor; // else untextured surfaces have v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
-uniform mat3 u_places[6];       // texture coordinates to those of each texture's picture
+uniform mat3 u_places[6];       // texture coordinates to those of each texture's image
 uniform int u_uv_sets[6];       // 0: v_uv, 1: v_second_uv
 uniform sampler2D u_normal_map;
 uniform float u_normal_scale;   // 0: no map
