@@ -374,7 +374,7 @@ class Frame:
         """Return the last image of the scene, without panels: (H, W, 4) uint8."""
         if self.target is None:
             raise ViewerError("nothing has been drawn yet")
-        if self.pace.is_unfinished:  # a picture gets all its passes
+        if self.pace.is_unfinished:  # an image gets all its passes
             options = self.state.options
             self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))
             self.pace.restart()
