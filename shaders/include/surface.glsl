@@ -39,7 +39,7 @@ vec4 base_color() {
     return color;
 }
 
-// Opacity of the surface; what a mask cuts out is not drawn.
+// Opacity of the surface; masked fragments are discarded.
 float surface_alpha() {
     if (u_alpha_mode == 0)
         return 1.0;
@@ -51,7 +51,7 @@ float surface_alpha() {
     return 1.0;
 }
 
-// A normal as the normal map bends it. The tangents are those of the screen's derivatives
+// A normal perturbed by the normal map. The tangents are those of the screen's derivatives
 // (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
 vec3 mapped_normal(vec3 position, vec3 normal) {
     if (u_normal_scale == 0.0)

@@ -46,7 +46,7 @@ class ContextMenu:
     Attributes
     ----------
     spot : Spot or None
-        What was hit; None for the background.
+        The item that was hit; None for the background.
     is_wanted : bool
         Whether the menu opens in the next frame.
     """

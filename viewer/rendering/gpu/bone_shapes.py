@@ -28,7 +28,7 @@ def octahedron() -> Floats:
     Returns
     -------
     (N, 7)
-        Corners of triangles: x and z in half widths, y in lengths; their normals, which are 0 where
+        Corners of triangles: x and z in half-widths, y in lengths; their normals, which are 0 where
         triangles are flat; the tint, 1 for the ridge, which shows the roll.
     """
     ring = [(1.0, _WIDEST, 0.0), (0.0, _WIDEST, _FLATNESS)]

@@ -180,7 +180,7 @@ class LatePasses:
 
     @cached_property
     def outline_pass(self) -> OutlinePass:
-        """Draws outlines of what is selected or hovered."""
+        """Pass for outlines of selected and hovered parts."""
         from viewer.rendering.passes.outline_pass import OutlinePass, OutlineTools
 
         tools = OutlineTools(self._programs, self._mesh_pass, self.point_pass, self._buffers)
