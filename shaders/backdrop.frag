@@ -1,12 +1,12 @@
 #version 330
-// The studio out of focus, with half a step of noise, so that 8 bits show no bands.
+// The studio out of focus, dithered by half a quantization step so that 8 bits show no banding.
 
 #pragma include tone
 #pragma include studio
 
 in vec3 v_ray;              // camera space
 
-const float BLUR = 0.6;     // roughness that it is blurred as
+const float BLUR = 0.6;     // roughness that determines the blur
 
 out vec4 f_color;           // sRGB
 

@@ -1,8 +1,8 @@
 #version 330
-// One triangle that covers the picture, with the ray of sight through each place.
+// One triangle that covers the image, with the viewing ray through each point.
 
-uniform vec2 u_ray_scale;   // ray per half picture, at depth 1
-uniform vec2 u_ray_shift;   // of the middle of the picture
+uniform vec2 u_ray_scale;   // half extent of the image at depth 1
+uniform vec2 u_ray_shift;   // ray through the centre of the image, at depth 1
 
 out vec3 v_ray;             // camera space, any length
 

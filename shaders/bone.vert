@@ -2,7 +2,7 @@
 // Places parts of a skeleton: instances of a shape between a joint and its child, or at a joint.
 
 in vec3 in_corner;      // x and z across in half widths, y from the joint (0) to the end (1)
-in vec3 in_normal;      // in that frame; 0 for one normal per triangle
+in vec3 in_normal;      // in the same frame; 0 for one normal per triangle
 in float in_tint;       // 0: the joint's colour, 1: that of the axis in_link.z
 in ivec3 in_link;       // joint; its child, -1 for an end, -2 for a ball; axis that marks the roll
 in vec4 in_end;         // of an end without child: direction in joint space, length in figure units
@@ -15,7 +15,7 @@ uniform mat4 u_projection;
 uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
 uniform int u_selected;        // joint to draw in u_highlight; -1 for none
 uniform int u_only;            // joint to draw alone; -1 for all
-uniform float u_height;         // of the picture, pixels
+uniform float u_height;         // of the image, pixels
 uniform vec3 u_highlight;      // linear
 uniform bool u_has_color;      // use u_color instead of in_color
 uniform vec3 u_color;          // linear
@@ -29,7 +29,7 @@ flat out float v_opacity;
 flat out int v_instance;    // joint
 
 const float THINNEST = 0.7;     // smallest half width, in pixels
-const float STUBBIEST = 0.35;   // largest half width, in lengths
+const float STUBBIEST = 0.35;   // largest half width, relative to the length
 const vec3 AXES[3] = vec3[](
     vec3(0.80, 0.09, 0.08), vec3(0.15, 0.62, 0.11), vec3(0.10, 0.30, 0.95));
 

@@ -1,6 +1,6 @@
 #version 330
-// One axis of a separable Gaussian blur of two fields of darkness. The first pass converts depths
-// to them.
+// One axis of a separable Gaussian blur of two fields of darkness. The first pass
+// converts depths to darkness.
 
 in vec2 v_place;
 

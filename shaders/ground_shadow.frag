@@ -6,7 +6,7 @@
 
 in vec2 v_place;            // of the shadow map
 
-uniform vec3 u_depth;       // in the map: at place 0, and its growth along both axes
+uniform vec3 u_depth;       // in the map: at v_place 0, and its increase along both axes
 uniform float u_opacity;
 
 out vec4 f_color;           // sRGB, premultiplied by alpha

@@ -1,5 +1,5 @@
 #version 330
-// What is outlined, as a coverage: one channel for each kind of outline.
+// Coverage of the outlined parts: one channel for each kind of outline.
 
 uniform vec4 u_mask;
 

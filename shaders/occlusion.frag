@@ -23,7 +23,7 @@ float arc(float horizon, float n) {
     return 0.25 * (-cos(2.0 * horizon - n) + cos(n) + 2.0 * horizon * sin(n));
 }
 
-// Greatest cosine of the angle between view direction and horizon in a direction of the picture.
+// Largest cosine of the angle between view direction and horizon in one image direction.
 float horizon(vec2 pixel, vec2 direction, vec3 position, vec3 to_eye, float reach, float start,
               float lowest) {
     float found = lowest;
@@ -36,7 +36,7 @@ float horizon(vec2 pixel, vec2 direction, vec3 position, vec3 to_eye, float reac
         vec3 away = position_at(vec2(texel) + 0.5, z) - position;
         float size = length(away);
         bool counts = z < 0.0 && texel == clamp(texel, ivec2(0), last);
-        // What is farther than the radius counts less and less.
+        // Samples beyond the radius count progressively less.
         float kept = counts ? clamp(2.0 - 2.0 * size / u_radius, 0.0, 1.0) : 0.0;
         found = max(found, mix(lowest, dot(away, to_eye) / max(size, 1e-20), kept));
     }
@@ -51,7 +51,7 @@ void main() {
         return;
     vec3 position = position_at(pixel, geometry.a), normal = geometry.rgb;
     vec3 to_eye = u_orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-position);
-    // On the surface itself, depths are rounded.
+    // Depths on the surface itself have rounding errors.
     position += 1e-3 * u_radius * normal;
     float reach = u_radius * u_pixels / (u_orthographic ? 1.0 : -geometry.a);
     float noise = fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))) + u_phase);

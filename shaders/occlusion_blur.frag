@@ -1,8 +1,8 @@
 #version 330
-// Bilateral blur of ambient occlusion: means of 5 by 5 neighbours that are about as deep.
+// Bilateral blur of ambient occlusion: means of 5 by 5 neighbours of similar depth.
 
 uniform sampler2D u_occlusion;  // fraction of the ambient light, and z in camera space
-uniform float u_radius;         // difference of depth from which neighbours do not count, scene units
+uniform float u_radius;         // depth difference beyond which neighbours are ignored
 
 out vec2 f_occlusion;
 

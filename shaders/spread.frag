@@ -13,7 +13,7 @@ void main() {
     for (int step = -u_reach; step <= u_reach; ++step) {
         int x = clamp(place.x + step, 0, size.x - 1);
         vec2 cover = texelFetch(u_mask, ivec2(x, place.y), 0).rg;
-        // A pixel that is covered in part ends that much nearer to its far edge.
+        // Coverage moves the edge within a partly covered pixel towards its far side.
         vec2 away = max(abs(float(step)) + 0.5 - cover, 0.0);
         nearest = mix(nearest, min(nearest, away), greaterThan(cover, vec2(0.0)));
     }

@@ -1,9 +1,9 @@
 #version 330
-// A strip of four vertices for each tile of the picture that the edge of a mask lies in or beside.
+// A strip of four vertices for each image tile in or next to which the edge of a mask lies.
 
 uniform sampler2D u_mask;       // coverage, 0 to 1, with mipmaps
-uniform int u_level;            // of the mipmaps that are looked at
-uniform int u_reach;            // pixels around the tile that count
+uniform int u_level;            // mipmap level to sample
+uniform int u_reach;            // pixels around the tile to consider
 
 const int SIDE = 16;            // of a tile, pixels
 

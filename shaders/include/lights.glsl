@@ -4,7 +4,7 @@ uniform vec3 u_light_directions[2];  // key and rim: towards each light, unit le
 uniform vec3 u_light_colors[2];      // linear, times strength
 uniform vec3 u_up;                   // the scene's up axis, unit length, camera space
 uniform vec3 u_ambient;              // ambient light on an upright surface, linear
-uniform vec3 u_ambient_growth;       // added on a surface that faces up, taken off one that faces down
+uniform vec3 u_ambient_growth;       // added where surfaces face up, subtracted where down
 
 // Hemisphere lighting: what a surface receives from a sky above and a ground below it.
 vec3 ambient_light(vec3 normal) {
@@ -39,7 +39,7 @@ uniform float u_occlusion_strength;
 // Fraction of the ambient light that reaches a surface at this depth in camera space.
 float ambient_visibility(float depth) {
 #ifdef OCCLUSION
-    // Bilateral upsampling: neighbours count as far as they are as deep as this pixel.
+    // Bilateral upsampling: neighbours are weighted by how close they are in depth.
     vec2 place = 0.5 * gl_FragCoord.xy - 0.5;
     ivec2 corner = ivec2(floor(place)), last = textureSize(u_occlusion, 0) - 1;
     vec2 part = place - vec2(corner);

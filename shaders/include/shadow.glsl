@@ -1,7 +1,7 @@
 // Filtered lookups in the key light's shadow map.
 
 uniform sampler2DShadow u_shadow_map;
-uniform vec2 u_shadow_filter;       // radius in widths of the map, turned by an angle
+uniform vec2 u_shadow_filter;       // radius relative to the map's width, rotated by an angle
 
 // Evenly spread over the unit disc: a spiral of golden angles (Vogel 1979).
 const vec2 taps[12] = vec2[](

@@ -1,4 +1,4 @@
-// The light of the studio around the scene; assets/make_studio.py makes it.
+// The light of the studio around the scene; assets/make_studio.py generates it.
 
 uniform sampler2DArray u_studio;    // octahedral maps; the last layer is irradiance / pi
 uniform mat3 u_to_studio;           // camera space to the studio's: +y up, +z towards the camera
@@ -15,7 +15,7 @@ vec2 studio_place(vec3 direction) {
     return ((0.5 * uv + 0.5) * STUDIO_SIZE + 1.0) / (STUDIO_SIZE + 2.0);
 }
 
-// What a surface of this roughness reflects from a direction in camera space.
+// Light that a surface of this roughness reflects from a direction in camera space.
 vec3 studio_light(vec3 direction, float roughness) {
     vec2 place = studio_place(u_to_studio * direction);
     float layer = STUDIO_ROUGH * roughness, low = floor(layer);

@@ -1,5 +1,5 @@
 // The surface of the material that is drawn: its colour, opacity and normal. Files without more
-// than a picture per material are drawn without MATERIALS, which costs them nothing.
+// than an image per material are drawn without MATERIALS, which costs them nothing.
 
 in vec2 v_uv;
 in vec3 v_color;                // linear
@@ -22,7 +22,7 @@ uniform vec4 u_base_factor;     // linear
 uniform bool u_has_base_factor; // else untextured surfaces have v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
-uniform mat3 u_places[6];       // texture coordinates to those of each texture's picture
+uniform mat3 u_places[6];       // texture coordinates to those of each texture's image
 uniform int u_uv_sets[6];       // 0: v_uv, 1: v_second_uv
 uniform sampler2D u_normal_map;
 uniform float u_normal_scale;   // 0: no map
@@ -39,7 +39,7 @@ vec4 base_color() {
     return color;
 }
 
-// Opacity of the surface; what a mask cuts out is not drawn.
+// Opacity of the surface; masked fragments are discarded.
 float surface_alpha() {
     if (u_alpha_mode == 0)
         return 1.0;
@@ -51,7 +51,7 @@ float surface_alpha() {
     return 1.0;
 }
 
-// A normal as the normal map bends it. The tangents are those of the screen's derivatives
+// A normal perturbed by the normal map. The tangents are those of the screen's derivatives
 // (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
 vec3 mapped_normal(vec3 position, vec3 normal) {
     if (u_normal_scale == 0.0)

@@ -1,18 +1,18 @@
 // Metallic-roughness surfaces as glTF 2.0 defines them (appendix B), lit by the studio and, more
 // faintly, by the two lights. The lobe is GGX (Walter et al. 2007) with the height-correlated Smith
 // term (Heitz 2014) and Schlick's Fresnel term; the studio's light comes as a split sum (Karis
-// 2013) with the energy that one bounce loses added back (Fdez-Aguera 2019).
+// 2013) with multiple-scattering compensation (Fdez-Aguera 2019).
 #pragma include studio
 uniform float u_metallic;
 uniform float u_roughness;
-uniform sampler2D u_split_sum;  // factor and summand of the reflectance by n . v and roughness
+uniform sampler2D u_split_sum;  // scale and bias of the reflectance, by n . v and roughness
 uniform bool u_unlit;
 #ifdef MATERIALS
 uniform sampler2D u_metallic_map;
 uniform sampler2D u_roughness_map;
 uniform sampler2D u_occlusion_map;
 uniform sampler2D u_emissive_map;
-uniform vec4 u_channels[6];     // which number of a texel counts
+uniform vec4 u_channels[6];     // which channel of a texel is used
 uniform bool u_has_metallic_map;
 uniform bool u_has_roughness_map;
 uniform bool u_has_emissive_map;
@@ -21,9 +21,9 @@ uniform vec3 u_emissive;        // linear
 #endif
 
 const float PI = 3.14159265358979;
-const float LIGHTS = 0.30;      // of the two lights beside the studio's
-const float BOX = 0.5;          // of the studio's light on a surface that faces its key box
-const float SMOOTHEST = 0.045;  // roughness at which highlights of points are still seen
+const float LIGHTS = 0.30;      // strength of the two lights relative to the studio's
+const float BOX = 0.5;          // share of the studio's light on a surface that faces its key light
+const float SMOOTHEST = 0.045;  // lowest roughness with visible highlights of point lights
 
 struct Surface {
     vec3 diffuse;               // albedo
@@ -31,7 +31,7 @@ struct Surface {
     float roughness;
 };
 
-// A texel's number.
+// The selected channel of a texel.
 #ifdef MATERIALS
 float number(sampler2D map, int index) {
     return dot(texture(map, place(index)), u_channels[index]);
@@ -49,7 +49,7 @@ Surface surface(vec3 base) {
     return Surface(base * (1.0 - metallic), mix(vec3(0.04), base, metallic), roughness);
 }
 
-// Light of the studio that goes towards the eye.
+// Studio light reflected towards the eye.
 vec3 surrounding(Surface s, vec3 normal, vec3 to_eye, float occlusion) {
     float n_v = clamp(dot(normal, to_eye), 1e-3, 1.0);
     vec2 table = texture(u_split_sum, vec2(n_v, s.roughness)).rg;
@@ -62,7 +62,7 @@ vec3 surrounding(Surface s, vec3 normal, vec3 to_eye, float occlusion) {
     return occlusion * (single * reflected + (several + diffuse) * studio_irradiance(normal));
 }
 
-// Light of one direction that goes towards the eye: BRDF times pi times cosine.
+// Light from one direction reflected towards the eye: BRDF times pi times cosine.
 vec3 direct(Surface s, vec3 normal, vec3 to_eye, vec3 to_light) {
     float n_l = dot(normal, to_light), n_v = max(dot(normal, to_eye), 1e-3);
     if (n_l <= 0.0)
@@ -98,10 +98,10 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     for (int i = 0; i < 2; ++i) {
         float cosine = max(dot(normal, u_light_directions[i]), 0.0);
         float seen = visibility(i, position, normal, cosine);
-        // Only the key light has a shadow map; occlusion stands for the rim light's shadow.
+        // Only the key light has a shadow map; occlusion approximates the rim light's shadow.
         seen *= i == 1 ? mix(1.0, ambient, 0.7) : 1.0;
         color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
-        // The studio's key box hangs about where the key light is, and the same things hide it.
+        // The studio's key softbox is about where the key light is, so the same objects block it.
         if (i == 0)
             occlusion *= 1.0 - BOX * cosine * (1.0 - seen);
     }

@@ -12,7 +12,7 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
         float cosine = dot(normal, halfway) * inversesqrt(dot(halfway, halfway));
         float shine = diffuse > 0.0 ? pow(max(cosine, 0.0), u_shininess) : 0.0;
         float seen = visibility(i, position, normal, diffuse);
-        // Only the key light has a shadow map; occlusion stands for the rim light's shadow.
+        // Only the key light has a shadow map; occlusion approximates the rim light's shadow.
         seen *= i == 1 ? mix(1.0, ambient, 0.7) : 1.0;
         color += seen * u_light_colors[i] * (base * diffuse + u_specular * shine);
     }

@@ -38,7 +38,7 @@ _STEP = "playback.actions.step"
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Entry of a panel, with what the layout needs.
+    """Entry of a panel, with the properties that the layout needs.
 
     Attributes
     ----------

@@ -14,13 +14,13 @@ from viewer.app.shown_panels import ShownPanels
 __all__ = ["Layout", "Sizes", "default_sizes", "draw_dock", "keep_fronts"]
 
 _DOCK = "viewer dock"
-# Widths in font sizes: smallest and largest of each side.
+# Minimum and maximum width of each side, in font sizes.
 _LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
-# The same relative to the window's width.
+# Widths of the sides relative to the window's width.
 _LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
 _MOST = 0.5
 """Largest fraction of the window's width that panels may take."""
-_THREE_ROWS = 60.0  # font sizes: a lower window has two rows of panels on the right
+_THREE_ROWS = 60.0  # font sizes: a window of smaller height has two rows of panels on the right
 _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 """Smallest height of bottom panels in font sizes, and its largest fraction of the window."""
 
@@ -59,7 +59,7 @@ class Layout:
     fronts : list of str
         Titles of panels to bring to the front once they are drawn.
     found : tuple
-        Places of panels and sizes of nodes in the previous frame.
+        Docks of panels and sizes of nodes in the previous frame.
     """
 
     is_arranged: bool = False
@@ -140,12 +140,12 @@ def _wanted(state: AppState) -> Sizes:
 
 
 def _shape(sizes: Sizes) -> tuple[bool, int]:
-    """Return what differs between arrangements with different nodes."""
+    """Return a key that differs between arrangements with different dock nodes."""
     return sizes.left > 0.0, sizes.rows
 
 
 def _build(layout: Layout, dock: int, sizes: Sizes) -> None:
-    """Arrange all panels anew."""
+    """Rebuild the arrangement of all panels."""
     builder, viewport = imgui.internal, imgui.get_main_viewport()
     width, height = max(viewport.size.x, 1.0), max(viewport.size.y, 1.0)
     builder.dock_builder_remove_node(dock)
@@ -170,7 +170,7 @@ def _build(layout: Layout, dock: int, sizes: Sizes) -> None:
 
 
 def _rows(right: int, sizes: Sizes) -> dict[str, int]:
-    """Split the right side into rows; return the node of each place."""
+    """Split the right side into rows; return the node of each dock."""
     builder = imgui.internal
     fraction = 0.5 if not sizes.left else 0.42 if sizes.rows == 2 else 0.6
     split = builder.dock_builder_split_node(right, imgui.Dir.down, fraction)
@@ -184,7 +184,7 @@ def _rows(right: int, sizes: Sizes) -> dict[str, int]:
 
 
 def _rebuild(layout: Layout, dock: int, sizes: Sizes) -> None:
-    """Arrange all panels anew, and keep the tabs that are in front."""
+    """Rebuild the arrangement, and keep the front tabs in front."""
     front = _in_front()
     _build(layout, dock, sizes)
     layout.fronts += front
@@ -208,7 +208,7 @@ def _is_in_front(title: str) -> bool:
 
 
 def _resize(layout: Layout, sizes: Sizes) -> None:
-    """Give the sides and the bottom other sizes."""
+    """Resize the sides and the bottom."""
     for name, node in layout.nodes.items():
         found = imgui.internal.dock_builder_get_node(node)
         if found is None:
@@ -220,7 +220,7 @@ def _resize(layout: Layout, sizes: Sizes) -> None:
 
 
 def _notice(layout: Layout) -> None:
-    """Notice that the user drags a panel or an edge."""
+    """Detect that the user drags a panel or an edge."""
     nodes = map(imgui.internal.dock_builder_get_node, layout.nodes.values())
     found = (
         *((title, imgui.internal.find_window_by_name(title).dock_id) for title in _docked()),

@@ -1,4 +1,4 @@
-"""What to draw in each frame of the window: passes while it rests, less while things move."""
+"""What to draw in each frame of the window: more passes while it is still, less while it moves."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from viewer.rendering.sampling import n_passes
 __all__ = ["Pace", "Step"]
 
 _FADE = 0.2  # seconds in which shadows appear or vanish
-_RESTS = 0.25  # seconds without a change after which nothing moves any more
-_SLOW = 1.0 / 24.0  # seconds of a frame from which on what moves is drawn as a draft
-_LONGEST = 0.1  # seconds between two frames that count for fading
+_RESTS = 0.25  # seconds without a change after which the scene counts as still
+_SLOW = 1.0 / 24.0  # frame time in seconds above which a moving scene is drawn in draft quality
+_LONGEST = 0.1  # maximum time step for fading, seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,32 +25,32 @@ class Step:
 
 
 class Pace:
-    """Draws a picture anew when it changes, and improves it while it stays the same.
+    """Redraws the image when it changes, and refines it while it stays the same.
 
-    Where a frame with shadows takes too long, shadows fade out while things move, and in again
-    afterwards: brightness never jumps.
+    If a frame with shadows takes too long, shadows fade out during movement and in again
+    afterwards, so that the brightness never jumps.
     """
 
     def __init__(self) -> None:
         self._key: object = None
         self._changed = self._now = float("-inf")
         self._is_moving = False
-        self._done = 0  # passes of the picture that is shown
+        self._done = 0  # passes of the image that is shown
         self._strength = 1.0
-        self._cost = 0.0  # seconds of a frame with shadows, as far as measured
+        self._cost = 0.0  # frame time with shadows, once measured
         self.is_unfinished = False
 
     def step(self, key: object, options: DisplayOptions, now: float) -> Step | None:
-        """Return what to draw in this frame; None if the picture is finished.
+        """Return what to draw in this frame; None if the image is finished.
 
         Parameters
         ----------
         key : object
-            Everything that the picture depends on.
+            Everything that the image depends on.
         options : DisplayOptions
-            The quality that is asked for.
+            Display options with the requested quality.
         now : float
-            Seconds of any clock.
+            Current time of any clock, seconds.
         """
         is_changed = key != self._key
         faded = self._fade(is_changed, options, now)
@@ -64,16 +64,16 @@ class Pace:
         self.is_unfinished |= self._strength < 1.0
         if self._done >= total:
             return None
-        # While shadows fade, the first pass alone is drawn again and again.
+        # While shadows fade, only the first pass is redrawn.
         index = self._done
         self._done = total if self._strength < 1.0 else index + 1
         return Step(options, range(index, index + 1), self._strength)
 
     def _fade(self, is_changed: bool, options: DisplayOptions, now: float) -> bool:
-        """Move the strength of shadows towards what it should be; return whether it changed."""
+        """Move the strength of shadows towards its target; return whether it changed."""
         change = min(now - self._now, _LONGEST) / _FADE
         is_first, before, self._now = self._key is None, self._strength, now
-        # A slow frame between two changes is no rest.
+        # A slow frame between two changes does not count as a pause.
         is_rest = now - self._changed >= _RESTS + 2.0 * self._cost
         if is_changed:
             self._is_moving, self._changed = not is_rest, now
@@ -91,6 +91,6 @@ class Pace:
         self._done = 0
 
     def measured(self, step: Step, seconds: float) -> None:
-        """Take note of how long a step took to draw."""
+        """Record how long a step took to draw."""
         if step.options.quality != "draft":
             self._cost = seconds

@@ -15,20 +15,20 @@ __all__ = ["save_screenshot"]
 
 
 def save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
-    """Save a picture of the scene under an unused name in the current folder.
+    """Save an image of the scene under an unused name in the current folder.
 
     Parameters
     ----------
     state : AppState
         Receives a message.
     picture : callable
-        Returns the picture, (H, W, 4) uint8; may raise ViewerError.
+        Returns the image, (H, W, 4) uint8; may raise ViewerError.
     """
     try:
         path = free_path(Path.cwd(), state.scene.title, ".png")
         save_image(path, picture())
         state.say(f"Saved {printable(path, 200)}")
-        if "##legend" in state.item_rects:  # drawn over the picture, not in it
+        if "##legend" in state.item_rects:  # drawn over the image, not in it
             state.say('Saved without the legend: turn on "Legend in pictures" in the Weights panel')
     except ViewerError as problem:
         state.error = str(problem)

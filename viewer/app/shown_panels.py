@@ -49,5 +49,5 @@ def set_open(state: AppState, name: str, opened: bool) -> None:
 
 
 def reset_layout(state: AppState) -> None:
-    """Arrange the panels as they are at first."""
+    """Restore the initial arrangement of the panels."""
     state.of(ShownPanels).wants_reset = True

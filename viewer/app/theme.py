@@ -11,7 +11,7 @@ __all__ = ["apply_theme", "change_scale", "set_theme"]
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
-# Colours by their use: dark and light.
+# Colours by use: dark theme, light theme.
 _COLORS = {
     "panel": ((0.125, 0.135, 0.15, 1.0), (0.945, 0.95, 0.955, 1.0)),
     "popup": ((0.11, 0.12, 0.135, 0.98), (0.985, 0.985, 0.99, 0.98)),

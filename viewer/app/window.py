@@ -58,7 +58,7 @@ __all__ = ["probe", "show"]
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two to settle
 _IDLE_SECONDS = 0.5  # interval at which messages that time out are checked
-_BUSY_SECONDS = 0.05  # the same while a file is read
+_BUSY_SECONDS = 0.05  # the same interval while a file is being read
 
 
 def show(
@@ -89,7 +89,7 @@ def show(
     fit_distance : bool
         Whether the camera is kept fitted to the scene until the user moves it.
     builders : sequence of Builder
-        Captures of the scene that are not completely read yet.
+        Captures of the scene that have not been read completely yet.
     plays : bool
         Whether motions play from the start.
     motion : MotionSettings, optional
@@ -241,7 +241,7 @@ class _Window:
         state = self.state
         # Threads are polled at intervals only, because drawing frames would slow them down.
         steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
-        # A picture that is not finished gets better in every frame.
+        # An unfinished image is refined in every frame.
         improves = self.frame.pace.is_unfinished
         if is_settling or state.clock.playing or steps or improves:
             glfw.poll_events()

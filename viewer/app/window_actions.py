@@ -25,5 +25,5 @@ def toggle_messages(state: AppState) -> None:
 
 
 def want(state: AppState, what: str) -> None:
-    """Ask the window to do something after the frame."""
+    """Request an action that the window runs after the frame."""
     state.wants.add(what)

@@ -245,7 +245,7 @@ def _untracked_notes(parts: list[_Part], key: str) -> list[Diagnostic]:
 
 
 def left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
-    """Return notes about what is not written: still figures, and keypoints next to bodies."""
+    """Return notes about omitted data: still figures, and keypoints of people with bodies."""
     left = [actor for actor in scene.actors if actor not in written]
     still = [actor.name for actor in left if actor.clip is None]
     points = [actor.name for actor in left if isinstance(actor.clip, PointClip)]
@@ -301,7 +301,7 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
 
 
 def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
-    """Return the requested range, counted from 0: its first frame and the one after its last."""
+    """Return the requested range, counted from 0: its first frame and one past its last."""
     if arguments.frames is None:
         return None
     found = parse_range(arguments.frames)

@@ -166,7 +166,7 @@ def finish(builder: Builder, scene: Scene) -> None:
 
 
 def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
-    """Load what is needed for a first image, without posing it, and print warnings."""
+    """Load enough for a first image, without posing the scene, and print warnings."""
     if arguments.model_path is not None:
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)
@@ -183,7 +183,7 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
 
 
 def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
-    """Add the names of available models, if the problem is an unknown name."""
+    """Add the names of available models to an error about an unknown name."""
     folder = load_model_folder()
     missing = [file for file in files if Path(file) == problem.path and not problem.path.exists()]
     if not missing or folder is None or len(problem.path.parts) != 1:

@@ -149,7 +149,7 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
 
 
 def _describe_surface(material: Material) -> dict[str, Any]:
-    """Return what a material has besides one opaque picture."""
+    """Return the properties of a material other than one opaque texture."""
     if material.is_plain:
         return {}
     maps = {
@@ -267,7 +267,7 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
 
 
 def _surface_words(material: dict[str, Any]) -> list[str]:
-    """Return what a material has besides a picture, in words."""
+    """Return the properties of a material other than one texture, in words."""
     if "maps" not in material:
         return []
     words = []

@@ -144,7 +144,7 @@ def _draw_onion(
     options: DisplayOptions,
     size: tuple[int, int],
 ) -> None:
-    """Draw poses of a motion in one picture."""
+    """Draw several poses of a motion in one image."""
     from viewer.formats import save_image
     from viewer.rig.motion.onion import onion
 
@@ -190,7 +190,7 @@ def draw_scene(
 ) -> Bytes:
     """Return the scene's pixels, (H, W, 4) uint8; the driver's limitations are printed.
 
-    A quality that was not chosen is lowered where drawing it in software takes long.
+    The default quality is lowered if drawing it in software would take long.
     """
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.quality_limits import limit_passes

@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_camera_arguments(parser)
     add_display_arguments(parser)
     add_skinning_arguments(parser)
-    # Options that are not given have the user's preferred values.
+    # Options that are not given default to the user's preferences.
     parser.set_defaults(samples=None, quality=None, up=None)
 
 
@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _fill_in(arguments: argparse.Namespace) -> None:
-    """Give options that were omitted their values from the user's preferences."""
+    """Set omitted options from the user's preferences."""
     from viewer.app.preferences.storage import load_preferences
 
     preferences = load_preferences()

@@ -9,7 +9,7 @@ from viewer.rig.figure import Figure
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:
-    """Return the data of a figure beside mesh, skeleton, skin and shapes."""
+    """Return the data of a figure other than mesh, skeleton, skin and shapes."""
     extras = {
         "part-body-parts": figure.body_parts,
         "part-keypoints": figure.keypoints,

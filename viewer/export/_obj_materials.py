@@ -1,4 +1,4 @@
-"""Material libraries with the PBR extension, and the pictures that they name."""
+"""Material libraries with the PBR extension, and the image files that they refer to."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.mesh import Mesh
 __all__ = ["PLAIN", "library_losses", "material_library"]
 
 PLAIN = "plain"
-"""The material of triangles that have none."""
+"""Material of triangles without a material."""
 
 _MAPS = {
     "base_texture": ("map_Kd", ""),
@@ -25,13 +25,13 @@ _MAPS = {
     "normal_texture": ("norm", "_normal"),
     "emissive_texture": ("map_Ke", "_emissive"),
 }
-"""Statement of each texture, and what its picture's name ends with."""
+"""MTL statement of each texture, and suffix of its image's name."""
 
 _ONE_NUMBER = ("metallic_texture", "roughness_texture")
 
 
 def material_library(mesh: Mesh, path: Path) -> dict[Path, bytes]:
-    """Return the pictures and, last, the ``.mtl`` that names them; nothing for plain meshes."""
+    """Return the images and, last, the ``.mtl`` that refers to them; nothing for plain meshes."""
     uvs = mesh.uvs if mesh.uvs is not None else np.zeros((0, 2))
     materials = mesh.materials if any(map(_has_look, mesh.materials)) else ()
     files: dict[Path, bytes] = {}
@@ -96,7 +96,7 @@ def _pictures(material: Material) -> dict[str, tuple[Texture, Bytes, str]]:
 
 
 def _grey(image: Bytes, channel: int) -> Bytes:
-    """Return a picture of one channel."""
+    """Return an image of one channel."""
     grey = np.repeat(image[..., channel : channel + 1], 4, axis=2)
     grey[..., 3] = 255
     return grey

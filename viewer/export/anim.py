@@ -50,7 +50,7 @@ def export_animation(
     path : Path
         The file; ``gaps="split"`` writes ``name-1.anim``, ``name-2.anim`` … if there are gaps.
     options : MotionOptions
-        Options, of which only ``gaps`` is used.
+        Options; only ``gaps`` is used.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def _is_whole(animation: SampledAnimation, clip: Clip) -> bool:
     targets = [channel.target for channel in clip.channels]
     step = 1.0 / animation.frame_rate
     starts = abs(float(times[0]) - clip.start) <= _SAME * step
-    # The last frame may come up to a frame before the end.
+    # The last frame may precede the end by up to a frame.
     ends = clip.end - float(times[-1]) < step * (1.0 - _SAME)
     return targets == list(range(skeleton.n_dofs)) and starts and ends
 
@@ -175,7 +175,7 @@ def _dofs(animation: SampledAnimation, skeleton: Skeleton, frames: Frames) -> Fl
     dofs[:, 3:] = angles[..., ::-1].reshape(frames.n_frames, -1)
     dofs[:, :3] = frames.translations[:, 0]
     if isinstance(animation.motion, Clip):
-        # The clip's own angles instead of equivalent ones.
+        # Use the clip's own angles instead of equivalent ones.
         targets, values = evaluate_all(animation.motion, frames.times)
         dofs[:, targets] = values
     dofs = np.clip(dofs, *skeleton.dof_limits.T)

@@ -124,7 +124,7 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
     path : Path
         The file; replaced if it exists.
     options : MotionOptions
-        Options, of which ``world_up`` is written to the file.
+        Options; ``world_up`` is written to the file.
 
     Returns
     -------

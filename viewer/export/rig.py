@@ -1,4 +1,4 @@
-"""Exporter of course rigs: a ``.skel`` and a ``.skin`` for any figure."""
+"""Exporter of .skel-style rigs: a ``.skel`` and a ``.skin`` for any figure."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def lint_files(
     options : LintOptions, optional
         Thresholds of the checks.
     settings : MotionSettings, optional
-        How motions are interpreted.
+        Settings that determine how motions are interpreted.
     max_size : int, optional
         Larger files, in bytes, are not read.
     progress : callable, optional

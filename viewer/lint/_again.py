@@ -37,7 +37,7 @@ class Again:
     findings : list of Finding
         As from ``lint_files``, for the scene as it is now.
     n_files : int
-        Number of files that it came from.
+        Number of files that the scene was opened from.
     notes : tuple of str
         One line each: files that are missing or were changed.
     """
@@ -63,15 +63,15 @@ def lint_again(
     Parameters
     ----------
     scene : Scene
-        Not changed.
+        Scene to check; not modified.
     paths : sequence of Path
-        The files that it was opened from.
+        Files that the scene was opened from.
     options : LintOptions, optional
         Thresholds of the checks.
     settings : MotionSettings, optional
-        How its motions were interpreted.
+        Settings with which its motions were interpreted.
     since : float, optional
-        When it was opened, seconds since the epoch: files that changed later are reported.
+        Time at which it was opened, seconds since the epoch: files changed since are reported.
     progress : callable, optional
         As for ``lint_scene``; reading files is included.
     is_likely : bool
@@ -110,7 +110,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _changed(path: Path) -> float:
-    """Return when a file, or one in a folder, was last changed; seconds since the epoch."""
+    """Return when a file or any file in a folder was last changed, seconds since the epoch."""
     return max(map(_last_change, _with_contents(path)), default=0.0)
 
 
@@ -165,7 +165,7 @@ def _have_equal(one: object, two: object, names: tuple[str, ...]) -> bool:
 
 
 def _alike(one: object, two: object) -> bool:
-    """Return whether two parts have equal numbers."""
+    """Return whether two parts have equal values."""
     if one is two:
         return True
     if isinstance(one, np.ndarray) and isinstance(two, np.ndarray):

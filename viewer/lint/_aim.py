@@ -23,14 +23,14 @@ class Places:
     Attributes
     ----------
     vertices : (N, 3)
-        Positions, the worst first.
+        Positions, worst first.
     triangles : (T, 3, 3)
         Corners of triangles; the worst triangle first.
     joints : (J, 3)
         Joints, or captured points that are seen; for findings about a whole motion, its actor.
     facing : (3,)
-        Mean normal of the marked surface: length 1 if all of it faces one way, 0 if it faces
-        all ways or there is none.
+        Mean normal of the marked surface: length 1 if it all faces one direction, 0 if it faces
+        all directions or there is no surface.
     """
 
     vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
@@ -83,7 +83,7 @@ def _facing(normals: Floats, actor: Actor) -> Floats:
     mean = normals.mean(axis=0)
     rotated = actor.placement[:3, :3] @ mean
     length = float(np.linalg.norm(rotated))
-    # A placement's scale must not lengthen it; a broken rig may have no finite normals.
+    # A placement's scale must not lengthen the mean; a broken rig may have no finite normals.
     return rotated * (np.linalg.norm(mean) / length) if 0.0 < length < np.inf else np.zeros(3)
 
 

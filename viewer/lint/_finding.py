@@ -41,9 +41,11 @@ class LintOptions:
     Attributes
     ----------
     max_speed : float or None
-        Of a joint or keypoint, figure units per second; None for 15 times the figure's size.
+        Maximum speed of a joint or keypoint, figure units per second; None for 15 times the
+        figure's size.
     max_rotation : float
-        Rotation of a joint relative to its parent, radians per second; default ``MAX_ROTATION``.
+        Maximum rotation rate of a joint relative to its parent, radians per second; by default
+        ``MAX_ROTATION``.
     confidence : float
         Captured keypoints below this have low confidence.
     rate : float
@@ -51,8 +53,8 @@ class LintOptions:
     frame_rate : float
         Frames per second for numbering the frames of keyed clips.
     ground : float, "auto" or "none"
-        Height of the ground along the scene's up axis; detected from the feet; or none,
-        and feet are not checked.
+        Height of the ground along the scene's up axis; detected from the feet if
+        ``"auto"``; with ``"none"``, feet are not checked.
     """
 
     max_speed: float | None = None
@@ -78,9 +80,9 @@ class Finding:
     part : "", "mesh", "skeleton" or "clip"
         The part of the actor that it refers to.
     vertices, triangles, joints : (N,) int32
-        Of the actor's figure, the worst first; keypoints of captures are listed as joints.
+        Indices in the actor's figure, worst first; keypoints of captures are listed as joints.
     frames : (N,) int32
-        As numbered in the file, the worst first.
+        Frame numbers as in the file, worst first.
     times : (N,)
         Times of these frames on the scene's clock, in seconds.
     seek : float or None
@@ -119,7 +121,7 @@ class Finding:
 
     @property
     def file(self) -> Path | None:
-        """The file that it is about, if known."""
+        """The file that the finding is about, if known."""
         return self.diagnostic.path
 
     @property
@@ -163,7 +165,7 @@ class Subject:
     counting : Counting or None
         Frame numbering of keyed clips; None to number each clip separately.
     invalid : mapping of str to (N,)
-        Data that a reader replaced because the file's own is invalid: vertices by
+        Data that a reader replaced because those in the file are invalid: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
         ``"joints"``, rows by ``"frames"``.
     tracks : list of Track
@@ -192,7 +194,7 @@ class Subject:
         Returns
         -------
         (count,)
-            False for items whose data is not the file's own.
+            False for items whose data were replaced.
         """
         result = np.ones(count, dtype=np.bool_)
         lost = self.invalid.get(part, _NONE)

@@ -11,21 +11,21 @@ from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["Ground", "ground_of"]
 
-Level = tuple[float, int]  # a height, and the number of frames in which feet rest there
+Level = tuple[float, int]  # a height, and the number of frames in which feet rest at it
 
 # Lengths are relative to the figure's height at rest: 0.01 is 17 mm for a person.
 _ALIKE = 0.005  # heights within this are one level: about half the tolerance for sunk feet
 _APART = 0.01  # minimum distance between separate levels
-_CUSTOM = 0.015  # from the conventional ground: captures are calibrated to about 25 mm
-_NEAR = 0.03  # the same, for the lowest feet if they never rest
+_CUSTOM = 0.015  # from the conventional ground at most: captures are calibrated to about 25 mm
+_NEAR = 0.03  # the same for the lowest feet if they never rest
 _LONG = 0.1  # minimum seconds for which a foot rests
 _CALM = 0.006  # maximum vertical motion meanwhile; at the top of a jump a foot falls by 12 mm
 _MOST = 0.5  # fraction of these frames that must be this close to their mean
 _RESTS = 0.2  # fraction of all frames: with fewer at rest, equal heights may be coincidence
-_FRACTION = 0.1  # fraction of the frames at rest that makes a level
+_FRACTION = 0.1  # minimum fraction of the frames at rest for a level
 _TIE = 0.5  # fraction of the longest level's frames above which a likely level is chosen
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
-_ROLLS = 0.02  # from the longest level: a rolling foot makes others this close
+_ROLLS = 0.02  # minimum distance from the longest level: a rolling foot makes others this close
 _STEP = 0.06  # below the longest level: the ground may be this far below a step or a seat
 
 
@@ -105,7 +105,7 @@ def _level_at(rests: Floats, height: float, size: float) -> list[Level]:
 
 
 def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -> bool:
-    """Return whether another level than the longest may be the ground.
+    """Return whether a level other than the longest may be the ground.
 
     A likely level with few frames is not a rival just below the longest: feet have sunk there.
     It is one if it is a step below, as for a person sitting or standing on a box, or above, as the
@@ -124,7 +124,7 @@ def _resting(lowest: Floats, present: Bools, step: float, size: float) -> Bools:
     count = len(lowest) - width
     if count < 1:
         return rests
-    heights = np.where(present, lowest, np.inf)  # feet do not rest if the person leaves meanwhile
+    heights = np.where(present, lowest, np.inf)  # feet do not rest if the person leaves
     windows = np.lib.stride_tricks.sliding_window_view(heights, width + 1)
     highest = windows.max(axis=1)
     calm = highest <= windows.min(axis=1) + _CALM * size
@@ -135,7 +135,7 @@ def _resting(lowest: Floats, present: Bools, step: float, size: float) -> Bools:
 
 
 def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
-    """Return the heights with high density, and their numbers of frames, the most first."""
+    """Return the heights with high density, and their numbers of frames, most frequent first."""
     left = np.sort(heights)
     levels: list[Level] = []
     while len(left) and len(left) >= _FRACTION * len(heights):
@@ -147,5 +147,5 @@ def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
         level = float(np.median(left[first : ends[first]]))
         levels.append((level, int(counts[first])))
         left = left[np.abs(left - level) > _APART * size]
-    # Of levels with equally many frames the upper one is first: below it, feet have sunk.
+    # Of levels with equally many frames the upper one is first: at the lower one, feet have sunk.
     return tuple(sorted(levels, key=lambda level: (-level[1], -level[0])))

@@ -18,11 +18,11 @@ def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
     Parameters
     ----------
     remark : Finding
-        Finding about the file that this part was read from.
+        Finding about the file that the part was read from.
     actor : Actor
         The actor with this part.
     part : "mesh", "skeleton" or "clip"
-        Of the actor.
+        Part of the actor.
     """
     if part == "mesh":
         return _in_mesh(remark, actor)

@@ -1,4 +1,4 @@
-"""Opens files for checks: files that fail become findings, the rest is assembled."""
+"""Opens files for checks: files that fail become findings, the others are assembled."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ def open_files(
     settings : MotionSettings, optional
         How motions are interpreted.
     max_size : int
-        Larger files are not read.
+        Size in bytes above which files are not read.
     progress : callable, optional
         Called before each file, and before each part of captures; may raise to cancel.
     """
     opened = Opened()
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
     queue = list(reversed(known.values()))
-    for number, path in enumerate(queue):  # grows during iteration: a .rig names files
+    for number, path in enumerate(queue):  # grows during iteration: a .rig refers to files
         if progress is not None:
             progress(number, len(queue), f"reading {printable(path, 60)}")
         named = _read(opened, path, settings or MotionSettings(), max_size)
@@ -150,7 +150,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
 
 
 def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
-    """Make a scene; parts that do not match are removed, reported, and checked separately."""
+    """Build a scene; parts that do not match are removed, reported, and checked separately."""
     contents = replace(opened.contents)
     alone: list[Figure] = []
     for path, figure in opened.contents.figures:
@@ -180,7 +180,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
 def _read_on(
     scene: Scene, builders: Sequence[Builder], progress: Progress | None
 ) -> ViewerError | None:
-    """Read captures completely; return the error that stopped one."""
+    """Read captures completely; return the error that stopped one of them."""
     for builder in builders:
         while not builder.is_done:
             if progress is not None:  # an exception from it is not a file error
@@ -239,7 +239,7 @@ def with_files(
     findings : list of Finding
         About its scene, or about the one that was checked instead.
     looked_at : (Scene, sequence of Owners), optional
-        Another scene, and for each of its actors the parts equal to those of the opened one.
+        The scene checked instead, and for each of its actors the parts equal to those opened.
     """
     if looked_at is None:
         actors = opened.scene.actors
@@ -252,7 +252,7 @@ def with_files(
         if twin is None:
             remarks.append(remark)
             continue
-        # The reader's finding knows whether the file is rejected, the check's has all locations.
+        # The reader's finding states whether the file is rejected; the check's has all locations.
         severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
         line = remark.line if placed[twin].at is None else None
         placed[twin] = placed[twin].located(placed[twin].file, line, severity)

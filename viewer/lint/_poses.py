@@ -12,9 +12,9 @@ from viewer.rig.skeleton import clamp_dofs
 
 __all__ = ["some_poses"]
 
-_COUNT = 4  # number of poses besides the rest pose and the current pose
+_COUNT = 4  # number of poses in addition to the rest pose and the current pose
 _SWING = 0.6  # radians: about the largest rotation of most joints in a walk
-_SEED = 5  # fixed, so that the same file gives the same numbers
+_SEED = 5  # fixed, so that the same file gives the same results
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 

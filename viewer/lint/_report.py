@@ -20,7 +20,7 @@ _LISTED = 100  # maximum locations of one finding in JSON; their count is always
 
 
 def worst_first(findings: Sequence[Finding]) -> list[Finding]:
-    """Return findings by severity, the worst first; stable within a severity."""
+    """Return findings sorted by severity, worst first; stable within a severity."""
     return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
 
 
@@ -50,7 +50,7 @@ def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
     Parameters
     ----------
     findings : sequence of Finding
-        All of them.
+        All findings.
     n_files : int
         Number of files checked; 0 for none.
     """
@@ -65,7 +65,7 @@ def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
     Parameters
     ----------
     findings : sequence of Finding
-        About this scene, or its files.
+        Findings about this scene or its files.
     scene : Scene
         Provides joint names.
     """

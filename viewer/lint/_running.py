@@ -59,7 +59,7 @@ def lint_scene(
     Parameters
     ----------
     scene : Scene
-        Not changed.
+        Scene to check; not modified.
     options : LintOptions, optional
         Thresholds of the checks.
     progress : callable, optional
@@ -71,7 +71,7 @@ def lint_scene(
     Returns
     -------
     list of Finding
-        By actor, in the order of ``CHECKS``; each has the actor and the locations in it.
+        Findings by actor, in the order of ``CHECKS``; each has the actor and the locations in it.
     """
     chosen = options or LintOptions()
     counting = counting_of(scene, chosen.frame_rate)

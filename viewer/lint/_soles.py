@@ -34,7 +34,7 @@ class Soles:
     movers : (P,) int32
         The joint that each point moves with.
     places : (P, 3)
-        In that joint's space.
+        Positions of the points in that joint's space.
     above : (P,)
         Height of each point above the sole at rest: 0 on a mesh.
     """
@@ -60,7 +60,7 @@ class Soles:
         Returns
         -------
         (F, N)
-            Along the scene's up axis.
+            Heights along the scene's up axis.
         """
         rows = np.einsum("a,fpab->fpb", axis[:3], world[:, self.movers, :3])
         heights = np.einsum("fpb,pb->fp", rows[..., :3], self.places) + rows[..., 3] + axis[3]

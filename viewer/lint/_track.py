@@ -32,7 +32,7 @@ class Track:
     rotations : (F, J, 4)
         Local rotations: unit quaternions.
     size : float
-        Of the skeleton at rest, in scene units.
+        Size of the skeleton at rest, in scene units.
     scale : float
         Scene units per figure unit.
     feet : (N,) int32

@@ -16,13 +16,13 @@ __all__ = ["LOW_FRACTION", "LOW_FRAMES", "check"]
 Indices = NDArray[np.int64]
 
 LOW_FRACTION = 0.05
-"""Fraction of a keypoint's visible frames: this much low confidence is usual."""
+"""Fraction of a keypoint's visible frames: this much low confidence is normal."""
 
 LOW_FRAMES = 2
-"""Minimum number of frames of low confidence."""
+"""Minimum number of frames with low confidence."""
 
-_SINGLE = 6  # maximum number of keypoints of low confidence listed individually
-_SIZES = 15.0  # maximum speed of a point, in sizes of the points' bounding box per second
+_SINGLE = 6  # maximum number of low-confidence keypoints listed individually
+_SIZES = 15.0  # maximum speed of a point, in bounding box diagonals of the points per second
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -65,7 +65,7 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
 def _low(
     subject: Subject, clip: PointClip, names: list[str], numbers: Indices, confidence: Floats
 ) -> list[Finding]:
-    """Report keypoints of low confidence individually, the worst first; the rest together.
+    """Report low-confidence keypoints individually, worst first; the rest together.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _low(
     numbers : (F,)
         Frames in which the person is present, from 0.
     confidence : (F, K)
-        In these frames.
+        Confidences in these frames.
     """
     seen = confidence > 0.0
     is_low = seen & (confidence < subject.options.confidence)
@@ -112,7 +112,7 @@ def _rarer(
     numbers: Indices,
     is_low: Bools,
 ) -> list[Finding]:
-    """Report keypoints of low confidence together; ``fractions`` (K,) are of the frames."""
+    """Report low-confidence keypoints together; ``fractions`` (K,) are fractions of the frames."""
     if len(points) == 0:
         return []
     frames = numbers[is_low[:, points].any(axis=1)]

@@ -24,7 +24,7 @@ __all__ = ["check", "missing_frames"]
 
 _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
-_ROUNDING = 1e-6  # radians or lengths beyond a limit
+_ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
 
 
@@ -195,9 +195,9 @@ class _TooFast:
     worst : int
         The row of a track at the end of the fastest movement.
     rows : (N,)
-        One for each frame with a joint above the limit, the worst first.
+        One row for each frame with a joint above the limit, worst first.
     joints : (J,)
-        The fastest first.
+        Indices of the joints, fastest first.
     """
 
     rate: float
@@ -215,7 +215,7 @@ def _too_fast(track: Track, rates: Floats, limit: float) -> _TooFast | None:
         return None
     rows = rows[np.argsort(-fastest[rows], kind="stable")]
     rate = float(fastest[rows[0]])
-    # Of joints with equal speed, up to rounding, the topmost in the hierarchy is named.
+    # Of joints with equal speed, up to rounding, the topmost in the hierarchy is reported.
     joint = int((rates[rows[0]] >= (1.0 - _ALIKE) * rate).argmax())
     joints = np.flatnonzero((rates > limit).any(axis=0))
     first_then_others = np.concatenate([[joint], joints[joints != joint]])

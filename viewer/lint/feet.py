@@ -16,14 +16,14 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check"]
 
-# Below the ground, in heights of the figure at rest: 17 mm for a person, 51 mm for a guess.
+# Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm for a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03
 _FACTOR = 3.0  # at this multiple of the limit even a single frame is reported
 # Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
 _TOUCHES = 0.02  # above the ground
 _SLIDES = 0.15  # per second
 _SWINGS = 1.0  # per second: a faster foot swings just above the ground
-_FAR = 0.03  # in total, while one foot stands
+_FAR = 0.03  # total distance while one foot stands
 _WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames are noisy
 
 
@@ -86,7 +86,7 @@ def _sunk(
     heights: Floats,
     limit: float,
 ) -> list[Finding]:
-    """Report feet that are deeper than a limit in figure units."""
+    """Report feet that sink deeper than a limit in figure units."""
     depths = np.where(track.present[:, None], -heights, 0.0)
     deepest = depths.max(axis=1)
     is_deep = np.pad(deepest > limit * track.scale, 1)

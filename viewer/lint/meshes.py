@@ -39,7 +39,7 @@ def check(subject: Subject) -> list[Finding]:
     known = subject.valid("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
     flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
     valid = np.flatnonzero(~flat & whole)
-    # Triangles without area have no neighbours and no sides.
+    # Degenerate triangles have no neighbours and no sides.
     corners = welded(mesh.positions, mesh.triangles)[valid]
     return [
         *findings,
@@ -278,7 +278,7 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
 def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
     """Report normals that point to the opposite side of all triangles at their vertex.
 
-    Triangles without area have no side. The two sides of a thin sheet have separate vertices,
+    Degenerate triangles have no side. The two sides of a thin sheet have separate vertices,
     or common ones, in which case each normal agrees with one side.
     """
     corners = mesh.triangles[valid]

@@ -14,8 +14,8 @@ from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels
 
 __all__ = ["check"]
 
-_UNIT = 1e-3  # deviation of a quaternion's length from 1: files with three digits
-_ROUNDING = 1e-9  # radians or lengths beyond a limit
+_UNIT = 1e-3  # deviation of a quaternion's length from 1, for files with three digits
+_ROUNDING = 1e-9  # tolerance beyond a limit, radians or lengths
 
 
 def check(subject: Subject) -> list[Finding]:

@@ -19,7 +19,7 @@ from viewer.rig.skinning import Skinning, deform
 __all__ = ["check"]
 
 _NOTED = 1e-3  # deviation of a sum from 1: files round to three digits
-_WRONG = 5e-3  # four influences of three digits, each off by half the last one, with a margin
+_WRONG = 5e-3  # four influences of three digits, each off by half of the last digit, with a margin
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -209,7 +209,7 @@ def _cost(
 def _posable(subject: Subject, skin: Skin) -> Bools:
     """Return the vertices whose posed position is known: they and all their joints are valid."""
     lost = ~subject.valid("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
-    # A joint of weight 0 moves nothing.
+    # A joint with weight 0 has no effect.
     holds = lost[skin.joints] & (skin.weights != 0.0)
     held = np.bincount(owners(skin), holds, minlength=skin.n_vertices)
     return subject.valid("positions", skin.n_vertices) & (held == 0)

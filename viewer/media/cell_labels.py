@@ -10,17 +10,17 @@ __all__ = ["write_label"]
 
 _SMALLEST = 9  # height of letters, pixels; smaller ones cannot be read
 _LETTERS = 1 / 14  # height of letters, relative to the cell's shorter side
-_INK, _PAPER = 255.0, 16.0  # grey of letters and of the tag behind them
+_INK, _PAPER = 255.0, 16.0  # grey levels of the letters and of the tag behind them
 _PAPER_OPACITY = 0.62
 
 
 def write_label(pixels: Bytes, text: str) -> None:
-    """Write a short text on a dark translucent tag into the lower left corner of a picture.
+    """Write a short text on a dark translucent tag into the lower left corner of an image.
 
     Parameters
     ----------
     pixels : (H, W, 4) uint8
-        Straight alpha; changed in place, unchanged if the text does not fit.
+        Straight alpha; modified in place, unchanged if the text does not fit.
     text : str
         One line.
     """
@@ -37,7 +37,7 @@ def write_label(pixels: Bytes, text: str) -> None:
     ImageDraw.Draw(tag).text((margin, down / 2), text, 255, font, anchor="lm")
     ink = np.array(tag)[..., None] / 255.0
     corner = pixels[height - down :, :across]
-    # Premultiplied, so that the tag is also right over a transparent picture.
+    # Premultiplied, so that the tag is also correct over a transparent image.
     under = corner.astype(np.float64)
     under[..., :3] *= under[..., 3:] / 255.0
     for color, opacity in ((_PAPER, _PAPER_OPACITY), (_INK, ink)):

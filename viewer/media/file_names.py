@@ -9,11 +9,11 @@ __all__ = ["file_stem", "folder_name", "opened_text"]
 
 _LONGEST = 100  # characters of a stem
 _INSIDE = ("smpl_full", "smplfull", "smpl", "keypoints3d", "core_txt_files")
-"""Folders with the same name in every EasyMocap recording or copy of the PIG model."""
+"""Names of folders that every EasyMocap recording or copy of the PIG model has."""
 
 
 def folder_name(path: Path) -> str:
-    """Return a name for a folder's content: the nearest folder with a name chosen by the user.
+    """Return a name for a folder's contents: that of the nearest folder named by the user.
 
     >>> folder_name(Path("/takes/dance.v2/smpl")), folder_name(Path("/models/hog"))
     ('dance.v2', 'hog')

@@ -1,4 +1,4 @@
-"""The 256-colour palette of a GIF: chosen from a few frames, used for all with ordered dither.
+"""The 256-colour palette of a GIF: chosen from a few frames, used for all with ordered dithering.
 
 With one palette for the whole video, static regions are identical from frame to frame and are not
 stored again, which makes the file five times smaller than with a palette per frame. The dither is
@@ -37,7 +37,7 @@ class PaletteChooser:
         source = self._graph.add_buffer(
             width=size[0], height=size[1], format="rgba", time_base=_HUNDREDTH
         )
-        # One colour means "transparent", and "unchanged since the previous frame".
+        # One colour stands for both "transparent" and "unchanged since the previous frame".
         chooser = self._graph.add("palettegen", "stats_mode=full:reserve_transparent=1")
         sink = self._graph.add("buffersink")
         source.link_to(chooser)

@@ -68,7 +68,7 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
 
 
 def picture_dimensions(path: Path) -> tuple[int, int] | None:
-    """Return the width and height of a picture, without decoding it; None if it is unreadable."""
+    """Return the width and height of an image, without decoding it; None if it is unreadable."""
     from PIL import Image
 
     try:

@@ -16,10 +16,10 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["PictureSink", "SheetSink", "sheet_layout"]
 
-_MOST_WORKERS = 4  # images that are compressed at the same time
+_MOST_WORKERS = 4  # maximum number of images compressed at the same time
 _SMALLEST_CELL = 16  # pixels
 _CELL_ASPECT = 4.0 / 3.0
-_GUTTER = 0.006  # between cells, relative to the picture's shorter side
+_GUTTER = 0.006  # gutter between cells, relative to the image's shorter side
 _WHITE = (255, 255, 255, 255)
 
 
@@ -86,7 +86,7 @@ class SheetSink:
     numbers : sequence of int
         Number of each frame, written into its cell.
     aspect : float
-        Preferred width / height of a cell: that of what the frames show.
+        Preferred width / height of a cell: that of the frames' content.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ def check_targets(
     files : sequence of Path
         All files that the run writes under requested names, including companion files.
     inputs : iterable of Path
-        All files that the run reads; a folder stands for the files in it.
+        All files that the run reads; a folder means all files in it.
     force : bool
         Whether existing files may be replaced; inputs never are.
     hint : str

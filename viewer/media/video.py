@@ -33,7 +33,7 @@ __all__ = ["VideoSink"]
 
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
 _QUALITY = 75.0
-_GIF_SAMPLES = 12  # frames whose colours the palette is chosen from
+_GIF_SAMPLES = 12  # number of frames from which the palette is chosen
 
 
 class VideoSink:
@@ -52,7 +52,7 @@ class VideoSink:
         Frames per second. GIF frame delays are multiples of 1/100 s; they are rounded so that their
         mean is exact.
     quality : float
-        0 to 100; GIFs have one quality.
+        0 to 100; ignored for GIFs.
     transparent : bool
         Whether frames have transparent pixels. If the format has no alpha, frames are composited on
         black.

@@ -22,7 +22,7 @@ class VideoKind:
     title : str
         Name in menus.
     encoders : tuple of str
-        FFmpeg's names of its encoders, the best first.
+        FFmpeg's names of its encoders, best first.
     has_alpha : bool
         Whether it supports transparency.
     needs_even : bool
@@ -42,7 +42,7 @@ VIDEOS = {
         ("libx264", "libopenh264", "mpeg4"),
         False,
         True,
-        {"movflags": "+faststart"},  # the index first, so that browsers start at once
+        {"movflags": "+faststart"},  # the index comes first, so that browsers start at once
     ),
     ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
     ".gif": VideoKind("animated GIF", ("gif",), True, False),
@@ -51,7 +51,7 @@ VIDEOS = {
 
 
 def video_kind(path: Path) -> VideoKind:
-    """Return the video format of a file's suffix.
+    """Return the video format for a file's suffix.
 
     Raises
     ------

@@ -20,11 +20,11 @@ from viewer.rig.skin import Skin, bind_positions, owners
 __all__ = ["Bounds", "stretch"]
 
 _MARGIN = 1.03  # for pose correctives and skinning methods that do not blend linearly
-_BONE = 0.05  # greatest half width of a bone, in sizes of the skeleton
+_BONE = 0.05  # largest half-width of a bone, relative to the skeleton's size
 
 
 class Bounds:
-    """Spheres that contain the drawn surfaces of actors, at the cost of their joints.
+    """Spheres that contain the drawn surfaces of actors, computed from their joints alone.
 
     A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
     it lies in the convex hull of spheres about the joints that reach to their farthest vertices.

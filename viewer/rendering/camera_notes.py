@@ -1,4 +1,4 @@
-"""Messages about calibrated cameras: missing images, other sizes, lens distortion."""
+"""Messages about calibrated cameras: missing images, mismatched sizes, lens distortion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.rig.scene import Scene
 
 __all__ = ["image_notes", "lens_notes"]
 
-_VISIBLE = 0.5  # pixels of the camera's own pictures: smaller errors are invisible
+_VISIBLE = 0.5  # pixels of the camera's images; smaller errors are invisible
 
 
 def image_notes(scene: Scene, camera: CameraView) -> list[str]:
@@ -19,7 +19,7 @@ def image_notes(scene: Scene, camera: CameraView) -> list[str]:
     Raises
     ------
     RigError
-        If the size of the camera's pictures is unknown.
+        If the size of the camera's images is unknown.
     """
     if scene.images is None:
         return []
@@ -43,7 +43,7 @@ def lens_notes(scene: Scene, camera: CameraView) -> list[str]:
     Raises
     ------
     RigError
-        If the size of the camera's pictures is unknown.
+        If the size of the camera's images is unknown.
     """
     error = distortion_error(camera)
     if error < _VISIBLE:

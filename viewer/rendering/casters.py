@@ -38,8 +38,8 @@ class Casters:
     options : DisplayOptions
         Display options.
     threshold : float
-        Actors of this opacity or less are omitted, 0 to 1. Averaged over passes with evenly
-        spread thresholds, a translucent actor casts a shadow as strong as itself.
+        Actors with at most this opacity are omitted, 0 to 1. Averaged over passes with evenly
+        spread thresholds, the strength of an actor's shadow equals its opacity.
     """
 
     programs: Programs
@@ -52,7 +52,7 @@ class Casters:
     threshold: float = 0.5
 
     def draw(self, view: View, fragment: str) -> None:
-        """Draw everything solid with a fragment shader that needs no material."""
+        """Draw all solid parts with a fragment shader that needs no material."""
         options = self.options
         for actor, mesh in self.meshes.singles:
             if actor.opacity <= self.threshold:
@@ -64,7 +64,7 @@ class Casters:
         for actor in self.actors:
             if actor.opacity <= self.threshold:
                 continue
-            # Over a skin, a skeleton is an overlay.
+            # Over a skin, a skeleton is an overlay and casts no shadow.
             if shows_skeleton(actor, options) and not shows_mesh(actor.figure, options):
                 skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
                 program = joint_program(self.programs, skeleton, options, "", fragment)

@@ -16,7 +16,7 @@ __all__ = ["FILTER_RADIUS", "NO_EFFECTS", "SHADOW_UNIT", "Effects", "Occlusion",
 
 SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # lower units belong to materials and skinning
 FILTER_RADIUS = 3.5
-"""Radius of the filter of shadows on surfaces, texels."""
+"""Radius of the shadow filter on surfaces, texels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +26,17 @@ class Shadow:
     Attributes
     ----------
     texture : moderngl.Texture
-        Depths seen from the light.
+        Depths as seen from the light.
     matrix : (4, 4)
-        Scene space to the map, 0 to 1 on all axes.
+        From scene space to coordinates in the map, 0 to 1 on all axes.
     texel : float
         Side of a texel, scene units.
     strength : float
-        0 to 1: fraction of the light that a shadow takes away.
+        0 to 1: fraction of the light that a shadow removes.
     angle : float
-        By which the filter's pattern is rotated, radians.
+        Rotation of the filter's pattern, radians.
     blur : float
-        Radius of the filter on the ground, scene units; at least that on surfaces counts.
+        Radius of the filter on the ground, scene units; never less than that on surfaces.
     """
 
     texture: moderngl.Texture
@@ -47,7 +47,7 @@ class Shadow:
     blur: float = 0.0
 
     def filter(self, is_ground: bool = False) -> tuple[float, float]:
-        """Return the radius of the filter in widths of the map, as a vector at its angle."""
+        """Return the filter's radius, relative to the map's width, as a vector at its angle."""
         texels = max(FILTER_RADIUS, self.blur / self.texel if is_ground else 0.0)
         radius = texels / self.texture.width
         return radius * math.cos(self.angle), radius * math.sin(self.angle)
@@ -78,19 +78,19 @@ class Effects:
 
     @property
     def defines(self) -> tuple[str, ...]:
-        """Macros of the shaders that use them."""
+        """Macros that enable these effects in shaders."""
         pairs = (("SHADOWS", self.shadow), ("OCCLUSION", self.occlusion))
         return tuple(name for name, effect in pairs if effect is not None)
 
     def bind(self, program: moderngl.Program, view: Floats) -> None:
-        """Set the uniforms and textures of a program; ``view`` is scene to camera space, (4, 4)."""
+        """Set uniforms and textures of a program; ``view`` maps scene to camera space, (4, 4)."""
         shadow, occlusion = self.shadow, self.occlusion
         if shadow is not None:
             values = {
                 "u_shadow_map": SHADOW_UNIT,
                 "u_shadow_matrix": as_uniform(shadow.matrix @ np.linalg.inv(view)),
                 "u_shadow_filter": shadow.filter(),
-                # As far as the filter reaches, or the surface would shade itself.
+                # As far as the filter reaches; otherwise surfaces would shadow themselves.
                 "u_shadow_offset": (FILTER_RADIUS + 1.0) * shadow.texel,
                 "u_shadow_strength": shadow.strength,
             }
@@ -105,4 +105,4 @@ class Effects:
 
 
 NO_EFFECTS = Effects()
-"""Light that depends on nothing but the lights."""
+"""No effects: lighting depends on the lights alone."""

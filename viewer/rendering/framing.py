@@ -180,7 +180,7 @@ def fit_turntable(camera: Camera, points: Floats, aspect: float, angle: float) -
     points : (N, 3)
         Points to frame, scene space.
     aspect : float
-        Width / height of the picture.
+        Width / height of the image.
     angle : float
         Rotation about the target in degrees.
     """
@@ -238,7 +238,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
 
 
 def _called(scene: Scene) -> list[tuple[str, ...]]:
-    """Return the names of each actor: its own, its figure's, its person's number."""
+    """Return the names of each actor: its own, its figure's, and its person number."""
     names = []
     for actor in scene.actors:
         by_figure = replace(actor, called="").name

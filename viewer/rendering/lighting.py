@@ -25,8 +25,8 @@ from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = ["Lighting"]
 
-_SHADOW_STRENGTH = 0.9  # the rest stands for light that other surfaces reflect
-_BLUR = 0.011  # radius of the filter on the ground in sizes of a figure, where passes are averaged
+_SHADOW_STRENGTH = 0.9  # the rest represents light reflected by other surfaces
+_BLUR = 0.011  # filter radius on the ground, relative to a figure's size, where passes are averaged
 
 
 class Lighting:
@@ -94,7 +94,7 @@ class Lighting:
         sample: Sample,
         strength: float,
     ) -> View:
-        """Draw what one pass of a picture needs; return its view with the effects.
+        """Draw the maps for one pass of an image; return its view with the effects.
 
         Parameters
         ----------
@@ -103,9 +103,9 @@ class Lighting:
         view : View
             The camera's matrices.
         size : (int, int)
-            Of the picture, pixels.
+            Width and height of the image, pixels.
         sample : Sample
-            The pass.
+            Parameters of the pass.
         strength : float
             Strength of shadows and occlusion, 0 to 1.
         """
@@ -116,7 +116,7 @@ class Lighting:
             shadow = self._shadow_pass(size).draw(
                 casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
             )
-            # Shadows of the passes lie beside each other on the ground: they must overlap.
+            # The shadows of the passes are offset on the ground: they must overlap.
             blur = _BLUR * self._size if n_passes(options) > 1 else 0.0
             shadow = replace(shadow, angle=2.0 * math.pi * sample.phase, blur=blur)
         if options.quality == "final" and self._size > 0.0:

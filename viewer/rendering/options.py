@@ -30,7 +30,7 @@ SHOWN = {
 """Parts of a figure that are drawn, with labels for menus."""
 
 MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
-"""Pictures of lit spheres for the shading ``"matcap"``, with labels for menus."""
+"""Images of lit spheres for the shading ``"matcap"``, with labels for menus."""
 
 BONES = {
     "auto": "Automatic",
@@ -123,7 +123,7 @@ class DisplayOptions:
     matcap : str
         A key of ``MATCAPS``, for the shading ``"matcap"``.
     metallic, roughness : float
-        0 to 1, for the shading ``"pbr"`` of materials that do not state them.
+        0 to 1, for the shading ``"pbr"`` of materials that do not define them.
     flat, wireframe, normals, texture, grid, cull : bool
         Use one normal per triangle; draw edges; draw vertex normals as lines; use the texture;
         draw the ground grid; cull back faces.
@@ -134,7 +134,7 @@ class DisplayOptions:
         sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
         them, otherwise octahedra.
     skeleton_opacity : float or None
-        Opacity of the skeleton over the skin; None for ``OPACITIES`` by style.
+        Opacity of the skeleton over the skin; None for the style's default in ``OPACITIES``.
     samples : int
         Samples per pixel, limited by the driver's maximum.
     quality : str
@@ -158,7 +158,7 @@ class DisplayOptions:
     isolines : bool or None
         Draw lines at every tenth of the range; None for the quantity's default.
     legend : bool
-        Draw the legend of the colours into the image.
+        Draw the colour legend into the image.
     reduced : bool
         Draw the coarser mesh of figures that have one.
     keypoints : bool
@@ -179,9 +179,10 @@ class DisplayOptions:
     cameras : bool
         Draw the frusta of calibrated cameras, with their images if there are some.
     image_brightness : float
-        Of the image behind the scene when looking through a calibrated camera, 0 to 1; 0 hides it.
+        Brightness of the image behind the scene when looking through a calibrated camera, 0 to 1;
+        0 hides it.
     outline : bool
-        Outline the selected joint, or else the selected actor, in pictures.
+        Outline the selected joint, or else the selected actor, in images.
     """
 
     show: str = "skin"

@@ -20,9 +20,9 @@ class Outlined:
     actor : int
         Index in the scene.
     joint : int
-        A joint of it, outlined where the skeleton is drawn; -1 for the whole actor.
+        Its joint, outlined where the skeleton is drawn; -1 for the whole actor.
     points : (N, 3)
-        In place of actor and joint, if there are any: points in scene space.
+        Points in scene space, outlined instead of the actor and joint if there are any.
     is_hovered : bool
         Whether it lies under the pointer, rather than being selected.
     """

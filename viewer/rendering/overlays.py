@@ -22,7 +22,7 @@ __all__ = ["Overlays", "draw_overlays"]
 
 @dataclass(frozen=True, slots=True)
 class Overlays:
-    """Marks, ghost and annotations that a picture shows over the scene."""
+    """Marks, ghost and annotations that an image shows over the scene."""
 
     marks: Marks | None
     ghost: Ghost | None
@@ -43,7 +43,7 @@ def draw_overlays(
     Returns
     -------
     (int, int)
-        Number of joint names omitted for lack of room, and number of joints within the picture.
+        Number of joint names omitted for lack of room, and number of joints within the image.
     """
     drawn: list[Annotation] = []
     if has_joint_marks(options):

@@ -20,7 +20,7 @@ _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's c
 def picture_size(view: CameraView) -> tuple[float, float]:
     """Return the width and height of a camera's images, pixels.
 
-    If the size is not in the files, the principal point is taken as the centre.
+    If the files do not state the size, the principal point is assumed to be the image centre.
 
     Raises
     ------

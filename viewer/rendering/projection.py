@@ -24,7 +24,7 @@ class Projected:
     pixels : (N, 2)
         From the image's left and upper edge; arbitrary where the point is not visible.
     depths : (N,)
-        Normalized depth, -1 at the near plane to 1 at the far plane.
+        Normalised depth, -1 at the near plane to 1 at the far plane.
     seen : (N,) bool
         Whether the point is in front of the eye and within the image.
     """
@@ -89,7 +89,7 @@ def project_segments(
 
 
 def unproject(view: View, size: tuple[int, int], points: Floats, pixels: Floats) -> Floats:
-    """Return the scene points at some pixels that have the depths of given points.
+    """Return the scene points at given pixels with the depths of given points.
 
     Parameters
     ----------

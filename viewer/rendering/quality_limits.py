@@ -12,14 +12,14 @@ from viewer.rig.scene import Scene
 
 __all__ = ["limit_passes", "seconds_per_pass"]
 
-_PATIENCE = 2.0  # seconds for a still picture
+_PATIENCE = 2.0  # seconds for a still image
 _FEWEST = 3  # passes; fewer look no better than normal quality
 _BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9  # of the sum of passes, and occlusion at half resolution
 _PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # seconds on two cores, measured
 
 
 def seconds_per_pass(size: tuple[int, int], n_triangles: int) -> float:
-    """Return about how long llvmpipe draws a pass of final quality on two cores.
+    """Return roughly how long llvmpipe takes to draw a pass of final quality on two cores.
 
     >>> round(seconds_per_pass((1280, 720), 12000), 2)
     0.13
@@ -32,14 +32,14 @@ def limit_passes(
 ) -> list[str]:
     """Lower a quality that would take over two seconds in software, or over 1 GB of memory.
 
-    Estimated and not measured, so that the picture does not depend on what else runs.
+    The time is estimated, not measured, so that the image does not depend on the machine's load.
 
     Parameters
     ----------
     options : DisplayOptions
-        Changed if necessary.
+        Display options; modified in place if necessary.
     scene : Scene
-        What is drawn.
+        The scene to draw.
     size : (int, int)
         Width and height in pixels.
     context : moderngl.Context

@@ -147,10 +147,10 @@ class Renderer:
             Index of an actor and of its highlighted joint, which also is the joint of a scalar
             quantity that needs one and does not name it; -1 for none.
         passes : range, optional
-            Which passes of final quality to draw now, from 0 in order; all if omitted. The target
+            Passes of final quality to draw now, from 0 in order; all if omitted. The target
             shows the average of those drawn so far.
         strength : float
-            0 to 1: how much of shadows and occlusion counts.
+            Strength of shadows and occlusion, 0 to 1.
         """
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
@@ -297,7 +297,7 @@ class Renderer:
     def _update(
         self, scene: Scene, view: View, options: DisplayOptions, selected: tuple[int, int]
     ) -> Meshes:
-        """Skin changed meshes, and upload what else changed."""
+        """Skin changed meshes, and upload other changed data."""
         meshes = update_meshes(self.buffers, scene.actors, options)
         if options.shading == "scalar" and meshes.singles:
             index, joint = selected
@@ -323,7 +323,7 @@ class Renderer:
         self._draw_layer(meshes, view, options, blended=False)
 
     def _draw_blended(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
-        """Draw translucent surfaces, over all that is opaque and the ground."""
+        """Draw translucent surfaces over opaque ones and the ground."""
         drawn = [mesh.mesh for _, mesh in meshes.singles]
         drawn += [instances.mesh for _, instances in meshes.instanced]
         if any(mesh.is_blended for mesh in drawn):
@@ -356,7 +356,7 @@ class Renderer:
         context.depth_func = "<"
 
     def _draw_legend(self, size: tuple[int, int]) -> None:
-        assert self.legend is not None  # meshes were drawn with their numbers
+        assert self.legend is not None  # meshes were drawn with their values
         note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
         if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)

@@ -1,4 +1,4 @@
-"""Passes of an image: what moves by fractions between them, and averages out."""
+"""Passes of an image: small offsets that differ between the passes and average out."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["Sample", "jittered", "n_passes", "sample", "tilted"]
 
-_LIGHT_RADIUS = math.tan(math.radians(1.7))  # of the key light's disc, at distance 1
+_LIGHT_RADIUS = math.tan(math.radians(1.7))  # radius of the key light's disc, at distance 1
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 
 
@@ -24,11 +24,11 @@ class Sample:
     Attributes
     ----------
     shift : (float, float)
-        Of the image, pixels: -0.5 to 0.5.
+        Shift of the image, pixels: -0.5 to 0.5.
     light : (float, float)
-        A point of the key light's disc, of radius 1.
+        A point on the key light's disc, which has radius 1.
     phase : float
-        Of the pattern of directions in which occlusion is searched, 0 to 1.
+        Phase of the pattern of directions in which occluders are searched for, 0 to 1.
     threshold : float
         Opacity above which actors cast shadows, 0 to 1.
     """
@@ -45,7 +45,7 @@ def n_passes(options: DisplayOptions) -> int:
 
 
 def sample(index: int, count: int) -> Sample:
-    """Return one of ``count`` passes: Halton points in the pixel, a spiral over the light.
+    """Return one of ``count`` passes: Halton points within the pixel, a spiral over the light.
 
     >>> sample(0, 1)
     Sample(shift=(0.0, 0.0), light=(0.0, 0.0), phase=0.0, threshold=0.5)
@@ -79,7 +79,7 @@ def tilted(direction: Floats, light: tuple[float, float]) -> Floats:
 
 
 def _radical_inverse(number: int, base: int) -> float:
-    """Return the digits of a number mirrored at the point (van der Corput 1935)."""
+    """Return the radical inverse: a number's digits mirrored at the point (van der Corput 1935)."""
     found, scale = 0.0, 1.0
     while number:
         scale /= base

@@ -182,7 +182,7 @@ def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
 
 
 def far_first(meshes: Meshes, options: DisplayOptions, view: View) -> Meshes:
-    """Return the same meshes, those drawn singly from the farthest to the nearest."""
+    """Return the same meshes, with those drawn singly sorted from farthest to nearest."""
 
     def depth(single: tuple[Actor, PosedMesh]) -> float:
         center = placement_of(single[0], options) @ np.append(single[1].center, 1.0)

@@ -23,7 +23,7 @@ __all__ = ["View", "in_front", "key_direction", "set_lights", "set_model", "view
 class View:
     """A camera's matrices for one image, (4, 4) for column vectors, and the camera itself.
 
-    Effects change the light on what is drawn with this view.
+    Effects modify the lighting of everything drawn with this view.
     """
 
     matrix: Floats
@@ -94,7 +94,7 @@ def _studio_axes(view: View, follows: bool) -> Floats:
     front = np.stack(camera_axes(Camera(azimuth=0.0, inclination=0.0, up=view.camera.up)))
     if follows:
         up = front[1]
-        # Seen from straight above or below, the top of the picture is away from the camera.
+        # Seen from straight above or below, the top of the image is away from the camera.
         level = axes[2] - (axes[2] @ up) * up
         level = level if np.linalg.norm(level) > 1e-6 else -np.sign(axes[2] @ up) * axes[1]
         back = level / np.linalg.norm(level)
@@ -109,6 +109,6 @@ def _direction(light: Light, follows: bool, view: View) -> Floats:
         flat = math.cos(inclination)
         across, towards = flat * math.sin(azimuth), flat * math.cos(azimuth)
         return np.array([across, math.sin(inclination), towards])
-    # The light comes from the position of a camera at these angles.
+    # The light comes from where a camera at these angles would be.
     camera = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
     return view.matrix[:3, :3] @ camera_axes(camera)[2]

@@ -24,7 +24,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["draw"]
 
-_PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without a colour of their own
+_PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without their own colour
 _LOOK = (
     imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.float
 )

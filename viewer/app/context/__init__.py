@@ -1,1 +1,1 @@
-"""Context menus: actions on what a right click in the view hits."""
+"""Context menus: actions on the item under a right click in the view."""

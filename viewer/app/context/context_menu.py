@@ -46,7 +46,7 @@ class ContextMenu:
     Attributes
     ----------
     spot : Spot or None
-        What was hit; None for the background.
+        The item that was hit; None for the background.
     is_wanted : bool
         Whether the menu opens in the next frame.
     """
@@ -58,12 +58,12 @@ class ContextMenu:
 def answer_right_click(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float
 ) -> None:
-    """Find what a right click hit, and ask for its menu.
+    """Find the item that a right click hit, and request its menu.
 
     Parameters
     ----------
     state : AppState
-        The state, with the place of the click.
+        The state, with the position of the click.
     renderer : Renderer
         The renderer that drew the scene.
     size : (int, int)

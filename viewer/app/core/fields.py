@@ -1,4 +1,4 @@
-"""Labelled fields: a label on the left of its widget, and sliders with their number in the clear.
+"""Labelled fields: a label to the left of each widget, and sliders that do not cover their number.
 
 The position of a slider is shown by a track along its lower edge, so that no handle covers the
 number.
@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 __all__ = ["begin_field", "field_width", "slider_float", "slider_int"]
 
 _COLUMN, _WIDEST = 0.4, 8.5
-"""Width of the labels: fraction of the panel's width, and the most in font sizes."""
+"""Width of the labels: fraction of the panel's width, and maximum in font sizes."""
 _TRACK, _KNOB = 0.14, (0.4, 0.3)
 """Height of the track, width and height of the knob, in font sizes."""
 _CLEAR = (0.0, 0.0, 0.0, 0.0)
@@ -25,15 +25,15 @@ def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: floa
     Parameters
     ----------
     label : str
-        Text, and what follows ``##`` or ``###`` to tell it from others, as for ImGui.
+        Text, and an ID after ``##`` or ``###`` to distinguish equal labels, as in ImGui.
     width : float
         Width of the widget in font sizes; it then follows its label directly. 0 aligns it with
         the widgets above and below and lets it fill the line.
     column : float
         Width for the label in window coordinates, for rows of one line. By default it depends on
-        the panel's width, and a longer label stands above its widget.
+        the panel's width, and a longer label is placed above its widget.
     needs : float
-        Smallest width of the widget in window coordinates; the label makes way for it.
+        Minimum width of the widget in window coordinates; the label shrinks to allow for it.
     """
     text = label.partition("##")[0]
     hidden = label[label.index("###") :] if "###" in label else f"##{label}"
@@ -123,7 +123,7 @@ class _Track:
             return
         start, end = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         letter, grab = imgui.get_font_size(), imgui.get_style().grab_min_size
-        # ImGui moves the middle of its handle between these places.
+        # ImGui moves the centre of its handle between these positions.
         left, right = start.x + 2.0 + 0.5 * grab, end.x - 2.0 - 0.5 * grab
         at, origin = (
             left + _fraction(number, low, high, self._is_logarithmic) * (right - left)
@@ -140,7 +140,7 @@ class _Track:
 
 
 def _fraction(value: float, low: float, high: float, is_logarithmic: bool) -> float:
-    """Return the place of a value between the ends of a slider, 0 to 1."""
+    """Return the position of a value between the ends of a slider, 0 to 1."""
     if is_logarithmic and 0.0 < low < high:
         part = math.log(max(value, low) / low) / math.log(high / low)
     else:

@@ -22,7 +22,7 @@ class Job(Protocol):
     title : str
         Description of the job.
     error : str
-        Why it failed; empty if it did not.
+        Why the job failed; empty if it did not.
     lines : list of str
         Messages at the end.
     can_cancel : bool

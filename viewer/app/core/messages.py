@@ -65,7 +65,7 @@ class MessageLog:
         return iter(self._messages.values())
 
     def listed(self, with_status: bool) -> list[Message]:
-        """Return the messages, the oldest first, with or without those of kind ``status``."""
+        """Return the messages, oldest first, with or without those of kind ``status``."""
         return [message for message in self if with_status or message.kind != "status"]
 
 

@@ -23,7 +23,7 @@ __all__ = [
 
 
 def no_motion(state: AppState) -> str:
-    """Return why time cannot be moved."""
+    """Return why the time cannot be changed."""
     return "" if state.clock.has_motion else "no motion: open a clip, a capture or a BVH"
 
 
@@ -33,7 +33,7 @@ def no_panel(state: AppState, needs: str) -> str:
     Parameters
     ----------
     state : AppState
-        With the scene.
+        The state, with the scene.
     needs : str
         Entry of the table of panels.
     """

@@ -84,7 +84,7 @@ def look_of(actor: Actor) -> Look:
 
 
 def _looks(actor: Actor, look: Look) -> bool:
-    """Return whether ``look_of`` would return the same, without making one in each frame."""
+    """Return whether ``look_of`` would return the same, without creating an object per frame."""
     # Clips are compared by identity: they are replaced and never mutated.
     return (
         actor.clip is look.clip

@@ -27,7 +27,7 @@ from viewer.rig.scene import Actor, Scene, scene_points
 
 __all__ = ["AppState"]
 
-_FARTHEST = 1e4  # largest distance of the camera, in sizes of the scene
+_FARTHEST = 1e4  # maximum distance of the camera, relative to the scene's size
 
 Part = TypeVar("Part")
 

@@ -20,7 +20,7 @@ def undo(state: AppState) -> None:
 
 
 def redo(state: AppState) -> None:
-    """Redo the change that was undone last."""
+    """Redo the most recently undone change."""
     before = state.actor
     pose_at = partial(state.clock.go_back, chosen=before)
     if not state.history.redo(state.scene, state.options, pose_at):

@@ -15,7 +15,7 @@ __all__ = ["ViewFrame", "view_frame"]
 Place = tuple[float, float]
 """A point of the window, window coordinates."""
 
-_NEAREST = 1e-9  # smallest w in clip space: points with a smaller one are beside or behind the eye
+_NEAREST = 1e-9  # smallest w in clip space: points with a smaller w are beside or behind the eye
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +49,7 @@ class ViewFrame:
         return (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
 
     def at_depth_of(self, point: Floats, place: Place) -> Floats:
-        """Return the point at a place of the window, at the depth of another point.
+        """Return the scene point at a window position, at the depth of another point.
 
         Parameters
         ----------
@@ -68,7 +68,7 @@ class ViewFrame:
         return np.asarray(found[:3] / found[3])
 
     def ray(self, place: Place) -> tuple[Floats, Floats]:
-        """Return the line of sight at a place: a point on it, and its unit direction away."""
+        """Return the viewing ray at a window position: a point on it, and its unit direction."""
         ends = np.stack([self._clip(place, depth, 1.0) for depth in (-1.0, 1.0)], axis=1)
         near, far = np.linalg.solve(self.matrix, ends).T
         near, far = near[:3] / near[3], far[:3] / far[3]

@@ -92,14 +92,14 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 
 
 def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
-    """Begin a window of its own, which opens in the middle; ``imgui.end`` ends it.
+    """Begin a separate window, which opens in the centre; ``imgui.end`` ends it.
 
     Parameters
     ----------
     title : str
-        In its title bar.
+        Text of the title bar.
     size : (float, float)
-        Width and height where it first appears, in letters' heights; less in a small window.
+        Width and height when it first appears, in font sizes; less in a small window.
 
     Returns
     -------
@@ -220,7 +220,7 @@ def choice(
 
 
 def _combo_width(texts: Iterable[str]) -> float:
-    """Return the width of a drop-down list that clips none of its texts."""
+    """Return the width at which a drop-down list clips none of its labels."""
     widest = max((imgui.calc_text_size(text).x for text in texts), default=0.0)
     return widest + imgui.get_frame_height() + 2.0 * imgui.get_style().frame_padding.x
 

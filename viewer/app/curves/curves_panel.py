@@ -56,7 +56,7 @@ def draw(state: AppState) -> None:
         _draw_list(state, curves)
     imgui.end_child()
     imgui.same_line()
-    # Beside the plot, not above it: widgets that appear must not move a key away from the mouse.
+    # Next to the plot, not above it: widgets that appear must not move a key away from the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
     if clip_of(state) is not None:
         side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.35 * room)

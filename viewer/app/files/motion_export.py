@@ -62,7 +62,7 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     Returns
     -------
     list of Path
-        One file per actor, and a ``.bin`` beside each ``.gltf``; for a folder, its folder of
+        One file per actor, and a ``.bin`` next to each ``.gltf``; for a folder, its folder of
         frames.
     """
     if not path.suffix:

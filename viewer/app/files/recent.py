@@ -80,7 +80,7 @@ def save_closed_panels(names: set[str]) -> None:
 
 
 def load_arranged() -> bool:
-    """Return whether the stored layout is the user's own; a stored default is made anew."""
+    """Return whether the stored layout is the user's own; a stored default is rebuilt."""
     try:
         return json.loads((state_folder() / "arranged.json").read_text("utf-8")) is True
     except (OSError, ValueError, RecursionError):

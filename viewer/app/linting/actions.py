@@ -62,7 +62,7 @@ def start_check(state: AppState) -> None:
     settings, since = state.motion_settings, state.opened_at
 
     def check(report: Report) -> list[str]:
-        # The bundled figure comes from files too.
+        # The bundled figure is read from files too.
         files, is_likely = paths or bundled_files(), not paths
         again = lint_again(copy, files, options, settings, since, report, is_likely)
         findings = tuple(worst_first(again.findings))

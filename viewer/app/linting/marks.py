@@ -22,8 +22,8 @@ from viewer.rig.scene import actor_points
 __all__ = ["aim", "marks_of", "show_finding"]
 
 _MOST = 3000  # largest number of marked vertices, and of marked edges of triangles
-_FEW = 200  # up to so many triangles are marked at their centres too: tiny edges cover no pixel
-_AROUND, _AROUND_JOINTS = 0.06, 0.15  # surroundings to show, relative to the actor's size
+_FEW = 200  # up to this many triangles also get a mark at the centre: tiny edges cover no pixel
+_AROUND, _AROUND_JOINTS = 0.06, 0.15  # shown around a finding, relative to the actor's size
 _ONE_WAY = 0.5  # minimum length of the mean normal of a location with a front side
 _AWAY = 0.2  # cosine to the line of sight below which the front side is not visible
 _STEEPEST = 70.0  # degrees

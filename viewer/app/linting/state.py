@@ -25,7 +25,7 @@ class Checked:
     options : LintOptions
         Limits of the check.
     findings : tuple of Finding
-        The worst first.
+        Findings, most severe first.
     n_files : int
         Number of files of the scene, which were read again.
     notes : tuple of str

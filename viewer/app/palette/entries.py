@@ -1,4 +1,4 @@
-"""Everything that the command palette finds: actions, panels, choices, joints and figures."""
+"""Entries of the command palette: actions, panels, choices, joints and figures."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class Entry:
     Attributes
     ----------
     text : str
-        Its name.
+        Name of the entry.
     kind : str
-        What it is, in one word.
+        Category, in one word.
     run : callable
         Called with the state.
     key : str
-        Key that does the same; empty for none.
+        Keyboard shortcut; empty for none.
     why : str
-        Why it cannot be run now; empty if it can.
+        Why the entry cannot be run now; empty if it can.
     """
 
     text: str
@@ -52,7 +52,7 @@ class Entry:
 
 
 def entries(state: AppState) -> list[Entry]:
-    """Return all entries for the present scene."""
+    """Return all entries for the current scene."""
     return [*_actions(state), *_panels(state), *_choices(state), *_joints(state), *_figures(state)]
 
 

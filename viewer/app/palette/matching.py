@@ -13,8 +13,8 @@ _BOUNDARIES = " _-.:/#("
 def score(query: str, name: str) -> float:
     """Return how well a name matches a query: the higher the better, negative if not at all.
 
-    Every word of the query must be found: best at the beginning of a word of the name, else inside
-    of one, else as letters in this order. Shorter names win among equals.
+    Every word of the query must match: best at the start of a word of the name, next best inside
+    one, otherwise as letters in this order. Ties go to the shorter name.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def score(query: str, name: str) -> float:
 
 
 def _score_word(word: str, name: str) -> float:
-    """Return the score of one word; negative if its letters are not all there in order."""
+    """Return the score of one word; negative if the name lacks its letters in this order."""
     place = name.find(word)
     while place > 0 and name[place - 1] not in _BOUNDARIES:
         following = name.find(word, place + 1)
@@ -51,14 +51,14 @@ def _score_word(word: str, name: str) -> float:
 
 
 def _score_letters(word: str, name: str) -> float:
-    """Return the score of letters in order; those at beginnings of words and in runs count more."""
+    """Return the score of letters in order; those at starts of words and in runs count more."""
     points = _walk(word, name, True)
     points = _walk(word, name, False) if points < 0 else points
     return -1.0 if points < 0 else _SCATTERED * points / (2.0 * len(word))
 
 
 def _walk(word: str, name: str, prefers_starts: bool) -> int:
-    """Return points for letters found in order, from left to right; -1 if one is missing."""
+    """Return the score of letters found in order, from left to right; -1 if one is missing."""
     points, last = 0, -1
     for letter in word:
         places = [place for place in range(last + 1, len(name)) if name[place] == letter]
@@ -74,7 +74,7 @@ def _walk(word: str, name: str, prefers_starts: bool) -> int:
 
 
 def ranked(query: str, names: Sequence[str]) -> list[int]:
-    """Return the indices of the names that match, the best first; in their order among equals."""
+    """Return the indices of matching names, best first; ties keep their order."""
     scores = [score(query, name) for name in names]
     return sorted(
         (index for index, value in enumerate(scores) if value >= 0.0),

@@ -13,8 +13,8 @@ from viewer.app.palette.matching import ranked
 
 __all__ = ["Palette", "draw_palette", "toggle_palette"]
 
-_WIDTH, _ROWS = 34.0, 12  # in font sizes; most rows without scrolling
-_TOP = 0.14  # of the window's height
+_WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
+_TOP = 0.14  # fraction of the window's height
 _KEY_COLOR = (1.0, 0.78, 0.45, 1.0)
 _K = imgui.Key
 
@@ -36,9 +36,9 @@ class Palette:
     known : list of Entry
         Entries of the scene for which it was opened.
     shown : list of int
-        Matching entries, the best first.
+        Indices of matching entries, best first.
     matched : str or None
-        Query that they match.
+        Query that these entries match.
     """
 
     is_open: bool = False
@@ -51,13 +51,13 @@ class Palette:
 
 
 def toggle_palette(state: AppState) -> None:
-    """Open the palette with an empty text, or close it."""
+    """Open the palette with an empty query, or close it."""
     is_open = state.of(Palette).is_open
     state.put(Palette(is_open=not is_open, known=[] if is_open else entries(state)))
 
 
 def draw_palette(state: AppState) -> None:
-    """Draw the palette if it is open; run what is chosen after it has closed."""
+    """Draw the palette if it is open; run the chosen entry after it has closed."""
     palette = state.of(Palette)
     if not palette.is_open:
         return
@@ -110,7 +110,7 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
 
 
 def _move(palette: Palette) -> bool:
-    """Move the highlight by the arrow keys, around at the ends; return whether it moved."""
+    """Move the highlight with the arrow keys, wrapping at the ends; return whether it moved."""
     count = len(palette.shown)
     steps = {_K.down_arrow: 1, _K.up_arrow: -1, _K.page_down: _ROWS, _K.page_up: -_ROWS}
     step = sum(by for key, by in steps.items() if imgui.is_key_pressed(key))
@@ -143,7 +143,7 @@ def _draw_rows(state: AppState, palette: Palette, moved: bool) -> Entry | None:
 
 
 def _reveal(top: float, height: float) -> None:
-    """Scroll so that a row is in view."""
+    """Scroll to make a row visible."""
     first, room = imgui.get_scroll_y(), imgui.get_window_height()
     if top < first:
         imgui.set_scroll_y(top)
@@ -152,7 +152,7 @@ def _reveal(top: float, height: float) -> None:
 
 
 def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
-    """Draw one entry with its kind, and its key or why it is disabled; return if it was clicked."""
+    """Draw an entry with its kind, and its key or why it is disabled; return if it was clicked."""
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
     flags = imgui.SelectableFlags_.disabled if entry.why else imgui.SelectableFlags_.none
     clicked = imgui.selectable(f"{entry.text}##row{row}", is_chosen, flags)[0]

@@ -64,7 +64,7 @@ def set_rate(state: AppState, rate: float) -> None:
 
 
 def _is_together(one: Actor, other: Actor) -> bool:
-    """Return whether two actors are the same or belong to the same capture."""
+    """Return whether two actors are identical or belong to the same capture."""
     first, second = one.clip, other.clip
     if one is other:
         return True

@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor, Motion
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
 _NAME_WIDTH = 9.0  # in font sizes
-_TICK_GAP = 5.0  # font sizes: smallest distance of two numbers on the ruler
+_TICK_GAP = 5.0  # font sizes: minimum distance between two numbers on the ruler
 _TICK_ASIDE = 3.0  # points between a tick of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
 _PLAIN = (0.44, 0.62, 0.80)  # colour of actors without a colour, sRGB
@@ -33,7 +33,7 @@ _LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
 
 
 def draw_tracks(state: AppState) -> None:
-    """Draw the ruler and the tracks; dragging sets the time to whole frames, with Alt to any."""
+    """Draw the ruler and the tracks; dragging moves the time by whole frames, with Alt freely."""
     size = imgui.get_font_size()
     moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
     height = imgui.get_text_line_height_with_spacing()

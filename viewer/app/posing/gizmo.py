@@ -1,7 +1,7 @@
 """Picking, dragging and releasing of handles in the view.
 
 ImGuizmo rotates matrices about three orthogonal axes; joints here have one, two or three DOFs
-about axes that may be oblique, with limits, so rings and arrows are our own.
+about axes that may be oblique, with limits, so the rings and arrows are custom.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ __all__ = [
 DOT_REACH = 14.0
 """Radius around a joint in which a click selects it, window coordinates."""
 
-_BESIDE = 22.0  # window coordinates beside a handle within which a drag does not orbit
+_BESIDE = 22.0  # window coordinates around a handle within which a drag does not orbit
 _STILL = 2.0  # window coordinates by which the pointer may move in a click
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
@@ -114,7 +114,7 @@ def _is_beside_handle(state: AppState, place: Place) -> bool:
 
 
 def _end_miss(state: AppState) -> bool:
-    """Ignore a drag beside a handle until the button is released; return False for a click."""
+    """Ignore a drag next to a handle until the button is released; return False for a click."""
     if imgui.is_mouse_down(_LEFT):
         return True
     state.of(Posing).has_missed = False
@@ -145,7 +145,7 @@ def _grabbed(state: AppState, place: Place) -> Handle | None:
 
 
 def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
-    """Return the handle of the selected joint at a place of the window.
+    """Return the handle of the selected joint at a window position.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def joint_places(state: AppState) -> Floats:
 
 
 def joint_at(state: AppState, place: Place) -> int:
-    """Return the chosen actor's joint at a place of the window, -1 for none."""
+    """Return the chosen actor's joint at a window position, -1 for none."""
     distances = np.linalg.norm(joint_places(state) - place, axis=1)
     distances[np.isnan(distances)] = np.inf
     nearest = int(distances.argmin()) if len(distances) else -1

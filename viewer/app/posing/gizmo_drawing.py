@@ -43,7 +43,7 @@ _HOT = (1.0, 0.92, 0.55)
 _LIMIT = (1.0, 0.70, 0.10)
 _CHAIN = (0.45, 0.90, 0.95)
 _BEHIND = 0.28  # opacity of the far side of a ring
-_MOST_DOTS = 300  # no dots are drawn for more joints
+_MOST_DOTS = 300  # maximum number of joints drawn as dots
 _ARC_RADIUS = 0.62  # relative to the radius of the rings
 _GAP = 10.0  # window coordinates between a ring and its text
 

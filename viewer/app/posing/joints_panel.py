@@ -52,7 +52,7 @@ OWN_NUMBERS = -2
 
 _FIRST_ROTATION = 3
 _INDENT = 9.0  # points per level
-_DEEPEST = 14  # most levels that are indented: chains of thousands must stay readable
+_DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
 _known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
 _known_rows: Memo[Skeleton, Rows] = Memo(kept=4)

@@ -40,7 +40,7 @@ LENGTH = 72.0
 _REACH = 7.0  # window coordinates around an arrow within which it is grabbed
 _SHORTEST = 12.0  # window coordinates: a shorter arrow points almost at the eye
 _BARE = 14.0  # window coordinates at an arrow's base that belong to the handle at the joint
-_ITERATIONS = 40  # of the solver: bounds the time of a frame
+_ITERATIONS = 40  # iterations of the solver: bounds the time per frame
 _MET = 1e-3  # smallest remaining distance that is shown, relative to the figure's size
 
 

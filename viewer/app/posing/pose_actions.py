@@ -156,7 +156,7 @@ def reset_joint(state: AppState, joint: int) -> None:
 
 
 def random_shape(state: AppState) -> None:
-    """Draw the first shape coefficients from a normal distribution, but not the expressions."""
+    """Sample the first shape coefficients from a normal distribution, but not the expressions."""
     posing = state.of(Posing)
     actor = state.actor
     shapes = actor.figure.blend_shapes

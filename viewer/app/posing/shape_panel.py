@@ -131,7 +131,7 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
 
 
 def _draw_marks() -> None:
-    """Mark whole standard deviations under the slider drawn last, the mean more strongly."""
+    """Mark integer standard deviations under the slider drawn last, the mean more strongly."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     width = high.x - low.x
     grab = imgui.get_style().grab_min_size * 0.5

@@ -26,7 +26,7 @@ __all__ = ["draw_toolbar"]
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
-_WIDTH = 14.5  # of each row, in font sizes: buttons must not move when rows appear
+_WIDTH = 14.5  # width of each row, in font sizes: buttons must not move when rows appear
 
 
 def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
@@ -37,7 +37,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
     state : AppState
         State that the tools act on.
     legend : Rect or None
-        Rectangle of the legend: the tools are placed below it if there is no room beside it.
+        Rectangle of the legend: the tools are placed below it if there is no room next to it.
     """
     x, y, width, height = state.view_rect
     if not state.panels_visible or width < _NARROWEST or height < _LOWEST:

@@ -1,1 +1,1 @@
-"""Preferences of the user: looks, units, quality, keys; remembered between runs."""
+"""User preferences: appearance, units, quality, keys; stored between runs."""

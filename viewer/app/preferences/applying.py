@@ -1,4 +1,4 @@
-"""Application of the preferences to the window: theme, scale, font and keys, while it runs."""
+"""Applies the preferences to the running window: theme, scale, font and keys."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ __all__ = ["change", "follow_preferences", "scale_of", "start_with"]
 
 
 def start_with(state: AppState, preferences: Preferences) -> None:
-    """Use stored preferences for a window that opens.
+    """Apply stored preferences to a new window.
 
     Parameters
     ----------
     state : AppState
         Its angle unit, quality and samples are set.
     preferences : Preferences
-        As loaded.
+        The stored preferences.
     """
     state.put(preferences)
     state.in_degrees = preferences.in_degrees
 
 
 def change(state: AppState, preferences: Preferences) -> None:
-    """Replace the preferences, apply what they change of the view, and store them."""
+    """Replace the preferences, apply their changes to the view, and store them."""
     before = state.of(Preferences)
     if preferences == before:
         return
@@ -46,13 +46,13 @@ def change(state: AppState, preferences: Preferences) -> None:
 
 
 def scale_of(state: AppState) -> float:
-    """Return the scale of the interface: as given, as preferred, or as the monitor's."""
+    """Return the scale of the interface: the given, the preferred, or the monitor's scale."""
     appearance = state.of(Appearance)
     return appearance.given_scale or state.of(Preferences).scale or appearance.screen_scale
 
 
 def follow_preferences(state: AppState) -> None:
-    """Apply the preferences that differ from what is shown; called in every frame."""
+    """Apply the preferences that differ from the applied ones; called in every frame."""
     preferences, applied = state.of(Preferences), state.of(Appearance)
     theme = preferences.theme
     if theme == "system":
@@ -65,7 +65,7 @@ def follow_preferences(state: AppState) -> None:
         change_scale(applied.scale, scale)
         applied.scale = scale
     if preferences.font_size != applied.font_size:
-        # A size set now would be replaced at the end of the frame.
+        # A size set now would be overwritten at the end of the frame.
         imgui.get_style()._next_frame_font_size_base = preferences.font_size
         applied.font_size = preferences.font_size
     if preferences.keys != applied.keys:

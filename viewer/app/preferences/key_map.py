@@ -42,7 +42,7 @@ _CODES = {_name(code): getattr(imgui.Key, code) for code in _USABLE}
 
 
 def parse_chord(text: str) -> int:
-    """Return the key code of a name such as ``Ctrl+Shift+Z``; 0 if it is not one.
+    """Return the key code of a name such as ``Ctrl+Shift+Z``; 0 if the name is invalid.
 
     >>> parse_chord("Ctrl+Z") == imgui.Key.mod_ctrl | imgui.Key.z, parse_chord("Ctrl+")
     (True, 0)
@@ -74,7 +74,7 @@ def label_of(shortcut: Shortcut, keys: Mapping[str, str]) -> str:
 
 
 def conflicts(keys: Mapping[str, str]) -> dict[str, str]:
-    """Return the actions whose key also runs another one.
+    """Return the actions whose key also runs another action.
 
     Parameters
     ----------

@@ -136,7 +136,7 @@ def _draw_keys(state: AppState, preferences: Preferences) -> None:
     """Draw the list of keys; a click on a key waits for its replacement."""
     height = _LISTED * imgui.get_text_line_height_with_spacing()
     found = conflicts(preferences.keys)
-    # The button below, and a line about conflicts.
+    # Leaves room for the button below and a line about conflicts.
     below = (1 + bool(found)) * imgui.get_frame_height_with_spacing()
     room = imgui.get_content_region_avail().y - below
     if imgui.begin_child("##key map", (0.0, max(min(height, room), 0.2 * height))):

@@ -70,7 +70,7 @@ class Preferences:
 
 @dataclass(slots=True)
 class Appearance:
-    """State of the window "Preferences", and what has been applied of its choices.
+    """State of the window "Preferences", and the choices already applied.
 
     Attributes
     ----------

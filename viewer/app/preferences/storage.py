@@ -1,4 +1,4 @@
-"""Preferences in a file: unknown and invalid entries get their defaults."""
+"""Stored preferences: unknown and invalid entries get their defaults."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Theme of the desktop, where the system tells: macOS, Windows, and desktops with gsettings."""
+"""Theme of the desktop, where it can be queried: macOS, Windows, and desktops with gsettings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"
 
 
 def system_theme() -> str:
-    """Return ``"dark"`` or ``"light"``; empty if the system does not tell."""
+    """Return ``"dark"`` or ``"light"``; empty if it cannot be determined."""
     if sys.platform == "win32":
         return _of_windows()
     if sys.platform == "darwin":
@@ -28,7 +28,7 @@ def system_theme() -> str:
 
 
 def _answer(command: tuple[str, ...]) -> str:
-    """Return what a command prints; empty if it is missing, fails or takes too long."""
+    """Return a command's output; empty if the command is missing, fails or takes too long."""
     if shutil.which(command[0]) is None:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""Preview of a recording: the present view, as one of its frames would show it."""
+"""Preview of a recording: the current view as a frame of the recording."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class Preview:
         self._drawn: object = None
 
     def draw(self, state: AppState, key: object) -> None:
-        """Draw the preview if the Record window is open and the picture has changed.
+        """Draw the preview if the Record window is open and the image has changed.
 
         Parameters
         ----------
         state : AppState
-            With the settings; receives the texture.
+            The state, with the settings; receives the texture.
         key : object
-            Identifies the picture of the view.
+            Identifies the image of the view.
         """
         recording = state.of(Recording)
         settings = recording.settings
@@ -54,7 +54,7 @@ class Preview:
         recording.preview = self._draw(state, settings, size)
 
     def _draw(self, state: AppState, settings: RecordSettings, size: tuple[int, int]) -> int:
-        """Draw the preview and return the number of its texture."""
+        """Draw the preview and return the ID of its texture."""
         options = recorded_options(state, settings, 2)
         target = self.target
         if target is None or (target.size, target.asked_samples) != (size, options.samples):
@@ -62,7 +62,7 @@ class Preview:
             self.target = target = Target(self.context, size, options.samples)
         camera = state.camera.copy()
         selected = (state.chosen_actor, state.selected_joint)
-        # The renderer of the view is in the middle of averaging its own picture.
+        # The view's renderer may still be averaging its own image.
         renderer = self._renderer = self._renderer or Renderer(self.context)
         renderer.draw(state.scene, camera, options, target, state.box, selected)
         target.resolve()
@@ -83,7 +83,7 @@ class Preview:
 
 
 def preview_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Return the size of the preview of a picture, pixels.
+    """Return the size of the preview of an image, pixels.
 
     >>> preview_size((1920, 1080)), preview_size((1000, 2000)), preview_size((16, 4000))
     ((320, 180), (100, 200), (1, 200))

@@ -66,7 +66,7 @@ def draw_record_dialog(state: AppState) -> None:
         return
     shown, stays = begin_window(_TITLE, _WINDOW)
     if shown:
-        # The buttons stay in reach where the settings need a scroll bar.
+        # The buttons stay visible even if the settings need a scroll bar.
         if imgui.begin_child("##settings", (0.0, -1.2 * imgui.get_frame_height_with_spacing())):
             _draw_preview(state, settings)
             _draw_file(state, settings)
@@ -86,7 +86,7 @@ def draw_record_dialog(state: AppState) -> None:
 
 
 def _draw_preview(state: AppState, settings: RecordSettings) -> None:
-    """Draw the present view as a frame of the recording, in the middle."""
+    """Draw the current view as a frame of the recording, centred."""
     texture = state.of(Recording).preview
     width, height = preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
     scale = imgui.get_font_size() / 15.0
@@ -102,7 +102,7 @@ def _draw_preview(state: AppState, settings: RecordSettings) -> None:
 
 
 def _draw_file(state: AppState, settings: RecordSettings) -> None:
-    """Draw the choice of the format, and of what belongs to it."""
+    """Draw the choice of the format, and the settings of that format."""
     settings.kind = choice(state, "Kind", settings.kind, KINDS)
     if settings.kind in (".mp4", ".webm"):
         settings.quality = count_slider(

@@ -19,7 +19,7 @@ def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -
     Parameters
     ----------
     state : AppState
-        With the options of the view, which are copied.
+        The state, with the options of the view, which are copied.
     settings : RecordSettings
         Settings of the recording.
     n_frames : int
@@ -39,7 +39,7 @@ def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -
 
 
 def recorded_follow(state: AppState, settings: RecordSettings) -> Follow | None:
-    """Return what the camera of a recording follows; None if it stands still."""
+    """Return the actor or joint that a recording's camera follows; None if it does not move."""
     following = state.of(Following)
     if not settings.follows or following.target is None or following.place is None:
         return None

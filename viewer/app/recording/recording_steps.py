@@ -93,7 +93,7 @@ def recording_steps(
 def _recording(
     state: AppState, settings: RecordSettings, times: Floats, size: tuple[int, int]
 ) -> Recording:
-    """Return the description of a recording of the view, without tools and panels."""
+    """Return the parameters of a recording of the view, without tools and panels."""
     return Recording(
         replace(state.scene, actors=[replace(actor) for actor in state.scene.actors]),
         times,

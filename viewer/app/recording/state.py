@@ -43,7 +43,7 @@ class RecordSettings:
     quality : int
         Quality of the compression of videos, 0 to 100.
     look : str
-        Quality of the pictures, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
+        Quality of the images, a key of ``viewer.rendering.options.QUALITIES``; empty for that of
         the view, or normal if the view is final and there are several frames.
     samples : int
         Samples per pixel; 0 for those of the view.
@@ -71,7 +71,7 @@ class RecordSettings:
 
     @property
     def is_transparent(self) -> bool:
-        """Whether the background is transparent, as far as the kind of file can hold it."""
+        """Whether the background is transparent and the file format supports transparency."""
         return self.background == "transparent" and self.kind != ".mp4"
 
     def pixels(self, view: tuple[float, float]) -> tuple[int, int]:
@@ -97,7 +97,7 @@ class Recording:
     wanted : Path or None
         Target file of a recording that starts after the frame.
     preview : int
-        Number of the preview's texture; 0 if there is none.
+        ID of the preview's texture; 0 if there is none.
     """
 
     settings: RecordSettings | None = None

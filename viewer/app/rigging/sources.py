@@ -43,7 +43,7 @@ def targets(state: AppState) -> list[Actor]:
 
 
 def templates(state: AppState) -> list[Actor]:
-    """Return the actors of the scene that have a rig of their own."""
+    """Return the actors of the scene that are already rigged."""
     made = {id(result.actor) for result in state.of(Rigging).results.values()}
     return [a for a in state.scene.actors if a.figure.is_attached and id(a) not in made]
 

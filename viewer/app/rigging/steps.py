@@ -83,7 +83,7 @@ def align_template(
 
 
 def with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
-    """Return a result whose report has the method of its alignment, which the transfer was given.
+    """Return a result whose report names the alignment method, if the alignment was given.
 
     Parameters
     ----------

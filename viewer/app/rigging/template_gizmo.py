@@ -1,4 +1,4 @@
-"""Gizmo that moves the template over the target: that of ImGuizmo, and our own ring for scaling.
+"""Gizmo that moves the template over the target: that of ImGuizmo, with a custom ring for scaling.
 
 ImGuizmo rotates and translates a matrix in float32, so its results are projected back to
 similarities. Its scale handles cannot be grabbed from a distance, so a plain ring replaces them.
@@ -36,7 +36,7 @@ _OPERATIONS = {"move": _G.OPERATION.translate, "rotate": _G.OPERATION.rotate}
 _SIZE = 0.22  # size of the gizmo, in clip space
 _FAR = 50.0  # distance of the eye that replaces a parallel projection, in half heights of the view
 _REACH = 8.0  # window coordinates around the ring within which it is grabbed
-_LEAST = 0.02  # smallest factor: a pointer at the centre must not make the template vanish
+_LEAST = 0.02  # minimum factor: a pointer at the centre must not make the template vanish
 _INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 
 
@@ -95,7 +95,7 @@ def _camera_matrices(state: AppState, middle: Floats) -> tuple[Floats, Floats]:
 
     ImGuizmo computes wrong rays for parallel projections. They are replaced by a perspective from
     far away, which projects points at the depth of the gizmo's centre to the same positions, and
-    points near it almost so.
+    points near it to almost the same ones.
     """
     camera = state.camera
     view = camera.view_matrix()

@@ -1,6 +1,6 @@
 """Axis gizmo in the lower right corner of the view: a click looks along an axis, a drag orbits.
 
-It is drawn behind the panels over the picture of the scene, and so is part of no saved picture.
+It is drawn behind the panels over the scene's image, and does not appear in saved images.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ __all__ = ["AxisGizmo", "draw_axis_gizmo", "holds_gizmo", "is_over_gizmo"]
 
 _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
-_RADIUS, _ARM, _END = 40.0, 31.0, 8.5  # of the disc, of the arms and of their ends, points
-_GAP, _ABOVE = 8.0, 28.0  # from the edges of the view; below it are the hints
+_RADIUS, _ARM, _END = 40.0, 31.0, 8.5  # radii of the disc, of the arms and of their ends, points
+_GAP, _ABOVE = 8.0, 28.0  # distance from the edges of the view; the hints are below it
 _NARROWEST, _LOWEST = 240.0, 200.0  # points: smaller views have no room for it
 _DEGREES_PER_POINT = 0.9
 _LEFT = imgui.MouseButton_.left
@@ -37,7 +37,7 @@ class AxisGizmo:
     is_shown : bool
         Whether it is drawn.
     is_held : bool
-        Whether it was pressed, and the button is still down.
+        Whether a press began on it and the button is still down.
     """
 
     is_shown: bool = True
@@ -45,7 +45,7 @@ class AxisGizmo:
 
 
 class _End(NamedTuple):
-    """End of an arm: its axis, sign, place in the window, and depth towards the eye."""
+    """End of an arm: its axis, sign, window position, and depth towards the eye."""
 
     axis: int
     sign: int
@@ -63,7 +63,7 @@ def holds_gizmo(state: AppState) -> bool:
     if io.want_capture_mouse or not is_over_gizmo(state):
         return False
     gizmo.is_held = imgui.is_mouse_clicked(_LEFT)
-    # The wheel zooms here as anywhere else.
+    # The wheel zooms here too.
     return not io.mouse_wheel
 
 
@@ -85,7 +85,7 @@ def _go_on(state: AppState, gizmo: AxisGizmo) -> None:
 
 
 def draw_axis_gizmo(state: AppState) -> None:
-    """Draw the axes as the camera sees them, those that point to the eye last."""
+    """Draw the axes as seen by the camera, those that point towards the eye last."""
     center = _center(state)
     if center is None:
         return
@@ -108,7 +108,7 @@ def draw_axis_gizmo(state: AppState) -> None:
 def _draw_end(end: _End, center: tuple[float, float], unit: float, is_hot: bool) -> None:
     """Draw an arm of a positive axis with its letter, or a ring for a negative one."""
     pen = imgui.get_background_draw_list()
-    # What points away from the eye is darker.
+    # Arms that point away from the eye are darker.
     light = 0.72 + 0.28 * (0.5 + 0.5 * end.depth)
     r, g, b = (channel * light for channel in _COLORS[end.axis])
     place, radius = (end.x, end.y), _END * unit
@@ -138,7 +138,7 @@ def _unit() -> float:
 
 
 def _center(state: AppState) -> tuple[float, float] | None:
-    """Return the middle of the gizmo, None where it is not shown."""
+    """Return the centre of the gizmo, None if it is not shown."""
     x, y, width, height = state.view_rect
     unit = _unit()
     is_small = width < _NARROWEST * unit or height < _LOWEST * unit
@@ -148,7 +148,7 @@ def _center(state: AppState) -> tuple[float, float] | None:
 
 
 def _is_free(state: AppState) -> bool:
-    """Return whether the pointer is over the view and holds nothing else."""
+    """Return whether the pointer is over the view and not dragging anything else."""
     is_down = any(imgui.get_io().mouse_down[button] for button in range(3))
     is_held = state.of(AxisGizmo).is_held
     return is_held or not (is_down or imgui.get_io().want_capture_mouse)
@@ -178,14 +178,14 @@ def _ends(state: AppState) -> list[_End]:
 
 
 def _end_at(state: AppState, place: tuple[float, float]) -> _End | None:
-    """Return the end of an axis at a place of the window, the nearest to the eye of several."""
+    """Return the end of an axis at a window position; of several, the one nearest to the eye."""
     reach = (_END + 2.0) * _unit()
     near = [e for e in _ends(state) if np.hypot(e.x - place[0], e.y - place[1]) <= reach]
     return max(near, key=lambda end: end.depth, default=None)
 
 
 def _view_at(state: AppState, place: tuple[float, float]) -> str:
-    """Return the view that a click at a place of the window chooses; empty for none."""
+    """Return the view that a click at a window position selects; empty for none."""
     end = _end_at(state, place)
     return "" if end is None else _named(state, end)
 

@@ -27,7 +27,7 @@ __all__ = [
     "toggle_projection",
 ]
 
-_AROUND = 0.12  # of the actor's size: surroundings shown of a joint
+_AROUND = 0.12  # extent shown around a joint, relative to the actor's size
 
 
 def fit_view(state: AppState) -> None:

@@ -67,7 +67,7 @@ def _place(state: AppState) -> tuple[float, ...]:
 
 
 def _draw_views(state: AppState) -> None:
-    """Draw the list of calibrated cameras, if a capture has some."""
+    """Draw the list of calibrated cameras if there are any."""
     views, fixed = state.scene.views, state.camera.fixed
     if not views:
         return

@@ -42,7 +42,7 @@ def toggle_option(state: AppState, name: str, text: str) -> None:
 
 
 def show_bones(state: AppState, style: str) -> None:
-    """Choose the style of skeletons, a key of ``BONES``, and say so."""
+    """Choose the style of skeletons, a key of ``BONES``, and show a status message."""
     state.options.bones = style
     state.say_status(f"Bones: {BONES[style].lower()}")
 

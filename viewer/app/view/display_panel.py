@@ -87,7 +87,7 @@ _CLAMP = imgui.SliderFlags_.always_clamp
 
 
 def _draw_surface(state: AppState) -> None:
-    """Draw what the chosen shading asks for: a matcap, or the surface of plain materials."""
+    """Draw the settings of the chosen shading: a matcap, or the surface of plain materials."""
     options = state.options
     if options.shading == "matcap":
         options.matcap = choice(state, "Matcap", options.matcap, MATCAPS)
@@ -99,7 +99,7 @@ def _draw_surface(state: AppState) -> None:
 
 
 def _draw_bones(state: AppState, why: str) -> None:
-    """Draw the style of skeletons beside the button that shows them."""
+    """Draw the style of skeletons next to the button that shows them."""
     imgui.same_line(imgui.get_content_region_avail().x * 0.5)
     with disabled(why):
         imgui.set_next_item_width(-1.0)
@@ -110,7 +110,7 @@ def _draw_bones(state: AppState, why: str) -> None:
 
 
 def _draw_opacity(state: AppState) -> None:
-    """Draw the opacity of the skeleton, which has a default for each style until it is moved."""
+    """Draw the opacity of the skeleton, which is the style's default until the slider is moved."""
     options, skeleton = state.options, state.actor.figure.skeleton
     usual = OPACITIES["boxes"] if skeleton is None else skeleton_opacity(skeleton, options)
     shown = usual if options.skeleton_opacity is None else options.skeleton_opacity

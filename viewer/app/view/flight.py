@@ -26,7 +26,7 @@ class _Place:
     inclination: float
 
     def key(self) -> tuple[object, ...]:
-        """Return a key that identifies the place."""
+        """Return a key that identifies the position."""
         return self.target.tobytes(), self.distance, self.azimuth, self.inclination
 
 
@@ -37,11 +37,11 @@ class Flight:
     Attributes
     ----------
     ends : (_Place, _Place) or None
-        Places at its start and end; None if the camera stands still.
+        Camera positions at its start and end; None if the camera is at rest.
     seconds : float
         Time since its start.
     placed : _Place or None
-        Place at which it put the camera last.
+        Position at which it last put the camera.
     """
 
     ends: tuple[_Place, _Place] | None = None
@@ -50,19 +50,19 @@ class Flight:
 
     @property
     def is_active(self) -> bool:
-        """Whether the camera is on its way."""
+        """Whether the camera is moving."""
         return self.ends is not None
 
 
 def fly_from(state: AppState, before: Camera) -> None:
-    """Let the camera move from an earlier place to where it is now.
+    """Animate the camera from an earlier position to its current one.
 
     Parameters
     ----------
     state : AppState
-        Its camera is at the end of the animation already.
+        The state; its camera is already at the end of the animation.
     before : Camera
-        A copy of it at the start.
+        A copy of the camera at the start.
     """
     flight, start, end = state.of(Flight), _place(before), _place(state.camera)
     if start.key() == end.key():
@@ -73,7 +73,7 @@ def fly_from(state: AppState, before: Camera) -> None:
 
 
 def advance_flight(state: AppState, seconds: float) -> None:
-    """Move the camera on; whatever else has moved it since the last frame ends the animation."""
+    """Advance the camera; the animation ends if anything else has moved it since the last frame."""
     flight = state.of(Flight)
     if flight.ends is None or flight.placed is None:
         return
@@ -89,7 +89,7 @@ def advance_flight(state: AppState, seconds: float) -> None:
         flight.ends = None
         _put(state, flight, end)
         if state.framing.is_fitting:
-            fit_again(state)  # the view or the scene may have changed on the way
+            fit_again(state)  # the view or the scene may have changed meanwhile
     else:
         _put(state, flight, _between(start, end, share * share * (3.0 - 2.0 * share)))
 
@@ -99,7 +99,7 @@ def _place(camera: Camera) -> _Place:
 
 
 def _put(state: AppState, flight: Flight, place: _Place) -> None:
-    """Place the camera; for the framing it has not been moved by hand."""
+    """Place the camera; the framing does not treat this as a move by the user."""
     camera = state.camera
     camera.target, camera.distance = place.target.copy(), place.distance
     camera.azimuth, camera.inclination = place.azimuth, place.inclination
@@ -109,7 +109,7 @@ def _put(state: AppState, flight: Flight, place: _Place) -> None:
 
 
 def _between(start: _Place, end: _Place, share: float) -> _Place:
-    """Return a place on the way; azimuths go the shorter way around."""
+    """Return an interpolated position; azimuths take the shorter way around."""
     angle = (end.azimuth - start.azimuth + 180.0) % 360.0 - 180.0
     azimuth = (start.azimuth + share * angle + 180.0) % 360.0 - 180.0
     ratio = np.log(end.distance / start.distance)

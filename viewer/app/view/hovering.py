@@ -19,14 +19,14 @@ from viewer.rig.skeleton import joint_label
 
 __all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
 
-_REST = 0.06  # seconds for which the mouse must rest before actors are looked for
-_MOST = 16  # actors among which one is looked for: crowds take long to search in software
+_REST = 0.06  # seconds for which the mouse must rest before actors are picked
+_MOST = 16  # maximum number of actors for this: picking in crowds is slow in software
 _AWAY = 14.0  # points between the pointer and the name
 
 
 @dataclass(slots=True)
 class Hovered:
-    """What lies under the pointer.
+    """The item under the pointer.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class Hovered:
     place : (float, float)
         Position of the pointer, window coordinates.
     since : float
-        Time at which it came to rest, seconds of ImGui's clock.
+        Time at which the pointer came to rest, seconds of ImGui's clock.
     is_waiting : bool
-        Whether it rests, but not long enough yet.
+        Whether the pointer is at rest, but not yet for long enough.
     """
 
     joint: int = -1
@@ -59,12 +59,12 @@ def hover_joint(state: AppState) -> None:
 
 
 def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scale: float) -> None:
-    """Find the actor under a pointer that rests, where there are several but no crowd.
+    """Find the actor under a resting pointer if there are several actors, but not a crowd.
 
     Parameters
     ----------
     state : AppState
-        The state; its ``Hovered`` gets the actor.
+        The state; its ``Hovered`` receives the actor.
     renderer : Renderer
         The renderer that drew the scene.
     size : (int, int)
@@ -93,7 +93,7 @@ def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scal
 
 
 def joint_near(state: AppState, place: tuple[float, float]) -> int:
-    """Return the chosen actor's joint near a place of the window if joints are visible; else -1."""
+    """Return the chosen actor's joint near a window position if joints are visible; else -1."""
     posing, actor = state.of(Posing), state.actor
     if actor.figure.skeleton is None or actor.pose is None or not actor.is_drawn:
         return -1
@@ -104,7 +104,7 @@ def joint_near(state: AppState, place: tuple[float, float]) -> int:
 
 
 def draw_hovered_name(state: AppState) -> None:
-    """Draw the name of the joint or actor under the pointer; tools draw names of their own."""
+    """Draw the name of the joint or actor under the pointer; tools draw their own names."""
     hovered, skeleton = state.of(Hovered), state.actor.figure.skeleton
     if state.of(Posing).is_on or state.of(Weights).hover.lines:
         return
@@ -125,7 +125,7 @@ def draw_hovered_name(state: AppState) -> None:
 
 
 def _is_free(state: AppState) -> bool:
-    """Return whether the pointer is over the view and holds nothing."""
+    """Return whether the pointer is over the view and not dragging anything."""
     io, (x, y, width, height) = imgui.get_io(), state.view_rect
     is_held = any(io.mouse_down[button] for button in range(3))
     is_inside = x <= io.mouse_pos.x < x + width and y <= io.mouse_pos.y < y + height

@@ -1,7 +1,7 @@
-"""Picture of the outlines over the view, apart from that of the scene.
+"""Image of the outlines over the view, separate from that of the scene.
 
-What is under the pointer changes often; the picture of the scene, which may be the average of many
-passes, stays.
+The item under the pointer changes often; the image of the scene, which may be the average of many
+passes, is kept.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["OutlineLayer"]
 
 
 class OutlineLayer:
-    """Draws outlines when they or the picture change.
+    """Draws outlines when they or the image of the scene change.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ class OutlineLayer:
         Parameters
         ----------
         state : AppState
-            The state, with what is selected and hovered.
+            The state, with the selected and hovered parts.
         renderer : Renderer
             The renderer that drew the scene.
         size : (int, int)
             Width and height of the view, pixels.
         picture : object
-            Key of the drawn picture.
+            Key of the image of the scene.
         """
         outlined = outlined_parts(state)
         if not outlined:
@@ -66,7 +66,7 @@ class OutlineLayer:
         return self._target.resolve()
 
     def release(self) -> None:
-        """Free the picture."""
+        """Free the image."""
         if self._target is not None:
             self._target.release()
         self._target, self._key = None, ()

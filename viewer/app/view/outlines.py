@@ -1,4 +1,4 @@
-"""Outlines of what is selected in the window, and of what lies under the pointer."""
+"""Outlines of the parts that are selected in the window or lie under the pointer."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def outlined_parts(state: AppState) -> tuple[Outlined, ...]:
     """Return the outlines of the current frame.
 
     The selected joint is outlined where the skeleton is drawn; without one, the actor that the user
-    chose among several. The pinned vertex, and what the pointer is over, are outlined too.
+    chose among several. The pinned vertex and the item under the pointer are outlined too.
     """
     if not state.of(Outlines).is_shown:
         return ()

@@ -90,7 +90,7 @@ def _take_click(
     if not aims and (pick is None or pick.joint < 0):
         x, y, width, _ = state.view_rect
         near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
-        if near >= 0:  # missed it by a little
+        if near >= 0:  # a near miss
             select_joint(state, near)
             return
     if pick is None:
@@ -106,14 +106,14 @@ def _take_click(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """What lies at a pixel.
+    """The item at a pixel.
 
     Attributes
     ----------
     actor : int
         Index of an actor.
     joint : int
-        Joint that is drawn there, or near it, or else that moves the surface most; -1 for none.
+        Joint drawn at or near the pixel, else the one that moves the surface most; -1 for none.
     vertex : int
         Nearest vertex of the surface; -1 for none.
     """
@@ -126,7 +126,7 @@ class Spot:
 def spot_at(
     state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
 ) -> Spot | None:
-    """Return what lies at a pixel, None for the background; parameters are those of ``vertex_at``.
+    """Return the item at a pixel, None for the background; parameters are those of ``vertex_at``.
 
     Raises
     ------
@@ -153,7 +153,7 @@ class _Mover(NamedTuple):
 
 
 def _mover(state: AppState, pick: Pick) -> _Mover | None:
-    """Return the joint with the largest weight where a skin was hit; None for anything else."""
+    """Return the joint with the largest weight where a skin was hit; None if no skin was hit."""
     if pick.joint >= 0 or pick.triangle < 0:
         return None
     actor, vertex, triangle = _vertex_of(state, pick)
@@ -191,7 +191,7 @@ def take_pick(state: AppState, found: Pick, aims: bool) -> None:
 def vertex_at(
     state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
 ) -> tuple[int, int, int] | None:
-    """Return the vertex of the surface that is seen at a pixel.
+    """Return the vertex of the surface visible at a pixel.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def _look_under_mouse(
 
 
 def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
-    """Return a line with the joint that a click would select here; none if it would not."""
+    """Return a line with the joint that a click would select; no lines if it would select none."""
     mouse = imgui.get_io().mouse_pos
     if wants_vertex(state.of(Weights)) or pick is None:
         return ()

@@ -89,7 +89,7 @@ def draw_views(state: AppState) -> None:
 
 
 def _draw_cameras(state: AppState) -> None:
-    """Draw the submenu of calibrated cameras, if a capture has some."""
+    """Draw the submenu of calibrated cameras if there are any."""
     views = state.scene.views
     if not views or not begin_menu(state, "Calibrated camera"):
         return

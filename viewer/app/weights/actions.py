@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 _FIRST = ("weight", "field", "class", "parts")
-"""Quantities to show at first, by preference."""
+"""Quantities to show initially, in order of preference."""
 
 
 def no_view(state: AppState, key: str) -> str:
@@ -59,7 +59,7 @@ def start_heat_map(state: AppState) -> None:
     """Show a scalar quantity as colours, replacing a choice for which nothing would be visible.
 
     A quantity that no figure has is replaced by an available one; a joint without influence, or
-    none, by the joint with the most; a field that is 0 everywhere by the first that is not.
+    none, by the joint with the most; a field that is 0 everywhere by the first one that is not.
     """
     options = state.options
     options.shading = "scalar"

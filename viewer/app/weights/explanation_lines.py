@@ -26,7 +26,7 @@ __all__ = ["draw_hovered", "influence_colors", "pinned_annotations", "vertex_ann
 
 # Pixels in an image of standard height.
 _THINNEST, _THICKEST = 1.0, 5.0  # lines of the smallest and largest weight
-_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot, dark borders of dots and of lines
+_DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot; dark borders of dots and lines
 _FAINTEST = 0.35
 _LONGEST = 24  # characters of a name
 _DARK, _LIGHT = (0.05, 0.06, 0.08, 0.8), (1.0, 1.0, 1.0, 1.0)

@@ -78,7 +78,7 @@ def _draw_bar(legend: Legend, width: float) -> None:
 
 
 def _draw_entries(legend: Legend, width: float, height: float) -> None:
-    """Draw a colour and a name for as many entries as there is room for, in columns."""
+    """Draw colours and names of as many entries as fit, in columns."""
     if not legend.entries:
         return
     side, line = imgui.get_text_line_height(), imgui.get_text_line_height_with_spacing()

@@ -30,7 +30,7 @@ _LONGEST = 40  # characters of a name
 _NUMBER, _LABEL = 3.8, 4.7  # widths of columns, in font sizes
 _DIGIT = 0.56  # width of a digit, in font sizes
 _SMALLEST, _FEWEST = 0.75, 3  # smallest font scale and number of decimals, for a narrow panel
-_PADDING = 2.0  # points beside each number
+_PADDING = 2.0  # points next to each number
 _SPARE = 6.0  # points: font sizes are rounded to whole pixels
 
 
@@ -98,7 +98,7 @@ def fitting(room: float, font_size: float) -> tuple[float, int]:
 
 @dataclass(frozen=True, slots=True)
 class _Sheet:
-    """State of the window, and the number of decimals of all numbers."""
+    """State of the window, and the number of decimals to show."""
 
     state: AppState
     digits: int

@@ -9,7 +9,7 @@ from viewer.diagnostics import Phrase
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
 
-# Ranks of clips for an actor: matching name, the actor's own, any other.
+# Ranks of clips for an actor: same name, the actor's own clip, any other clip.
 _N_RANKS = 3
 
 
@@ -84,7 +84,7 @@ def _kind(actor: Actor) -> tuple[bool, bool, bool]:
 
 
 def _lone(actors: Sequence[Actor], clips: Sequence[Clip]) -> tuple[Phrase, ...]:
-    """Return unpaired clips, and actors, with their kind unless they have mesh and skeleton."""
+    """Return labels of unpaired clips and actors, by kind unless they have mesh and skeleton."""
     kinds = {
         (True, False, False): "lone-skeleton",
         (False, True, False): "lone-mesh",

@@ -27,9 +27,9 @@ class Compared:
     mismatches : tuple of Diagnostic
         Actors on one side only, with the side.
     error : str
-        Reason why it could not be opened; empty if it could.
+        Reason why the input could not be opened; empty if it was.
     diagnostics : tuple of Diagnostic
-        Warnings of its readers.
+        Warnings of the file readers.
     """
 
     name: str

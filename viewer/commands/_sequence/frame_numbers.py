@@ -112,7 +112,7 @@ class Numbering:
 def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numbering:
     """Return the frame numbering of some actors' motions.
 
-    The longest capture decides: at its own rate, frames have the numbers of its files. At
+    The longest capture defines it: at its own rate, frames have the numbers in its files. At
     another rate, or if there are only keyframed clips, frames count from 0.
 
     ``actors``: with or without motions.

@@ -37,7 +37,7 @@ class Request:
     Attributes
     ----------
     kind : "pictures", "video", "sheet" or "onion"
-        One file per frame, one video file, one image of all frames in cells, or in one place.
+        One file per frame, one video file, or one image of all frames: in cells or superimposed.
     output : Path
         As given; includes ``{frame}`` for images.
     range : Range or None

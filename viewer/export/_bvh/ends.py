@@ -17,7 +17,7 @@ _DEFAULT_END = 1.0  # the same, if the unit is unknown
 
 
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
-    """Return the offsets of end sites at rest, none of which is 0.
+    """Return the offsets of end sites at rest; none is zero.
 
     ``figure``: with its shape applied.
     ``rest`` (J, 4, 4): joint space to figure space in the rest pose.

@@ -19,7 +19,7 @@ VERTICES, INDICES = 34962, 34963  # targets of buffer views
 
 _TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_PADDING = 4  # arrays are aligned to the size of the largest component
+_PADDING = 4  # alignment of arrays: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
 _HEADER = 28  # bytes of a .glb besides JSON and arrays
 

@@ -18,19 +18,19 @@ __all__ = ["Color", "Materials", "material_losses"]
 
 Color = tuple[float, float, float]
 
-_PLAIN = (0.62, 0.60, 0.57)  # linear; what the viewer draws without a texture
+_PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour of untextured surfaces
 _MATTE = {"metallicFactor": 0.0, "roughnessFactor": 0.8}  # glTF surfaces are metallic by default
 _WRAPS = {"clamp": 33071, "repeat": 10497, "mirror": 33648}
 _SMOOTH, _SHARP = (9729, 9987), (9728, 9986)  # magnified, minified with mipmaps
-_SHEAR = 1e-6  # of a texture's placement, which rotation and scale cannot express
+_SHEAR = 1e-6  # shear of a texture transform, which rotation and scale cannot express
 
 
 class Materials:
     """Writer of the materials of one mesh.
 
-    ``document``: changed.
-    ``mesh``: its materials.
-    ``color`` (r, g, b): linear, of surfaces without a colour of their own.
+    ``document``: modified in place.
+    ``mesh``: mesh with the materials.
+    ``color`` (r, g, b): linear, for surfaces without their own colour.
     """
 
     def __init__(self, document: Document, mesh: Mesh, color: Color | None) -> None:
@@ -40,7 +40,7 @@ class Materials:
         self._samplers: dict[tuple[Any, ...], int] = {}
 
     def plain(self, name: str = "plain") -> int:
-        """Add a material without a picture; return its index."""
+        """Add a material without textures; return its index."""
         return self._add(name, {"baseColorFactor": [*(self._color or _PLAIN), 1.0], **_MATTE})
 
     def add(self, index: int) -> int:
@@ -73,7 +73,7 @@ class Materials:
         return self._add(name, surface, self._rest(material, shown, name))
 
     def _rest(self, material: Material, shown: dict[str, Texture], name: str) -> dict[str, Any]:
-        """Return normals, occlusion, emission, opacity and sides."""
+        """Return the remaining properties: normals, occlusion, emission, opacity and sides."""
         rest: dict[str, Any] = {"doubleSided": material.double_sided}
         extensions: dict[str, Any] = {}
         if "normal_texture" in shown:
@@ -101,13 +101,13 @@ class Materials:
         return rest
 
     def _add(self, name: str, surface: dict[str, Any], rest: dict[str, Any] | None = None) -> int:
-        # Without a statement files may wind triangles either way.
+        # Unless the file states it, triangles may be wound either way.
         rest = {"doubleSided": True} if rest is None else rest
         item = {"name": text_of(name), "pbrMetallicRoughness": surface, **rest}
         return self._document.add("materials", item)
 
     def _reference(self, texture: Texture, name: str) -> dict[str, Any]:
-        """Return a texture's index with its placement; each picture is written once."""
+        """Return a texture's index with its transform; each image is written once."""
         assert texture.image is not None  # the caller looked
         image = texture.image
         key = id(image), image.size
@@ -162,16 +162,16 @@ def _same_place(one: Texture, other: Texture) -> bool:
 
 
 def _placement(matrix: Floats) -> tuple[dict[str, Any], float]:
-    """Return offset, rotation and scale of KHR_texture_transform, and the shear left out.
+    """Return offset, rotation and scale of KHR_texture_transform, and the omitted shear.
 
-    glTF counts v from the first row of the picture, and so do the matrices of the extension:
+    glTF counts v from the first image row, and so do the matrices of the extension:
     T(offset) R(-rotation) S(scale).
     """
     (a, b, u), (c, d, v) = matrix.tolist()
     scale_u = math.hypot(a, c)
     angle = math.atan2(c, a)
     cos, sin = math.cos(angle), math.sin(angle)
-    # The second column is (-b, d); what is along the first one is shear.
+    # The second column is (-b, d); its component along the first column is shear.
     scale_v = d * cos - b * sin
     shear = abs(b * cos + d * sin)
     placed = {"offset": [u + b, 1.0 - d - v], "rotation": angle, "scale": [scale_u, scale_v]}

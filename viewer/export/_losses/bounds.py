@@ -138,7 +138,7 @@ def _lengths(directions: Floats | None) -> Floats:
 
 
 def _norms(weights: Floats) -> Floats:
-    """Return the norm of the nine numbers of each joint: (F, J)."""
+    """Return the norm of the nine corrective weights of each joint: (F, J)."""
     return np.asarray(np.linalg.norm(weights.reshape(len(weights), -1, _NUMBERS), axis=2))
 
 

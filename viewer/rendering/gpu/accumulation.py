@@ -49,7 +49,7 @@ class Accumulation:
         self.count = 0
 
     def add(self, target: Target) -> None:
-        """Add what a target shows."""
+        """Add the image of a target."""
         texture = target.resolve()
         self._framebuffer.use()
         self.context.viewport = (0, 0, *self.size)
@@ -59,7 +59,7 @@ class Accumulation:
         self.count += 1
 
     def show(self, target: Target) -> None:
-        """Replace what a target shows by the average; its depths stay."""
+        """Replace the image of a target by the average; its depths are kept."""
         target.framebuffer.use()
         self.context.viewport = (0, 0, *self.size)
         self.context.enable_only(moderngl.NOTHING)

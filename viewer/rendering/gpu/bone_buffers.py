@@ -21,10 +21,10 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["BoneBuffers"]
 
 _BALL = -2  # in place of a child
-_MANY = 1000  # joints above which balls, which may all lie in one place, are left out
+_MANY = 1000  # number of joints above which balls, which may all coincide, are omitted
 _GREY = (0.30, 0.32, 0.35)  # linear
 
-# Half widths: in lengths, then the smallest and largest in sizes of the figure.
+# Half-widths: relative to the length, then minimum and maximum relative to the figure's size.
 _OCTAHEDRON = (0.13, 0.0028, 0.022)
 _STICK = (0.035, 0.0022, 0.0065)
 _THIN_STICK = (0.012, 0.0009, 0.0016)
@@ -86,7 +86,7 @@ class BoneBuffers:
     context : moderngl.Context
         The context in use.
     skeleton : Skeleton
-        In its rest shape, which sets directions and sizes of ends without a child.
+        In its rest pose, which determines directions and sizes of ends without a child.
     style : str
         ``"octahedra"``, ``"sticks"`` or ``"axes"``.
     """
@@ -158,7 +158,7 @@ def _widths(links: BoneLinks, count: int, sizes: tuple[float, float, float]) -> 
 def _ball_parts(
     links: BoneLinks, n_joints: int, sizes: tuple[float, float, float], factor: float
 ) -> list[tuple[Floats, _Rows]]:
-    """Return balls at the joints, a little wider or thinner than the widest bone beside each."""
+    """Return balls at the joints, slightly wider or thinner than the widest bone at each."""
     if n_joints > _MANY:
         return []
     share, low, high = sizes

@@ -1,4 +1,4 @@
-"""Links between joints as a skeleton is drawn: bones to children, and short ends without one."""
+"""Links of a drawn skeleton: bones from joints to their children, and short ends at leaf joints."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["BoneLinks", "bone_links"]
 
-_END = 0.4  # length of an end, of the bone before it
-_END_LIMITS = 0.01, 0.07  # the same, of the figure's size
-_AXIS = 0.4  # length of axes, of the nearest bone beside the joint
-_AXIS_LIMITS = 0.008, 0.06  # the same, of the figure's size
-_REACH = 12.0  # largest size of a figure in lengths of its long bones: roots may be far away
-_SAME = 1e-6  # of the figure's size: joints that are nearer coincide
+_END = 0.4  # length of an end, relative to the bone before it
+_END_LIMITS = 0.01, 0.07  # minimum and maximum, relative to the figure's size
+_AXIS = 0.4  # length of axes, relative to the shortest bone at the joint
+_AXIS_LIMITS = 0.008, 0.06  # minimum and maximum, relative to the figure's size
+_REACH = 12.0  # maximum size of a figure relative to its long bones: roots may be far away
+_SAME = 1e-6  # relative to the figure's size: joints closer than this coincide
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,9 +32,9 @@ class BoneLinks:
     ids : (N, 3) int32
         Joint; its child, -1 for an end; the joint's axis that lies most across the bone.
     ends : (N, 4)
-        Of an end: its direction in joint space, and its length in figure units; 0 for others.
+        For an end, its direction in joint space and its length in figure units; otherwise 0.
     longest : (J,)
-        Length of the longest bone beside each joint, figure units.
+        Length of the longest bone at each joint, figure units.
     axis_lengths : (J,)
         Length of the axes drawn at each joint, figure units.
     size : float
@@ -58,7 +58,7 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     Parameters
     ----------
     skeleton : Skeleton
-        Its rest pose counts.
+        The skeleton; its rest pose is used.
     """
     worlds = world_matrices(skeleton, rest_pose(skeleton))
     points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
@@ -75,7 +75,7 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     along = np.abs(np.einsum("nka,na->nk", axes[joints], np.concatenate([unit(spans), ways])))
     ids = np.stack([joints, np.append(children, np.full(len(ends), -1)), along.argmin(axis=1)], 1)
     free = np.zeros((len(ids), 4))
-    # Coordinates of the direction along the joint's own, perhaps oblique, axes.
+    # Coordinates of the direction in the joint's own, possibly oblique, axes.
     back = np.linalg.pinv(np.swapaxes(axes[ends], 1, 2))
     free[len(children) :, :3] = np.einsum("nab,nb->na", back, ways)
     free[len(children) :, 3] = reach

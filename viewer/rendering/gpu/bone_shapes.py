@@ -15,10 +15,10 @@ __all__ = ["arrow", "ball", "octahedron", "stick"]
 
 _Point: TypeAlias = tuple[float, float, float]
 
-_WIDEST = 0.12  # where an octahedron is widest, from the joint, in lengths
-_FLATNESS = 0.7  # thickness over width: a quarter turn about the length is visible
+_WIDEST = 0.12  # where an octahedron is widest: fraction of the length from the joint
+_FLATNESS = 0.7  # thickness over width, so that a quarter turn about the length is visible
 _SIDES = 8  # of sticks and arrows
-_TIP = 0.72  # where the tip of an arrow begins, in lengths
+_TIP = 0.72  # where the tip of an arrow begins, as a fraction of the length
 _TIP_WIDTH = 2.4  # in widths of its shaft
 
 
@@ -28,7 +28,7 @@ def octahedron() -> Floats:
     Returns
     -------
     (N, 7)
-        Corners of triangles: x and z in half widths, y in lengths; their normals, which are 0 where
+        Corners of triangles: x and z in half-widths, y in lengths; their normals, which are 0 where
         triangles are flat; the tint, 1 for the ridge, which shows the roll.
     """
     ring = [(1.0, _WIDEST, 0.0), (0.0, _WIDEST, _FLATNESS)]
@@ -63,7 +63,7 @@ def ball() -> Floats:
 
 
 def _split(triangles: Floats) -> Floats:
-    """Return four triangles on the unit sphere for each: (4 N, 3, 3)."""
+    """Split each triangle into four on the unit sphere: (4 N, 3, 3)."""
     a, b, c = (triangles[:, corner] for corner in range(3))
     ab, bc, ca = (unit(one + other) for one, other in ((a, b), (b, c), (c, a)))
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
@@ -73,8 +73,8 @@ def _split(triangles: Floats) -> Floats:
 def _ridge(foot: float, half: float, tip: float, end: float) -> Floats:
     """Return a pyramid on the side of +x, up to a third of the length.
 
-    Parameters are in half widths: where its foot is and how thick, how far out its tip is, and
-    where the surface is at its end.
+    Parameters are in half-widths: position and thickness of its base, distance of its tip from the
+    axis, and distance of the surface where the ridge ends.
     """
     low, high = (foot, _WIDEST, half), (foot, _WIDEST, -half)
     top, last = (tip, 1.3 * _WIDEST, 0.0), (end, 0.35, 0.0)

@@ -38,7 +38,7 @@ def without_colors(context: moderngl.Context) -> Iterator[None]:
 
 @contextmanager
 def without_depth_test(context: moderngl.Context) -> Iterator[None]:
-    """Draw regardless of depth, over what has been drawn."""
+    """Draw regardless of depth, over previous draws."""
     context.disable(moderngl.DEPTH_TEST)
     try:
         yield

@@ -1,6 +1,6 @@
 """Index buffers of the drawn triangles, in an order that keeps neighbours together.
 
-Drivers cache the results of recent vertices, at most a few hundred. Files often list triangles
+GPUs cache the results of recent vertices, at most a few hundred. Files often list triangles
 in an order that misses this cache, so that every vertex is shaded three to five times; in the
 order of a space-filling curve it is shaded once or twice (``tests/bench/bench_instances.py``).
 """

@@ -48,7 +48,7 @@ class MeshBuffers:
     surfaces : list of Surface
         Of each material.
     has_materials : bool
-        Whether these have more than a picture each.
+        Whether any of these has more than a base colour texture.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:

@@ -34,7 +34,7 @@ def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = Fals
     pixels : (H, W, 4) uint8
         Its contents, first row at v = 0.
     is_linear : bool
-        Whether they are numbers, not sRGB.
+        Whether they are linear data, not sRGB colours.
     """
     upload = _upload_function() if is_software(texture.ctx) else None
     if upload is None:
@@ -56,7 +56,7 @@ def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
     pixels : (H, W, 4) uint8
         sRGB unless ``is_linear``; alpha is treated like a colour.
     is_linear : bool
-        Whether the pixels are numbers.
+        Whether the pixels are linear data.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def _tables(is_linear: bool) -> tuple[np.ndarray, Bytes]:
 
 
 def _upload_function() -> Any:
-    """Return glTexImage2D, which moderngl offers for level 0 only; None if it is not found."""
+    """Return glTexImage2D, which moderngl exposes for level 0 only; None if it is not found."""
     if not sys.platform.startswith("linux"):
         return None
     try:

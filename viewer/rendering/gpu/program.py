@@ -97,7 +97,7 @@ class Programs:
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
         materials : bool
-            Surfaces have more than a picture each, see ``include/surface.glsl``.
+            Surfaces have more than a base colour texture, see ``include/surface.glsl``.
         effects : tuple of str
             Macros of the fragment shader, see ``viewer.rendering.effects``.
 

@@ -63,7 +63,7 @@ class ScalarBuffer:
         Parameters
         ----------
         name : str
-            A key of ``SCALARS``, with a joint if the quantity needs one. Missing data count as 0.
+            A key of ``SCALARS``, with a joint if the quantity needs one. Missing values are 0.
         pose : Pose or None
             None for the mesh in its bind pose.
         skinning : Skinning

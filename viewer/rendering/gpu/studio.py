@@ -1,4 +1,4 @@
-"""The studio's light and the matcaps on the GPU; ``assets/make_studio.py`` makes them."""
+"""Studio environment light and matcaps on the GPU; ``assets/make_studio.py`` generates them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from viewer.resources import resource
 __all__ = ["STUDIO_SAMPLERS", "Matcaps", "Studio"]
 
 STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
-"""Texture units beside those of materials and effects; no program has the last two."""
+"""Texture units besides those of materials and effects; no program uses both of the last two."""
 
 _SRGB8 = 0x8C41
 
 
 class Studio:
-    """Blurred light of the studio, and the table of the split sum.
+    """Prefiltered studio environment, and the lookup table of the split-sum approximation.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Studio:
 
 
 class Matcaps:
-    """Pictures of lit spheres, each uploaded on first use.
+    """Matcaps: images of lit spheres, each uploaded on first use.
 
     Parameters
     ----------

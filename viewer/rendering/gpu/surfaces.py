@@ -1,4 +1,4 @@
-"""Materials on the GPU: pictures, each uploaded once, and the uniforms of each material."""
+"""Materials on the GPU: textures, each uploaded once, and the uniforms of each material."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class Surface:
     Attributes
     ----------
     uniforms : dict
-        Of ``include/surface.glsl`` and ``shade/pbr.glsl``.
+        Uniforms of ``include/surface.glsl`` and ``shade/pbr.glsl``.
     untextured : dict
-        Those that differ where textures are off.
+        Uniforms that differ while textures are off.
     textures : tuple of (unit, texture)
         Bound before the triangles are drawn.
     is_physical : bool
-        Whether the material has a metallic and a roughness of its own.
+        Whether the material has its own metallic and roughness values.
     is_blended : bool
         Whether the triangles are drawn after all opaque ones.
     double_sided : bool
@@ -77,7 +77,7 @@ class Surface:
 
 
 def needs_materials(materials: Sequence[Material]) -> bool:
-    """Return whether materials have more than a plainly placed picture each, see ``MATERIALS``."""
+    """Return whether a material has more than a plain base colour texture, see ``MATERIALS``."""
     return any(
         not material.is_plain
         or (material.base_texture is not None and "mirror" in material.base_texture.wrap)
@@ -92,20 +92,20 @@ def upload_surfaces(
     notes: list[str],
     owner: Owner,
 ) -> list[Surface]:
-    """Upload the pictures of materials.
+    """Upload the textures of materials.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     materials : sequence of Material
-        Of one mesh.
+        Materials of one mesh.
     has_uvs : bool
         Whether the mesh has texture coordinates.
     notes : list of str
         Receives messages about limitations of the driver.
     owner : Owner
-        Takes the textures.
+        Takes ownership of the textures.
     """
     made: dict[tuple[object, ...], moderngl.Texture] = {}
     surfaces = []
@@ -135,11 +135,11 @@ def _upload(
 
 
 def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
-    """Return a picture and its mirror image side by side: moderngl repeats, but does not mirror."""
+    """Return an image next to its mirror image: moderngl lacks the mirrored repeat mode."""
     if wrap[0] == "mirror":
         image = np.concatenate([image, image[:, ::-1]], axis=1)
     if wrap[1] == "mirror":
-        # v = 0 is at the last row: there the picture itself begins.
+        # v = 0 is at the last row: there the image itself begins.
         image = np.concatenate([image[::-1], image], axis=0)
     return image
 
@@ -160,7 +160,7 @@ def _surface(material: Material, textures: dict[str, moderngl.Texture]) -> Surfa
 
 
 def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict[str, Any]:
-    """Return all uniforms of a material, as programs keep those of the last one."""
+    """Return all uniforms of a material, since programs keep the values of the previous one."""
     placed = [getattr(material, name) or Texture("") for name in TEXTURES]
     channels = np.eye(4, dtype="f4")[[texture.channel for texture in placed]]
     values: dict[str, Any] = {
@@ -188,7 +188,7 @@ def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict
 
 
 def _place(texture: Texture) -> np.ndarray:
-    """Return a texture's placement as GLSL stores it: columns of a 3 x 3 matrix."""
+    """Return a texture's transform as GLSL stores it: columns of a 3 x 3 matrix."""
     matrix = np.eye(3)
     matrix[:2] = texture.matrix
     for row, side in enumerate(texture.wrap):
@@ -198,4 +198,4 @@ def _place(texture: Texture) -> np.ndarray:
 
 
 PLAIN = Surface()
-"""Of triangles without a material."""
+"""Surface of triangles without a material."""

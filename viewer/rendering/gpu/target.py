@@ -142,7 +142,7 @@ class Target:
         Parameters
         ----------
         buffer : moderngl.Buffer
-            4 bytes per pixel, last row first; ``picture_rows`` converts its contents to a
+            4 bytes per pixel, last row first; ``picture_rows`` converts its contents to an
             image. Reading it waits for the copy.
         """
         self._resolved.read_into(buffer, components=4)

@@ -152,9 +152,9 @@ def empty_offsets(context: moderngl.Context, count: int) -> moderngl.Texture:
 def picture_texture(
     context: moderngl.Context, pixels: Bytes, notes: list[str], is_linear: bool = False
 ) -> moderngl.Texture:
-    """Return a mip-mapped texture, clamped at its edges, v = 0 at the picture's last row.
+    """Return a mip-mapped texture, clamped at its edges, v = 0 at the image's last row.
 
-    Pixels are sRGB unless ``is_linear``. A picture above the driver's limit is reduced by an
+    Pixels are sRGB unless ``is_linear``. An image above the driver's limit is reduced by an
     integer factor, with a message in ``notes``.
     """
     limit = context.info["GL_MAX_TEXTURE_SIZE"]

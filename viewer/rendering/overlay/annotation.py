@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 LABEL_COLOR = (0.97, 0.97, 0.98)
-"""Default colour of labels, sRGB."""
+"""Default label colour, sRGB."""
 
 _LETTERS = 13.0  # height, pixels, in an image of standard height
 _GAP = 7.0  # pixels between a point and its label

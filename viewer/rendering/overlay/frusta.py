@@ -38,7 +38,7 @@ def frustum_depth(box: Floats) -> float:
 def frustum_corners(camera: CameraView, depth: float) -> Floats:
     """Return the corners of a camera's image at a depth: (4, 3), scene space.
 
-    They begin at the upper left and go round clockwise: the corners of the outermost pixels, with
+    Clockwise from the upper left; these are the corners of the outermost pixels, with
     X = R^T (d K^-1 u - T), without lens distortion.
     """
     width, height = picture_size(camera)
@@ -73,7 +73,7 @@ def frusta_annotation(
     box : (2, 3)
         Bounds of the scene, which give the frusta's size.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
     depth, centers = frustum_depth(box), camera_centers(cameras)
     starts: list[Floats] = []

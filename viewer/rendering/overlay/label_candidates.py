@@ -116,7 +116,7 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
 
 
 def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
-    """Return a mask of places that certainly are too near to other points or cover their own: (M,).
+    """Return a mask of places certainly too close to other points or covering their own: (M,).
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ class SegmentPass:
         view : View
             The camera's matrices.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         style : SegmentStyle
             Style of the segments.
         """

@@ -1,4 +1,4 @@
-"""Pass that draws annotations: markers of findings, X-ray joints, vertex callouts."""
+"""Pass that draws annotations: finding markers, X-ray joints, vertex callouts."""
 
 from __future__ import annotations
 

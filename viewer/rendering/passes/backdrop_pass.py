@@ -14,7 +14,7 @@ from viewer.rendering.view import View, set_lights
 
 __all__ = ["BackdropPass"]
 
-_PARALLEL_FOV = 35.0  # degrees: parallel rays would all show one place
+_PARALLEL_FOV = 35.0  # degrees: parallel rays would all show the same point
 
 
 class BackdropPass:
@@ -27,7 +27,7 @@ class BackdropPass:
     programs : Programs
         Provides the shader programs.
     studio : Studio
-        The light to show.
+        The environment to show.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs, studio: Studio) -> None:
@@ -36,7 +36,7 @@ class BackdropPass:
         self._array = context.vertex_array(self._program, [])
 
     def draw(self, view: View, lights: Lights) -> None:
-        """Fill the picture."""
+        """Fill the image."""
         self.studio.use()
         projection = view.projection
         scale = 1.0 / projection[0, 0], 1.0 / projection[1, 1]

@@ -49,7 +49,7 @@ class CameraImagePass:
         image : CameraImage
             Its image.
         size : (int, int)
-            Width and height of the picture, pixels.
+            Width and height of the image, pixels.
         brightness : float
             Factor on the image's colours, 0 to 1.
         """

@@ -20,9 +20,9 @@ from viewer.rig.arrays import Floats
 __all__ = ["Contact", "ContactPass"]
 
 _SIZE = 256  # texels on each side
-_NEAR, _FAR = 0.04, 0.35  # heights at which contact and ambient shadow end, in sizes of a figure
-_BELOW = 0.05  # depth to which feet may sink into the ground, the same
-_NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, the same
+_NEAR, _FAR = 0.04, 0.35  # upper ends of contact and ambient shadow, figure sizes
+_BELOW = 0.05  # depth to which feet may sink into the ground, likewise
+_NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Contact:
     texture : moderngl.Texture
         Red is darkness by contact, green by occluders farther above, 0 to 1.
     low, high : (2,)
-        Its corners on the ground, along the ground's axes.
+        Opposite corners of the field, along the ground's axes.
     """
 
     texture: moderngl.Texture

@@ -22,7 +22,7 @@ _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
 _NAMED = {"gradient": (_BOTTOM, _TOP), "white": ((1.0, 1.0, 1.0),) * 2}
 _LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
-_EXTENT = 6.0  # half the side length of the grid, in figure sizes
+_EXTENT = 6.0  # half the side length of the grid, relative to the scene's size
 
 
 def grid_step(box: Floats) -> float:
@@ -43,7 +43,7 @@ def parse_color(text: str) -> tuple[float, float, float]:
     Raises
     ------
     ViewerError
-        If the text is anything else.
+        If the text is not a colour of this form.
 
     >>> parse_color("#ff0000")
     (1.0, 0.0, 0.0)

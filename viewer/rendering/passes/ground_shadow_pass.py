@@ -18,7 +18,10 @@ __all__ = ["GroundShadowPass"]
 
 _OPACITY = 0.42  # opacity of the key light's shadow
 _CONTACT_OPACITIES = 0.55, 0.38
-_GRAZING = 0.06, 0.22  # sine of the light's height at which its shadow begins, and is full
+_GRAZING = (
+    0.06,
+    0.22,
+)  # sine of the light's elevation: its shadow appears, and is full
 _FIELD_UNIT = 0
 
 
@@ -58,7 +61,7 @@ class GroundShadowPass:
         fade = float(np.clip((slope - _GRAZING[0]) / (_GRAZING[1] - _GRAZING[0]), 0.0, 1.0))
         if fade == 0.0:
             return
-        # Light that passes the corners of the map meets the ground at these depths.
+        # Rays through the corners of the map meet the ground at these depths.
         corners = np.array([[0.0, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]]) @ back.T
         depths = (height - corners[:, :3] @ up) / (up @ away)
         places = corners[:, :3] + depths[:, None] * away

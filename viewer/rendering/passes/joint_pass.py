@@ -136,7 +136,7 @@ class JointPass:
         opacity : float
             Below 1 the skeleton is one translucent layer.
         color : (r, g, b), optional
-            Of all joints, linear; a colour for each joint if omitted.
+            Colour of all joints, linear; one colour per joint if omitted.
         overlays : bool
             Draw a translucent skeleton over everything drawn before: boxes often enclose the skin,
             which would hide them.
@@ -149,7 +149,7 @@ class JointPass:
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_joints, program, skeleton, *how)
         if opacity < 1.0:
-            # Only the nearest parts count: the others would show through them.
+            # Only the nearest parts are drawn: others would show through them.
             draw_nearest(self.context, draw)
         else:
             draw()
@@ -203,7 +203,7 @@ def draw_boxes(
     color: Color | None = None,
     opacity: float = 1.0,
 ) -> None:
-    """Draw boxes that were moved to where they belong."""
+    """Draw boxes whose matrices have been uploaded."""
     _set_up(program, boxes, placement, view, options, -1, opacity, color)
     set_uniforms(program, {"u_only": -1})
     _draw_instances(program, boxes)

@@ -88,7 +88,7 @@ class KeypointPass:
         options : DisplayOptions
             Lights.
         opacity : float
-            Of the markers.
+            Opacity of the markers.
         """
         program = self.joints.programs.drawing("joint", "phong", fragment="mesh")
         draw_boxes(program, points.boxes, placement, in_front(view), options, opacity=opacity)

@@ -155,7 +155,7 @@ class LatePasses:
 
     @cached_property
     def matcaps(self) -> Matcaps:
-        """Pictures of lit spheres."""
+        """Images of lit spheres."""
         from viewer.rendering.gpu.studio import Matcaps
 
         matcaps = Matcaps(self._context)
@@ -172,7 +172,7 @@ class LatePasses:
         return backdrop
 
     def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
-        """Bind what the shading of these meshes needs beside their own textures."""
+        """Bind the textures that the shading of these meshes needs in addition to their own."""
         if options.shading == "matcap":
             self.matcaps.use(options.matcap)
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):
@@ -180,7 +180,7 @@ class LatePasses:
 
     @cached_property
     def outline_pass(self) -> OutlinePass:
-        """Draws outlines of what is selected or hovered."""
+        """Pass for outlines of selected and hovered parts."""
         from viewer.rendering.passes.outline_pass import OutlinePass, OutlineTools
 
         tools = OutlineTools(self._programs, self._mesh_pass, self.point_pass, self._buffers)
@@ -189,7 +189,7 @@ class LatePasses:
         return outlines
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
-        """Return the sum of passes of an image of this size."""
+        """Return the accumulation buffer for images of this size."""
         from viewer.rendering.gpu.accumulation import Accumulation
 
         if self._sum is None or self._sum.size != size:

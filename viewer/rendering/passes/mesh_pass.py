@@ -194,7 +194,7 @@ class MeshPass:
 def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
     """Return the shading of a mesh, a key of ``SHADING``.
 
-    ``"auto"`` follows the materials, and so does ``"scalar"`` where there are no numbers.
+    ``"auto"`` follows the materials, and so does ``"scalar"`` where there are no values.
     """
     if options.shading not in ("auto", "scalar"):
         return options.shading

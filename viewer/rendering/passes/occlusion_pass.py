@@ -16,7 +16,7 @@ from viewer.rendering.view import View
 
 __all__ = ["OcclusionPass"]
 
-_RADIUS = 0.09  # within which surfaces occlude, in sizes of a figure
+_RADIUS = 0.09  # radius within which surfaces occlude, relative to a figure's size
 
 
 class OcclusionPass:
@@ -29,7 +29,7 @@ class OcclusionPass:
     programs : Programs
         Provides the programs.
     size : (int, int)
-        Width and height of the picture, pixels.
+        Width and height of the image, pixels.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class OcclusionPass:
         phase: float,
         strength: float,
     ) -> Occlusion:
-        """Compute the occlusion of a picture.
+        """Compute the occlusion of an image.
 
         Parameters
         ----------
@@ -72,11 +72,11 @@ class OcclusionPass:
         view : View
             The camera's matrices.
         size : float
-            Of a figure, scene units: gives the radius.
+            Size of a figure, scene units: determines the radius.
         phase : float
-            Of the pattern of directions, 0 to 1: another one for each pass of a picture.
+            Phase of the direction pattern, 0 to 1: different for each pass of an image.
         strength : float
-            0 to 1: how much of the occlusion counts.
+            Strength of the occlusion, 0 to 1.
         """
         halved = self._halved(view)
         context = self.context
@@ -93,7 +93,7 @@ class OcclusionPass:
         return Occlusion(self._fields[1], strength)
 
     def _halved(self, view: View) -> View:
-        """Return the view of a picture whose sides are even, half its pixels apart."""
+        """Return the view of the half-resolution image, whose full size is rounded up to even."""
         scale = np.array(self.size) / (2.0 * np.array(self._half))
         matrix = np.diag([*scale, 1.0, 1.0])
         matrix[:2, 3] = scale - 1.0

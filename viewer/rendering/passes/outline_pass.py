@@ -27,11 +27,11 @@ from viewer.rig.scene import Actor, Scene
 __all__ = ["OutlinePass", "OutlineTools"]
 
 _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
-"""Selected and hovered, sRGB."""
-_WIDTH = 2.0  # of the line, pixels of a picture of standard height
-_POINT = 9.0  # diameter of a point, the same
+"""Outline colours of selected and hovered parts, sRGB."""
+_WIDTH = 2.0  # line width, pixels in an image of standard height
+_POINT = 9.0  # diameter of a point, likewise
 _TILE, _LEVEL = 16, 4  # side of tile.vert's tiles, pixels; mipmaps with texels of that size
-_MOST = 12  # pixels around a mask that are looked at
+_MOST = 12  # search radius around a mask, pixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class OutlinePass:
     context : moderngl.Context
         The context in use.
     tools : OutlineTools
-        Programs, and what was uploaded for drawing.
+        Programs, and the buffers uploaded for drawing.
     """
 
     def __init__(self, context: moderngl.Context, tools: OutlineTools) -> None:
@@ -80,15 +80,16 @@ class OutlinePass:
         outlined : sequence of Outlined
             Parts of the scene.
         scene : Scene
-            As it was drawn.
+            The scene as drawn.
         view : View
             The camera's matrices.
         options : DisplayOptions
-            What is shown.
+            Display options.
         target : Target
-            The picture.
+            The image.
         is_layer : bool
-            Replace its colours where there are lines, with straight instead of premultiplied alpha.
+            Replace the target's colours where there are lines, with straight instead of
+            premultiplied alpha.
 
         Raises
         ------
@@ -113,7 +114,7 @@ class OutlinePass:
             self._compose(target, is_layer)
 
     def _make(self, size: tuple[int, int], samples: int) -> None:
-        """Create masks of the picture's size."""
+        """Create masks of the image's size."""
         mask = self._mask
         if mask is not None and (mask.size, mask.asked_samples) == (size, samples):
             return

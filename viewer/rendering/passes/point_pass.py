@@ -32,7 +32,7 @@ MIDDLE: Color = (0.42, 0.42, 0.42)
 """Colours by side, linear; the actor's colour, if set, replaces MIDDLE."""
 
 _LARGEST = 0.012  # radius relative to the size of all points: 2 cm on a person
-_SMALLEST = 0.0015  # the same, minimum: coincident points stay visible
+_SMALLEST = 0.0015  # minimum of this radius: coincident points stay visible
 _SPACING = 0.3  # maximum radius relative to the distance of the nearest point, for fingers
 _LIMB = 0.5  # radius of a limb relative to its thinner end
 _SAMPLES = 32  # frames of a clip that determine the radii

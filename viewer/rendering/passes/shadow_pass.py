@@ -81,7 +81,7 @@ class ShadowPass:
 
 
 def map_side(size: tuple[int, int]) -> int:
-    """Return the texels on each side of the shadow map of a picture, at least four a pixel.
+    """Return the side length of an image's shadow map in texels, at least four texels per pixel.
 
     >>> map_side((1280, 720)), map_side((100, 75))
     (2048, 512)
@@ -91,10 +91,10 @@ def map_side(size: tuple[int, int]) -> int:
 
 
 def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, float]:
-    """Return the view of a directional light that contains some spheres, and its half extent.
+    """Return the view of a directional light that contains the spheres, and its half extent.
 
-    Extents grow in steps, and the middle lies on a grid of texels, so that edges of shadows do not
-    crawl while figures move.
+    Extents grow in steps, and the centre is snapped to the texel grid, so that shadow edges do
+    not crawl while figures move.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def parallel_view(axes: Floats, middle: Floats, halves: Floats) -> View:
     middle : (3,)
         Centre of the box, along these axes.
     halves : (3,)
-        Half its sides.
+        Half the side lengths of the box.
     """
     matrix = np.eye(4)
     matrix[:3, :3] = axes
