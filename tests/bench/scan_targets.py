@@ -126,7 +126,7 @@ def z_up(scan: Scan) -> Scan:
 
 
 def holed(scan: Scan) -> Scan:
-    """Return the same without what a scanner does not see: armpits, crotch, soles, the crown."""
+    """Return the scan without what scanners miss: armpits, crotch, soles, the crown."""
     names = made.body().skeleton.names
     joints = viewer.joint_matrices(made.body(), scan.pose)[:, :3, 3]
     at = dict(zip(names, joints, strict=True))

@@ -62,7 +62,7 @@ def _instances() -> Scene:
 
 
 def _people() -> Scene:
-    """Two people as body25: one seen well, one less and less from head to foot."""
+    """Two people as body25: one clearly visible, one less confident from head to foot."""
     layout = keypoint_layout(25)
     actors = []
     for number in range(2):

@@ -59,7 +59,7 @@ def test_shadow_of_a_plate_lies_where_light_at_45_degrees_throws_it(offscreen):
 
 
 def test_shadow_falls_on_another_figure(offscreen):
-    """Below a plate, light from straight above reaches a larger plate only beside it."""
+    """Below a plate, light from straight above reaches a larger plate only around it."""
     light = lights(0.2, 0.6, inclination=90.0, follow_camera=False)
     scene = scene_of(plate(1.0), plate(0.4, half=1.0))
     options = with_shadows(lights=light)

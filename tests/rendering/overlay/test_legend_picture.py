@@ -60,7 +60,7 @@ def test_swatches_are_below_each_other_in_their_order():
 
 
 def joints(count, size, name="joint {}"):
-    """Return the legend of so many joints, and where their swatches begin: columns, None if not."""
+    """Return the legend of n joints, and the first columns of their swatches, None if hidden."""
     entries = tuple(
         Entry((200, index % 256, 40 + index // 256), name.format(index)) for index in range(count)
     )

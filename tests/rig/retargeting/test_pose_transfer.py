@@ -1,4 +1,4 @@
-"""Transfer of poses between figures with other DOF orders, rest rotations, up axes and joints."""
+"""Transfer of poses between figures with unequal DOF orders, rest rotations, up axes and joints."""
 
 from __future__ import annotations
 
