@@ -1,7 +1,7 @@
 """Draw the gallery: pictures in assets/pictures and the page viewer/manual/gallery.md.
 
-Run ``make gallery``, or ``python assets/make_gallery.py [NAME ...]`` for some of the pictures. All
-is made from bundled data. Pictures with burnt or black areas are refused.
+Run ``make gallery``, or ``python assets/make_gallery.py [NAME ...]`` for some of the pictures.
+Everything is made from bundled data. Images with overexposed or black areas are refused.
 """
 
 import contextlib

@@ -1,11 +1,12 @@
-"""Starting Python as a process of its own that signals reach, however the tests were started."""
+"""Run Python in a separate process that receives signals, however the tests were started."""
 
 from __future__ import annotations
 
 import sys
 
-# What is ignored when a program starts stays ignored, as after nohup, in a shell's background and
-# on many machines that run tests. Not in preexec_fn: that forks a process that may have threads.
+# A signal that is ignored when a program starts stays ignored, as after nohup, in a shell's
+# background and on many machines that run tests. Not in preexec_fn: that forks a process that may
+# have threads.
 _LISTEN = (
     "import os, signal, sys\n"
     "for name in ('SIGINT', 'SIGTERM', 'SIGHUP'):\n"

@@ -1,4 +1,4 @@
-"""Fixtures and paths that several test files use."""
+"""Fixtures and paths shared by test files."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from run_time import RunTime
 pytest_plugins = ["stored_pictures"]
 
 ROOT = Path(__file__).resolve().parents[1]
-# What draws in all of its tests and examples, or in one that all of it depends on.
+# Folders and files whose tests and examples all draw, or depend on one that draws.
 DRAWING = ("tests/app", "tests/rendering", "viewer/rendering", "viewer/__init__.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
-# Every run tries the same examples, and takes as long as it takes.
+# Every run tries the same examples, without a time limit.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
 settings.load_profile("fixed")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    if not hasattr(config, "workerinput"):  # else a process of its own counts for all
+    if not hasattr(config, "workerinput"):  # in workers, their controller counts for all
         config.pluginmanager.register(RunTime())
 
 
@@ -79,7 +79,7 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
 
 @pytest.fixture(autouse=True)
 def own_settings(tmp_path_factory, monkeypatch) -> None:
-    """No test reads or changes what the person who runs it has remembered."""
+    """No test reads or changes the settings of the user who runs it."""
     folder = tmp_path_factory.getbasetemp() / "settings"
     for name in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(folder / name))
@@ -87,13 +87,13 @@ def own_settings(tmp_path_factory, monkeypatch) -> None:
 
 @pytest.fixture
 def quick_fits(monkeypatch) -> None:
-    """Alignments take an eighth of the usual points: far less time, nearly as good."""
+    """Alignments use an eighth of the usual points: much faster, and nearly as good."""
     monkeypatch.setattr("viewer.autorig.alignment.surface_alignment.SAMPLES", 250)
 
 
 @pytest.fixture(scope="session")
 def gl_framebuffer() -> Iterator[moderngl.Framebuffer]:
-    """A framebuffer of a context without a window, for all tests; use ``ctx``, which checks it."""
+    """A framebuffer of a windowless context, shared by all tests; use ``ctx``, which checks it."""
     from viewer.rendering.gpu.context import headless_context
 
     context = headless_context()
@@ -112,4 +112,4 @@ def ctx(gl_framebuffer: moderngl.Framebuffer) -> Iterator[moderngl.Context]:
         assert context.error == "GL_NO_ERROR"
         yield context
         assert context.error == "GL_NO_ERROR"
-        gl_framebuffer.use()  # what the test bound may have been released
+        gl_framebuffer.use()  # the framebuffer bound by the test may have been released

@@ -1,4 +1,4 @@
-"""Files dragged from another program onto a window: the source's side of the XDND protocol."""
+"""Files dragged from another program onto a window: the source side of the XDND protocol."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class _Source:
         self.x11.XFlush(self.display)
 
     def wait_for(self, name):
-        """Return the numbers of a message from the window; hand the list over when asked."""
+        """Return the data of a message from the window; send the file list when it is requested."""
         deadline, wanted = time.monotonic() + _PATIENCE, self.atom(name)
         while time.monotonic() < deadline:
             if not self.x11.XPending(self.display):

@@ -13,7 +13,7 @@ from children import listening
 from PIL import ImageGrab
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 60.0  # seconds until something that should happen counts as missing
+PATIENCE = 60.0  # seconds until an expected event counts as missing
 
 
 def _wait_for(condition, what):
@@ -43,7 +43,7 @@ class _ClientMessage(ctypes.Structure):
 
 
 def _ask_to_close(display, window):
-    """Send WM_DELETE_WINDOW, as a window manager does when its cross is clicked."""
+    """Send WM_DELETE_WINDOW, as a window manager does when its close button is clicked."""
     x11 = ctypes.CDLL("libX11.so.6")
     x11.XOpenDisplay.restype = ctypes.c_void_p
     x11.XInternAtom.restype = ctypes.c_ulong
@@ -130,7 +130,7 @@ class Window:
         self.tell("mousemove", 640, 870)  # off the window: nothing is hovered
 
     def finish(self):
-        """Return what the program printed after it has ended well."""
+        """Return the program's output after it has exited successfully."""
         out, err = self.process.communicate(timeout=PATIENCE)
         assert (self.process.returncode, out, err) == (0, b"", b"")
 
@@ -139,7 +139,7 @@ class Window:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def is_asleep(self, seconds=0.8):
-        """Return whether the window draws nothing for some time."""
+        """Return whether the window draws no frames for some time."""
         spent, since = self.seconds_of_cpu(), time.monotonic()
         time.sleep(seconds)
         return (self.seconds_of_cpu() - spent) / (time.monotonic() - since) < 0.05

@@ -1,4 +1,4 @@
-"""What a call refuses or warns of, as data: (key, line, values)."""
+"""Errors and warnings of a call as data: (key, line, values)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def fault_of(found: Diagnostic) -> Fault:
 
 
 def refusal_of(work: Callable[[], Any]) -> Fault:
-    """Return the fault that a call raises, which must be one with data."""
+    """Return the error that a call raises, which must carry a diagnostic."""
     with pytest.raises(ViewerError) as caught:
         work()
     assert caught.value.diagnostic is not None
@@ -41,7 +41,7 @@ def warnings_of(found: Iterable[Diagnostic]) -> list[Fault]:
 
 
 def lines(found: Iterable[Diagnostic]) -> list[str]:
-    """Return diagnostics as they are shown."""
+    """Return diagnostics as displayed."""
     return list(map(str, found))
 
 

@@ -34,7 +34,7 @@ class RunTime:
 
 
 def run_time_line(seconds: float, budget: str | None) -> str:
-    """Return how long a run took, beside its budget if it has one."""
+    """Return how long a run took, next to its budget if it has one."""
     line = f"{duration_text(seconds)} in all"
     return line if budget is None else f"{line}, of a budget of {duration_text(float(budget))}"
 

@@ -1,7 +1,7 @@
 """Golden images: their location, and which of them a run re-renders.
 
 ``VIEWER_UPDATE_GOLDEN`` holds their names, or ``all``; ``make golden NAME…`` sets it. Look at every
-picture that was drawn anew before it is committed.
+re-rendered image before committing it.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ ALL = "all"
 
 
 def asked() -> set[str]:
-    """Return the names of the pictures to be drawn anew, or that of all."""
+    """Return the names of the images to be re-rendered, or ``all``."""
     return set(os.environ.get("VIEWER_UPDATE_GOLDEN", "").split())
 
 
 def is_redrawn(name: str) -> bool:
-    """Tell whether this run draws a picture anew."""
+    """Return whether this run re-renders an image."""
     return bool(asked() & {name, ALL})
 
 
 def name_of(item: pytest.Item) -> str:
-    """Return the picture that a test marked ``golden`` compares; empty for other tests."""
+    """Return the image that a test marked ``golden`` compares; empty for other tests."""
     mark = item.get_closest_marker("golden")
     if mark is None:
         return ""
@@ -35,7 +35,7 @@ def name_of(item: pytest.Item) -> str:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out all but the tests of the pictures that are drawn anew."""
+    """Deselect all tests except those of re-rendered images."""
     names = asked()
     if not names:
         return

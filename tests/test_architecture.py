@@ -1,4 +1,4 @@
-"""Imports point one way, headless stays lean, and files stay readable."""
+"""Import directions, few imports without a window, and limits on files and folders."""
 
 import ast
 import re
@@ -20,7 +20,8 @@ LARGE_FOLDERS = {"formats": 75, "commands": 35}
 # Folders of tests that mirror no folder of sources.
 OTHER_FOLDERS = {"bench", "data", "golden"}
 
-# Which parts of the package each part may import, beside itself and what every part may.
+# Which parts of the package each part may import, in addition to itself and what every part may
+# import.
 EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
 PARTS = {
     "rig": set(),
@@ -100,7 +101,7 @@ def tree(path: Path) -> ast.Module:
 
 @cache
 def nodes(path: Path) -> tuple[ast.AST, ...]:
-    """Return the nodes that say something of a whole file: imports, functions and conditions."""
+    """Return the nodes that matter for a whole file: imports, functions and conditions."""
     kinds = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.If)
     return tuple(node for node in ast.walk(tree(path)) if isinstance(node, kinds))
 
@@ -168,7 +169,7 @@ def test_test_files_stay_short_in_folders_that_mirror_the_sources() -> None:
     for folder, count in counts.items():
         assert count <= LARGE_FOLDERS.get(folder, 30), folder
         mirrored = PACKAGE / folder
-        # What is private in the sources has its tests in a folder without the underscore.
+        # Tests of private folders are in a folder without the underscore.
         private = mirrored.parent / f"_{mirrored.name}"
         assert folder in OTHER_FOLDERS or mirrored.is_dir() or private.is_dir(), folder
 
@@ -250,7 +251,7 @@ def test_drawing_headlessly_needs_no_window_library() -> None:
 
 
 def test_nothing_touches_the_environment_of_the_process() -> None:
-    """Libraries that set variables for everyone are a recurring fault of peers."""
+    """Libraries that set global environment variables are a recurring problem elsewhere."""
     for path in SOURCES:
         assert not re.search(r"os\.environ\[[^]]+\]\s*=|putenv|environ\.update", path.read_text())
 
@@ -281,7 +282,7 @@ def module_name(path: Path) -> str:
 
 
 def reached(graph: dict[str, set[str]], start: str) -> set[str]:
-    """Return the modules that a module imports, directly or by others."""
+    """Return the modules that a module imports, directly or indirectly."""
     found: set[str] = set()
     left = [start]
     while left:

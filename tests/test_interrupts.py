@@ -121,7 +121,7 @@ INFO = ("info",), {}
         "argparse",
         "viewer.commands.render",
         "numpy",
-        "datetime",  # asked for by numpy's own C code, which makes an ImportError of anything
+        "datetime",  # imported by numpy's own C code, which turns any exception into an ImportError
         "numpy.linalg",
         "viewer.formats",
         "viewer.formats.skin",
@@ -153,7 +153,7 @@ def test_signal_while_moderngl_calls_python_does_not_crash(end, number, helper, 
         "import viewer.rendering.recorder as r\nbefore(r._Drawer, 'release')\n"
         "def fail(*_): strike()\nr.pose_scene = fail",
         "import viewer.media.video as v\nafter(v.VideoSink, 'write')",
-        # In the encoder's thread; the handler runs in the main one, which must have its turn.
+        # In the encoder's thread; the handler runs in the main one, which must be scheduled.
         "import viewer.media.video as v, viewer.interrupts as i\n"
         "old = v.VideoSink.close\n"
         "def close(sink):\n"
@@ -226,7 +226,7 @@ def test_closed_terminal_ends_a_run_too(end):
 
 
 def test_signal_swallowed_by_python_is_raised_again(end):
-    # What a destructor raises is only reported; so is what a weak reference's callback raises.
+    # Exceptions in destructors and weak reference callbacks are only reported.
     moment = (
         "import viewer.commands.info as m\n"
         "class Dropped:\n"

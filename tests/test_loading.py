@@ -243,7 +243,7 @@ def test_other_content_is_described(tmp_path, data, kind):
         assert refusal(path) == f"{path}: expected a {wanted} file, found {kind}"
 
 
-# What is no file
+# Not regular files
 
 
 def test_missing_file_is_named(tmp_path):
@@ -343,7 +343,7 @@ def test_unusual_names_load_and_are_shown_on_one_line(tmp_path, name):
 def test_file_above_the_size_cap_is_refused_before_it_is_read(tmp_path):
     path = tmp_path / "big.skel"
     with path.open("wb") as stream:
-        stream.truncate(3 << 30)  # a hole: it takes no room
+        stream.truncate(3 << 30)  # sparse: it takes no disk space
     assert refusal(path) == (
         f"{path}: expected at most 2147483648 bytes, found 3221225472 (see --max-size)"
     )

@@ -257,7 +257,7 @@ def test_rig_file_opens_its_files_even_with_cycles(tmp_path):
 
 
 def test_clip_fits_skel_rigs_only(tmp_path, smpl):
-    # An SMPL body has 72 DOFs, as a course rig of 23 joints has: its channels mean something else.
+    # An SMPL body has 72 DOFs, as a .skel-style rig of 23 joints, with different meanings.
     channel = " channel { extrapolate constant constant keys 1 { 0 0 flat flat } }"
     path = tmp_path / "walk.anim"
     path.write_text("animation { range 0 1 numchannels 72" + 72 * channel + " }")

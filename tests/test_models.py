@@ -26,7 +26,7 @@ def folder(tmp_path):
 
 @pytest.fixture(autouse=True)
 def settings(tmp_path, monkeypatch):
-    """A settings folder of its own for each test."""
+    """A separate settings folder for each test."""
     monkeypatch.setattr(
         platformdirs, "user_config_dir", lambda *_, **__: str(tmp_path / "settings")
     )

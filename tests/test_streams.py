@@ -32,7 +32,7 @@ def rig(tmp_path):
 
 
 def shell(line: str, *words: str, folder: Path | None = None) -> subprocess.CompletedProcess:
-    """Run a line of bash in which ``viewer`` is the program and ``"$@"`` are some words."""
+    """Run a line of bash in which ``viewer`` is the program and ``"$@"`` are given arguments."""
     line = line.replace("viewer", f'"{sys.executable}" -m viewer')
     return subprocess.run(
         ["bash", "-c", line, "bash", *words],
@@ -126,7 +126,7 @@ def test_image_with_all_streams_closed_is_complete(rig, tmp_path):
     ],
 )
 def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
-    """It must not be replaced by a picture, as a file of that name would be."""
+    """It must not be replaced by an image, as a file of that name would be."""
     (tmp_path / "link.bmp").symlink_to("/dev/stdout")
     log = tmp_path / "log"
     log.write_bytes(b"precious\n")
@@ -134,7 +134,7 @@ def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
     done = shell(line, *rig, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert log.read_bytes().startswith(b"precious\n" + begin)
-    # What was written is said where it does not get into the picture.
+    # The message about the output goes to the stream that does not hold the image.
     assert done.stderr.startswith(os.fsencode(name)) and done.stderr.count(b"\n") == 1
     assert os.fsencode(name) not in log.read_bytes()
 
@@ -203,7 +203,7 @@ def test_reserved_descriptors_are_released():
 
 @pytest.mark.parametrize("suffix", [".anim", ".skel", ".bvh"])
 def test_results_match_the_output_sent_to_a_pipe(rig, tmp_path, suffix):
-    """Such a file cannot be opened again to be read back."""
+    """A pipe cannot be reopened to be read back."""
     (tmp_path / f"link{suffix}").symlink_to("/dev/stdout")
     done = shell(
         f'set -o pipefail; viewer convert "$1" -o link{suffix} | cat', rig[0], folder=tmp_path

@@ -47,7 +47,7 @@ def display():
         "-screen",
         "0",
         "1400x900x24",
-        "-noreset",  # a server that starts over when its last client leaves refuses the next
+        "-noreset",  # a server that resets when its last client leaves refuses the next
         "-nolisten",
         "tcp",
     ]
@@ -102,7 +102,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     inside = (x, y, width, height - 90)  # the lowest part shows messages that go away
     part = np.s_[y : y + inside[3], x : x + width]
 
-    # A slider moves the figure, R brings it back to the pixel.
+    # A slider moves the figure, R restores it pixel by pixel.
     label = "root.y"
     x0, y0, x1, y1 = rects[label]
     middle = (y0 + y1) / 2
@@ -115,7 +115,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     app.key("r")
     app.wait_until_shown(before, part)
 
-    # Skeleton and binding space come and go.
+    # Skeleton and bind pose are toggled.
     for key in ("s", "k"):
         now = app.wait_until_quiet()
         app.key(key)
@@ -124,7 +124,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
         app.key("s" if key == "s" else "k")
         app.wait_until_changed(changed, inside)
 
-    # Tab leaves nothing but the figure.
+    # Tab hides everything except the figure.
     now = app.wait_until_quiet()
     app.key("Tab")
     wide = app.wait_until_changed(now, (0, 100, 200, 500))
@@ -237,7 +237,7 @@ def surface(figure):
     x, y, width, height = state.view_rect
     size = round(width), round(height)
 
-    def is_inside(across, down):  # not at an edge, which another rounding would miss
+    def is_inside(across, down):  # not at an edge, which different rounding would miss
         around = [(across + i, down + j) for i in (-3, 0, 3) for j in (-3, 0, 3)]
         return all(vertex_at(state, renderer, size, place) is not None for place in around)
 
@@ -271,8 +271,8 @@ def test_vertex_text_is_complete_wherever_the_mouse_rests(window, places, surfac
         app.tell("mousemove", *place)
         _wait_for(app.is_asleep, "an idle processor")
         shown = app.screen()[part]
-        assert (shown != empty).any(axis=-1).sum() > 5000  # a text of some lines
-        app.key("shift")  # which means nothing, but brings frames
+        assert (shown != empty).any(axis=-1).sum() > 5000  # a text of several lines
+        app.key("shift")  # has no effect, but triggers frames
         _wait_for(app.is_asleep, "an idle processor")
         assert (app.screen()[part] == shown).all()
 

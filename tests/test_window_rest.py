@@ -10,7 +10,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_awaited_event_is_followed_by_frames_showing_it():
-    for at in range(1, 9):  # the frame that brings it, be it the last one before the window sleeps
+    for at in range(1, 9):  # the frame that shows it, even the last before the window sleeps
         rest = _Rest()
         for frame in range(at):
             rest.count(happened=frame % 4 == 0, awaits=True)

@@ -59,7 +59,7 @@ def _leg_details() -> list[Part]:
 
 
 def _arm() -> list[Part]:
-    # place; middle y, z; radii upwards, downwards, forwards, backwards; exponent
+    # position; middle y, z; radii upwards, downwards, forwards, backwards; exponent
     rows = [
         (0.130, 1.362, -0.024, 0.0488, 0.0552, 0.0509, 0.0552, 2.0),
         (0.180, 1.370, -0.024, 0.0499, 0.0530, 0.0509, 0.0530, 2.0),

@@ -1,4 +1,4 @@
-"""Images of synthetic cameras: drawn by the viewer, then bent by the lens."""
+"""Images of synthetic cameras: rendered by the viewer, then distorted by the lens."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.scene import Scene
 
 __all__ = ["write_images"]
 
-_MARGIN = 1.3  # of the drawn picture, from which the bent one is cut
+_MARGIN = 1.3  # of the rendered image, from which the distorted one is sampled
 _ITERATIONS = 30
 
 
@@ -50,7 +50,7 @@ def _widened(view: CameraView) -> CameraView:
 
 
 def _bent(pixels: Bytes, wide: CameraView, view: CameraView) -> Bytes:
-    """Return what a lens draws: each pixel is looked up where the ideal camera has it."""
+    """Return the distorted image: each pixel is looked up where the ideal camera has it."""
     assert view.size is not None  # synthetic cameras have one
     rows, columns = np.mgrid[: view.size[1], : view.size[0]]
     places = np.stack([columns, rows, np.ones_like(rows)]).reshape(3, -1)

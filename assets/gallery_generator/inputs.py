@@ -23,7 +23,7 @@ N_FRAMES = 61
 IMAGE = 20  # frame of the capture that has images
 _SIZE, _FOCAL = (480, 270), 330.0
 _LENS = (-0.22, 0.03)
-_ANGLES = (-62.0, 8.0, 75.0, 165.0)  # of the cameras about the people, degrees
+_ANGLES = (-62.0, 8.0, 75.0, 165.0)  # azimuths of the cameras around the people, degrees
 
 
 def body_figure() -> Figure:

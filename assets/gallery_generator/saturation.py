@@ -1,4 +1,4 @@
-"""Measure of burnt and black areas of pictures."""
+"""Fraction of overexposed and black areas in images."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BLACK = 2  # of 255
 def saturated_fraction(
     pixels: Bytes, background: tuple[int, int, int] | None = None, has_data: bool = False
 ) -> float:
-    """Return the fraction of pixels of which a channel is burnt, or all are black.
+    """Return the fraction of pixels with an overexposed channel or with all channels black.
 
     Parameters
     ----------

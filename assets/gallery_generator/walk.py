@@ -1,4 +1,4 @@
-"""A walk of the bundled body, from the joint angles of textbooks on gait."""
+"""A walk of the bundled body, from joint angles in textbooks on gait."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Gait:
     period : float
         Seconds of two steps.
     phase : float
-        Of the first frame, 0 to 1; the left leg is ahead at 0.25.
+        Phase of the first frame, 0 to 1; the left leg is ahead at 0.25.
     arms : float
-        Factor on the swing of the arms.
+        Multiplier for the swing of the arms.
     """
 
     start: tuple[float, float] = (0.0, 0.0)

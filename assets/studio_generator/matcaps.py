@@ -38,7 +38,7 @@ def _clay(normals: np.ndarray) -> np.ndarray:
 
 
 def _chrome(normals: np.ndarray) -> np.ndarray:
-    """Return polished metal in the studio, its range compressed so that nothing is burnt."""
+    """Return polished metal in the studio, its range compressed so that nothing is overexposed."""
     towards = np.array([0.0, 0.0, 1.0])
     reflected = 2.0 * normals[..., 2:3] * normals - towards
     light = (1.7 * specular(radiance, reflected, 0.12**2, 256)) ** 1.2

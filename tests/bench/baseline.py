@@ -1,4 +1,4 @@
-"""The least that draws and saves a frame: numpy, moderngl, Pillow, one program, one PNG.
+"""The minimal program that draws and saves a frame: numpy, moderngl, Pillow, one shader, one PNG.
 
 Run as ``python baseline.py OUTPUT.png``; what ``viewer render`` is measured against. Draws as many
 triangles as the bundled figure has, 1280 x 720, four samples a pixel, without reading any file.

@@ -45,7 +45,7 @@ def points_text(rng: np.random.Generator) -> str:
 
 
 def write(folder: Path) -> list[bytes]:
-    """Write the frames; return what is in the files."""
+    """Write the frames; return the contents of the files."""
     rng = np.random.default_rng(0)
     data = []
     for kind, text in (("smpl", body_text), ("keypoints3d", points_text)):
@@ -76,7 +76,7 @@ def parsed(data: list[bytes]) -> None:
 
 
 def memory(folder: Path) -> float:
-    """Return the peak of memory that reading takes, in units of the raw floats."""
+    """Return the peak memory of reading, as a multiple of the raw floats."""
     tracemalloc.start()
     kept = motions(folder)
     peak = tracemalloc.get_traced_memory()[1]

@@ -1,9 +1,9 @@
-"""A hundred posed bodies as instances, against as many copies that stand still, drawn alike.
+"""A hundred posed bodies as instances, against as many static copies drawn the same way.
 
 Both are one instanced draw of the same triangles with the same fragment shader, 1280 x 720; the
 copies' vertex shader places them and does nothing else. Alternating, so that the machine cancels
-out. The processor's part (kinematics, correctives, upload) is printed beside it, and so is how few
-actors are worth drawing as instances.
+out. The processor's part (kinematics, correctives, upload) is printed too, and from how many actors
+on instancing pays off.
 """
 
 from __future__ import annotations
@@ -116,14 +116,14 @@ def posed_draw(
     view: View,
     options: DisplayOptions,
 ) -> Callable[[], None]:
-    """Return what draws the instances as the renderer does."""
+    """Return a function that draws the instances as the renderer does."""
     return lambda: instance_pass.draw_instances(programs, instances, actors, view, options)
 
 
 def still_draw(
     context: moderngl.Context, instances: InstanceBuffers, view: View, options: DisplayOptions
 ) -> Callable[[], None]:
-    """Return what draws as many copies of the mesh at rest."""
+    """Return a function that draws as many copies of the mesh at rest."""
     fragment = resource("shaders", "mesh.frag").read_text()
     shade = resource("shaders", "shade", "phong.glsl").read_text()
     for name in re.findall(r"#pragma include (\w+)", fragment):
@@ -155,7 +155,7 @@ def still_draw(
 
 
 def processor(figure: Figure, rounds: int) -> None:
-    """Print what a frame of all poses costs before anything is drawn."""
+    """Print the CPU cost of posing all actors, before anything is drawn."""
     actors, rng = cast(figure, COUNT).actors, np.random.default_rng(1)
     with Offscreen() as offscreen, offscreen.context:
         offscreen.target((16, 16), 1).framebuffer.use()
@@ -207,7 +207,7 @@ def fewest(figure: Figure, rounds: int) -> None:
 def whole_frames(
     scene: Scene, together: Offscreen, single: Offscreen
 ) -> dict[str, Callable[[], None]]:
-    """Return what draws frames in four ways."""
+    """Return functions that draw frames in four ways."""
     rng, options, box = np.random.default_rng(2), DisplayOptions(), scene_box(scene)
     camera = default_camera(scene, SIZE)
 

@@ -1,4 +1,4 @@
-"""What checking costs: ``lint`` on the bundled body with 1,000 frames, beside reading them.
+"""Cost of checking: ``lint`` on the bundled body with 1,000 frames, against reading them.
 
 Reading is opening body and motion as ``viewer view`` does; the check starts from the open scene.
 Where its time goes is printed as well.
@@ -31,7 +31,7 @@ def motion(path: Path) -> Path:
     seconds = np.arange(N_FRAMES)[:, None] / RATE
     swing = rng.uniform(0.0, 0.3, 3 * N_JOINTS)
     poses = swing * np.sin(2.0 * np.pi * rng.uniform(0.2, 1.0, 3 * N_JOINTS) * seconds)
-    # z up: a body is turned onto its feet, and walks along y.
+    # z up: the body is rotated upright, and walks along y.
     poses[:, :3] = np.pi / 2.0, 0.0, 0.0
     place = np.zeros((N_FRAMES, 3))
     place[:, 1], place[:, 2] = 0.8 * seconds[:, 0], 1.2
@@ -47,7 +47,7 @@ def motion(path: Path) -> Path:
 
 
 def main(rounds: int = 7) -> None:
-    """Print the time of a check against that of reading, and each check's share."""
+    """Print the time of checking relative to reading, and each check's share."""
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as folder:
         files = [bundled_body(), motion(Path(folder) / "walk.npz")]
         scene = viewer.load(*files)

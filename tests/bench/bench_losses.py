@@ -1,4 +1,4 @@
-"""Exporting 1,000 frames of the bundled body: what it costs to read the file back and compare."""
+"""Exporting 1,000 frames of the bundled body: the cost of reading the file back and comparing."""
 
 from __future__ import annotations
 

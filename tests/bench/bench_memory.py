@@ -1,4 +1,4 @@
-"""Peak memory of rendering the bundled figure, against the least that draws a frame."""
+"""Peak memory of rendering the bundled figure, against a minimal program that draws a frame."""
 
 from __future__ import annotations
 

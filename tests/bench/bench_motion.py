@@ -1,4 +1,4 @@
-"""What playing costs: sampling, kinematics and upload of one 62-joint actor against its frame.
+"""Cost of playback: sampling, kinematics and upload of one 62-joint actor against its frame.
 
 The frame is 1280 x 720 with the default display. Of 500 played frames the growth of memory is
 printed as well: of what Python holds, and of the whole process.
@@ -31,7 +31,7 @@ N_FRAMES, SECONDS = 300, 10.0
 
 
 def sampled() -> SampledClip:
-    """Return ten seconds of capture: every joint turns a little, the figure walks."""
+    """Return ten seconds of capture: every joint rotates a little, the figure walks."""
     rng = np.random.default_rng(0)
     turns = np.cumsum(rng.normal(0.0, 0.003, (N_FRAMES, N_JOINTS, 3)), axis=0)
     place = np.zeros((N_FRAMES, 3))
@@ -69,7 +69,7 @@ def main(rounds: int = 150) -> None:
 
 
 def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Callable[[], object]]:
-    """Return what plays a frame, and what does the same without skinning and drawing."""
+    """Return functions that play a frame, with and without skinning and drawing."""
     scene, options = Scene([actor]), DisplayOptions()
     assert actor.clip is not None
     pose_actor(actor, 0.0)
@@ -96,7 +96,7 @@ class Clock:
         self.clip, self.ticks = clip, 0
 
     def next(self) -> float:
-        """Return the next time; never one that was there before, so that nothing is kept."""
+        """Return the next time; never a repeated one, so that no cached result is used."""
         self.ticks += 1
         return (self.ticks / 60.0 + 1e-5 * self.ticks) % (self.clip.end - self.clip.start)
 

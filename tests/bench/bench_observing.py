@@ -1,8 +1,8 @@
 """Cost of observing edits in a large scene, as a ratio to posing its actors.
 
 300 actors play a motion. Every frame the history compares the scene with its last state and follows
-the clock, and a key tells whether the picture is out of date. Both must stay cheap beside posing.
-The whole frame of the window is printed as well, 320 x 200 with all panels.
+the clock, and a key tells whether the picture is out of date. Both must stay cheap compared with
+posing. The whole frame of the window is printed as well, 320 x 200 with all panels.
 """
 
 from __future__ import annotations

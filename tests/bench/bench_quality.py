@@ -1,4 +1,4 @@
-"""What each quality of a picture costs, as a ratio to draft; and draft against an older checkout.
+"""Cost of each render quality relative to draft; and of draft relative to an older checkout.
 
     python tests/bench/bench_quality.py [FOLDER]
 

@@ -84,7 +84,7 @@ def main(rounds: int = 60) -> None:
 
 
 def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
-    """Time three skinned and three static frames a round."""
+    """Time three skinned and three static frames per round."""
     options = DisplayOptions(background="transparent", grid=False, samples=1)
     actor = Actor(figure)
     scene = Scene([actor])

@@ -1,4 +1,4 @@
-"""From process start to the PNG of the bundled figure, against the least that draws a frame."""
+"""From process start to the PNG of the bundled figure, against a minimal program."""
 
 from __future__ import annotations
 

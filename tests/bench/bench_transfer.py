@@ -1,4 +1,4 @@
-"""Weights carried over by the default method, against those of the nearest vertex.
+"""Weights transferred by the default method, against those of the nearest vertex.
 
 Parts, all or those named: ``aligned``, the weights alone, template and target lying on each other;
 ``whole``, the whole way, which looks for the alignment itself, against the seed's whole way;

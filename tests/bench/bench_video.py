@@ -29,7 +29,7 @@ GOAL = 0.8
 
 
 class _Dropped:
-    """A sink of nothing."""
+    """A sink that drops all frames."""
 
     workers, n_samples = 1, 0
 
@@ -72,7 +72,7 @@ def moving() -> Actor:
 
 
 def main(rounds: int = 5) -> None:
-    """Print frames a second, and how near both together come to the slower one."""
+    """Print frames per second, and the ratio of recording to the slower of the two."""
     scene = Scene([moving()])
     recording = Recording(scene, np.arange(N_FRAMES) / RATE, default_camera(scene, SIZE), SIZE)
     _, recording.box = frame_motion(recording)

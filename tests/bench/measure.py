@@ -1,4 +1,4 @@
-"""What the benchmarks share: interleaved rounds, ratios, processes."""
+"""Shared by the benchmarks: interleaved rounds, ratios, processes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
 
 
 def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Time every piece of work once a round, in turn; return milliseconds by name."""
+    """Time each function once per round, in turn; return milliseconds by name."""
     times: dict[str, list[float]] = {name: [] for name in work}
     for number in range(rounds + 1):
         for name, run in work.items():

@@ -77,7 +77,7 @@ def scans() -> list[Scan]:
 
 
 def person(body: viewer.Figure, shape: dict[str, float], arms: float) -> made.Target:
-    """Return another person than the template, the arms lowered by so many radians."""
+    """Return a person different from the template, the arms lowered by an angle in radians."""
     pose = viewer.rest_pose(body.skeleton)
     pose.shape_weights = np.array([shape.get(name, 0.0) for name in body.blend_shapes.names])
     names = list(body.skeleton.names)
@@ -121,12 +121,12 @@ def noisy(target: made.Target, rng, name: str) -> Scan:
 
 
 def z_up(scan: Scan) -> Scan:
-    """Return the same in centimetres, standing on z, away from the origin."""
+    """Return the scan in centimetres, with z up, away from the origin."""
     return replace(scan, positions=scan.positions @ Z_UP.T + [20.0, -35.0, 90.0])
 
 
 def holed(scan: Scan) -> Scan:
-    """Return the same without what a scanner does not see: armpits, crotch, soles, the crown."""
+    """Return the scan without what scanners miss: armpits, crotch, soles, the crown."""
     names = made.body().skeleton.names
     joints = viewer.joint_matrices(made.body(), scan.pose)[:, :3, 3]
     at = dict(zip(names, joints, strict=True))
@@ -144,13 +144,13 @@ def holed(scan: Scan) -> Scan:
 
 
 def without(scan: Scan, joints: list[str]) -> Scan:
-    """Return the same without the parts that follow some joints most."""
+    """Return the scan without the parts that follow some joints most."""
     gone = np.isin(scan.weights.toarray().argmax(axis=1), joint_numbers(scan, joints))
     return kept(scan, ~gone[scan.triangles].any(axis=1))
 
 
 def clothed(scan: Scan) -> Scan:
-    """Put a jacket, a skirt and hair on a person, and take away the skin beneath."""
+    """Put a jacket, a skirt and hair on a person, and remove the skin beneath."""
     jacket = ["spine1", "spine2", "spine3", "left_shoulder", "right_shoulder", "left_collar",
               "right_collar"]  # fmt: skip
     skirt = ["pelvis", "left_hip", "right_hip"]
@@ -190,7 +190,7 @@ def joint_numbers(scan: Scan, joints: list[str]) -> list[int]:
 
 
 def kept(scan: Scan, chosen: np.ndarray) -> Scan:
-    """Return the same with some triangles, and the vertices that they use."""
+    """Return the scan with some of its triangles, and the vertices that they use."""
     used, flat = np.unique(scan.triangles[chosen], return_inverse=True)
     triangles = flat.reshape(-1, 3).astype(np.int32)
     return replace(

@@ -1,4 +1,4 @@
-"""Interrupt commands at random moments, and count how they end.
+"""Interrupt commands at random moments, and count the outcomes.
 
     python tests/bench/stress_signals.py [--tries N] [--seed S] [WORK:SIGNAL ...]
 

@@ -159,7 +159,7 @@ def bent_pose(figure, rng, angle: float) -> viewer.Pose:
 
 
 def _arms_down(figure, angle: float = 1.35) -> viewer.Pose:
-    """Lower the arms of the body, with the usual angle until they lie on the torso."""
+    """Lower the arms of the body; by default until they lie on the torso."""
     pose = viewer.rest_pose(figure.skeleton)
     turns = np.zeros((len(pose.rotations), 3))
     names = list(figure.skeleton.names)

@@ -164,7 +164,7 @@ def test_existing_files_need_force(walk, tmp_path, capsys):
 
 
 def test_upside_down_worlds_are_written_upright(recording, tmp_path):
-    # With y pointing down, a body's joints come out turned by half a turn about x.
+    # With y pointing down, a body's joints are rotated by 180 degrees about x.
     assert convert(*recording, "--up=-y", "-o", tmp_path / "a.npz", "--as", "npz") == 0
     assert convert(*recording, "--up=y", "-o", tmp_path / "b.npz", "--as", "npz") == 0
     with np.load(tmp_path / "a-0.npz") as a, np.load(tmp_path / "b-0.npz") as b:

@@ -248,7 +248,7 @@ def test_range_and_single_frame_exclude_each_other(recording, tmp_path, capsys, 
     assert capsys.readouterr().err == f"viewer: {message}\n"
 
 
-# Keypoints beside bodies
+# Keypoints together with bodies
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "glb", "json", "txt", "skel", "npz"])

@@ -133,7 +133,7 @@ def test_reduced_mesh_option_does_not_affect_other_figures(draw, tmp_path):
     assert not differing(draw(*rig), draw(*rig, "--reduced")).any()
 
 
-# Numbers as colours
+# Values as colours
 
 
 def test_influence_limit_error_is_shown_where_there_are_many_influences(draw, box):

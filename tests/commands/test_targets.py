@@ -36,7 +36,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def refuse(capsys):
-    """Run a command that must refuse its output in one line, before it writes anything."""
+    """Run a command that must refuse its output with one line, before anything is written."""
 
     def run_it(command: list[str], *words: str) -> None:
         capsys.readouterr()
@@ -50,7 +50,7 @@ def refuse(capsys):
 
 
 def written_by(command: list[str], folder: Path) -> list[str]:
-    """Run a command; return the files whose names were asked for, and remove them all."""
+    """Run a command; delete its files and return the names given by the user."""
     assert run(into(folder, command)) == 0
     names = list(contents(folder))
     for name in names:
@@ -62,7 +62,7 @@ def written_by(command: list[str], folder: Path) -> list[str]:
 
 
 def check_command(command: list[str], inputs: Inputs, folder: Path, refuse) -> None:
-    """Put something in the way of each file that a command writes."""
+    """Check that each file that a command writes is protected if it exists already."""
     before = {path: path.read_bytes() for path in inputs.all}
     command = into(folder, command)
     for name in written_by(command, folder):
@@ -110,7 +110,7 @@ def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
         refuse(command, f"{target}: already exists")
         assert contents(folder) == {target.name: b"precious"}
         target.unlink()
-        # The mesh's own texture is read without being named.
+        # The mesh's texture is an input, although the command does not name it.
         for path in (*inputs.of_roof[:2], mesh.with_name("mesh_0.png")):
             target.symlink_to(path)
             refuse([*command, "--force"], f"{target}: input files are never overwritten")
@@ -177,7 +177,7 @@ def test_folder_of_frames_is_an_input(inputs, folder, refuse):
 
 
 def test_other_textures_of_a_skin_are_kept(inputs, folder, refuse):
-    """A ``.skin`` names its pictures, so another one cannot give way."""
+    """Texture names of a ``.skin`` are fixed: a different existing file is an error."""
     (folder / "cloth1.png").write_bytes(b"precious")
     for more in ([], ["--force"]):
         refuse(

@@ -10,7 +10,7 @@ from viewer.commands._progress import Progress
 
 
 class Terminal(io.StringIO):
-    """A stream that says that a person reads it."""
+    """A stream that claims to be a terminal."""
 
     def isatty(self) -> bool:
         return True

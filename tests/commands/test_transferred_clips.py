@@ -25,7 +25,7 @@ TURN = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A fox 100 times as large, turned by a quarter, and a clip of the fox that walks along z."""
+    """A fox scaled by 100 and rotated by 90 degrees, and a clip in which the fox walks along z."""
     folder = tmp_path_factory.mktemp("clips")
     fox = viewer.load().actors[0]
     positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0] @ np.transpose(TURN)

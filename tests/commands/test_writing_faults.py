@@ -1,4 +1,4 @@
-"""Every kind of output on a full disk: failing at each write and at each fill level."""
+"""Every output format on a full disk: failure at each write and at each fill level."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def command_of(inputs: Inputs, case: str, folder: Path) -> list[str]:
 
 
 class FullDisk:
-    """Takes half of the n-th write; the disk is full from then on."""
+    """Writes half of the n-th write's bytes; the disk is full from then on."""
 
     def __init__(self, monkeypatch, number: int) -> None:
         self.calls, self.number = 0, number
         opened, write_text = os.fdopen, Path.write_text
         monkeypatch.setattr(saving.os, "fdopen", lambda *a: _Stream(opened(*a), self))
 
-        def written(path, text, **settings):  # frames of a folder are written without a rename
+        def written(path, text, **settings):  # frames in a folder, written without a rename
             self.meet(lambda half: write_text(path, half, **settings), text)
             return write_text(path, text, **settings)
 
@@ -91,7 +91,7 @@ def test_failure_at_any_write_changes_nothing(
     if is_there:
         assert run(command) == 0
         for name in contents(folder):
-            if Path(name).suffix not in (".png", ".mtl"):  # which name what they hold
+            if Path(name).suffix not in (".png", ".mtl"):  # whose names describe their contents
                 (folder / name).write_bytes(f"precious {name}".encode())
     before = contents(folder)
     for number in count(1):
@@ -104,7 +104,7 @@ def test_failure_at_any_write_changes_nothing(
         refused(code, capsys, folder)
         found = contents(folder)
         if case.startswith("f_"):
-            # Numbered pictures that are finished stay; none is ever half there.
+            # Finished numbered images are kept; none is ever incomplete.
             found = {name: before.get(name, data) for name, data in found.items()}
             assert {name for name in found if name.startswith(".")} == set()
             found = {name: data for name, data in found.items() if name in before}
@@ -118,7 +118,7 @@ def test_every_disk_fill_level_keeps_existing_files(inputs, tiny_disk, capsys, c
     command = command_of(inputs, case, folder)
     for level in range(17):
         folder.mkdir()
-        # A temporary file system counts blocks of files alone.
+        # tmpfs counts only the blocks of file contents.
         (tiny_disk / "fill").write_bytes(bytes(4096 * level))
         capsys.readouterr()
         codes.append(run(command))
@@ -131,5 +131,5 @@ def test_every_disk_fill_level_keeps_existing_files(inputs, tiny_disk, capsys, c
             path.rmdir() if path.is_dir() else path.unlink()
         folder.rmdir()
         (tiny_disk / "fill").unlink()
-    # Less room is never better.
+    # A run never succeeds with less space than one that failed.
     assert codes == sorted(codes) and codes[16] == 5

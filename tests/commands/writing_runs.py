@@ -1,4 +1,4 @@
-"""Commands that write files, one per kind of output, and their inputs."""
+"""Commands that write files, one per output format, and their inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FREE = (".mtl", ".png")
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """Files that the commands read: of a rig with pictures, of one with a clip, of a capture."""
+    """Input files of the commands: a rig with textures, a rig with a clip, and a capture."""
 
     roof: tuple[str, ...] = ()
     twist: tuple[str, ...] = ()
@@ -33,14 +33,14 @@ class Inputs:
         return self.of_roof + self.of_twist + self.of_take
 
     def read_by(self, command: list[str]) -> tuple[Path, ...]:
-        """Return all that a command reads, pictures and the frames of a folder too."""
+        """Return all files that a command reads, including textures and the frames of a folder."""
         if any(word in command for word in self.recording[:1]):
             return self.of_take
         return self.of_roof if self.roof[1] in command else self.of_twist
 
 
 def write_inputs(folder: Path) -> Inputs:
-    """Write a rig with pictures, one with a clip, and a capture of two people and its model.
+    """Write a rig with textures, one with a clip, and a capture of two people and its model.
 
     Person 0 is in frames 20 to 23, person 7 in all of them but 22.
     """
@@ -65,7 +65,7 @@ def write_inputs(folder: Path) -> Inputs:
 
 
 def converting(inputs: Inputs) -> dict[str, list[str]]:
-    """Return commands by what they write, ``OUT/`` for the folder; quick, and without OpenGL."""
+    """Return fast commands without OpenGL, by their output; ``OUT/`` stands for the folder."""
     poses = {
         f"a pose as {name}": ["convert", *inputs.roof, "-o", f"OUT/{name}"]
         for name in ("p.obj", "p.ply", "p.npz", "p.json", "p.skel", "p.glb", "p.gltf")
@@ -97,7 +97,7 @@ def converting(inputs: Inputs) -> dict[str, list[str]]:
 
 
 def drawing(inputs: Inputs) -> dict[str, list[str]]:
-    """Return commands that draw first."""
+    """Return commands that render."""
     motion = [*inputs.twist, "--size", "64x48", "--frames", "0:3"]
     return {
         f"{name} {' '.join(more)}": ["render", *motion, "-o", f"OUT/{name}", *more]
@@ -115,11 +115,11 @@ def drawing(inputs: Inputs) -> dict[str, list[str]]:
 
 
 def into(folder: Path, command: list[str], *more: str) -> list[str]:
-    """Return a command that writes into a folder."""
+    """Return the command with ``OUT/`` replaced by a folder."""
     return [word.replace("OUT/", f"{folder}/") for word in command] + list(more)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return what is in a folder, and in those in it."""
+    """Return the files in a folder and its subfolders."""
     found = (path for path in folder.rglob("*") if path.is_file() or path.is_symlink())
     return {str(path.relative_to(folder)): path.read_bytes() for path in found if path.exists()}

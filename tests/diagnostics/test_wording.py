@@ -1,4 +1,4 @@
-"""Every message renders, and every call supplies the values of its template."""
+"""Every message can be formatted, and every call supplies the values of its template."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CALLS = {
 
 
 def sample(spec: str) -> Any:
-    """Return a value that a specification can show."""
+    """Return a sample value that a format specification accepts."""
     if spec[:1] in "#?" and spec:
         return 3
     if spec == "word":
@@ -59,7 +59,7 @@ def test_every_phrase_renders(key: str) -> None:
 
 
 def calls() -> list[tuple[str, str, set[str]]]:
-    """Return (place, key, names of values) for every call whose key is written out."""
+    """Return (location, key, value names) for every call with a literal key."""
     found = []
     for path in sorted(ROOT.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -18,7 +18,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 
-TENTH = 1e-5  # metres, 0.01 mm: what the issue allows
+TENTH = 1e-5  # metres, 0.01 mm: tolerance given in the issue
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
 
 
@@ -31,7 +31,7 @@ def quaternions(vectors: np.ndarray) -> np.ndarray:
 def body_animation(
     figure: Figure, count: int = 12, rows: list[int] | None = None, seed: int = 0
 ) -> SampledAnimation:
-    """Return random large rotations of a body, one shape, some frames missing."""
+    """Return a body with large random rotations, a constant shape and some missing frames."""
     rng = np.random.default_rng(seed)
     timing = Timing(30.0, np.arange(count) if rows is None else np.array(rows))
     names = figure.skeleton.names
@@ -60,7 +60,7 @@ def write(animation: SampledAnimation, folder: Path, **options) -> tuple[PlainBv
 
 
 def joints_of(animation: SampledAnimation) -> np.ndarray:
-    """Return where the animation's joints are: (F, J, 3)."""
+    """Return the animation's joint positions: (F, J, 3)."""
     return world_frames(animation.figure, animation.frames)[..., :3, 3]
 
 

@@ -1,4 +1,4 @@
-"""Animations of synthetic bodies of the SMPL family, and direct formulas for their results."""
+"""Animations of synthetic SMPL-family bodies, and explicit formulas for their vertices."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from viewer.rig.smpl_family import FAMILY
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
-    """Return numbers from -0.5 to 0.5, all different."""
+    """Return values from -0.5 to 0.5, all different."""
     count = int(np.prod(shape))
     return 0.5 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3).reshape(shape)
 
 
 def family_motion(count: int, frames: int = 4, rows=None, first_frame: int = 0, **words):
-    """Return a motion of all joints, the root turned far, about the model's origin."""
+    """Return a motion of all joints with large root rotations, about the model's origin."""
     vectors = waves(frames, count, 3, seed=0.1 * frames)
     vectors[:, 0] += [1.2, -0.4, 0.9]
     words = {"shape": waves(1, 10, seed=2.0), "about_origin": True, **words}
@@ -33,23 +33,23 @@ def family_motion(count: int, frames: int = 4, rows=None, first_frame: int = 0, 
 def family_animation(
     figure: Figure, motion: BodyMotion, interpolate: bool = False
 ) -> SampledAnimation:
-    """Return a figure's animation of a motion, every frame of it."""
+    """Return the animation of a figure for all frames of a motion."""
     clip = body_clip(motion, figure)[0]
     return sample_animation(Actor(figure, clip=clip), interpolate=interpolate)
 
 
 def clip_animation(figure: Figure, clip: SampledClip) -> SampledAnimation:
-    """Return a figure's animation of a clip."""
+    """Return the animation of a figure for a clip."""
     return sample_animation(Actor(figure, clip=clip))
 
 
 def vertices_about_origin(arrays, vectors, root, move, shape=()) -> np.ndarray:
-    """Return V = R X + T, where ``vectors`` turn all joints but the root."""
+    """Return V = R X + T, where ``vectors`` rotate all joints but the root."""
     pose = np.array(vectors)
     pose[0] = 0.0
     return smpl_forward(arrays, shape, pose)[0] @ rotation(root).T + move
 
 
 def vertices_about_pelvis(arrays, vectors, move, shape=()) -> np.ndarray:
-    """Return what smplx makes of poses and trans: the whole body posed, then moved."""
+    """Return smplx's vertices for poses and trans: the whole body is posed, then translated."""
     return smpl_forward(arrays, shape, vectors)[0] + move

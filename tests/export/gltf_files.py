@@ -10,7 +10,7 @@ from viewer.export import export
 from viewer.rig.figure import Figure
 from viewer.rig.skinning import Skinning, deform
 
-SINGLE = 2e-6  # of the size: single precision through a chain of matrices
+SINGLE = 2e-6  # relative to the size: single precision through a chain of matrices
 EXACT = 1e-6  # small figures of size 1 or so
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)
 AS_IS = np.eye(3)
@@ -22,13 +22,13 @@ def write(folder, actor, name="out.glb", **skinning) -> tuple[Gltf, list[str]]:
 
 
 def corners(gltf: Gltf, values: np.ndarray) -> np.ndarray:
-    """Return what belongs to the triangles' corners, primitive after primitive."""
+    """Return the attribute values at the triangle corners, primitive by primitive."""
     rows = [values[gltf.triangles(number)] for number in range(len(gltf.primitives))]
     return np.concatenate(rows)
 
 
 def assert_drawn(gltf: Gltf, figure: Figure, pose, turn=AS_IS, time=None, **how) -> None:
-    """Hold what a program draws to linear blend skinning with weights that add up to 1."""
+    """Check the rendered vertices against linear blend skinning with normalised weights."""
     how = {"normalize": True, "correctives": False, **how}
     positions, normals = deform(figure, pose, Skinning(**how))
     order = np.argsort(figure.mesh.material_indices, kind="stable")

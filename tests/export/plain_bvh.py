@@ -1,6 +1,7 @@
-"""A second BVH reader, strict and slow: line by line, lists and loops, nothing of the viewer's.
+"""A second BVH reader, strict and slow: line by line, with lists and loops, sharing no code with
+the viewer.
 
-It takes lines where Blender's importer expects them: "{" alone, then OFFSET, then CHANNELS.
+It requires the line layout that Blender's importer expects: "{" alone, then OFFSET, then CHANNELS.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class PlainBvh:
         return {name: place for name, (_, place) in self.joints(frame).items()}
 
     def joints(self, frame: int) -> dict[str, tuple[list[list[float]], list[float]]]:
-        """Return how every joint is turned in the world, and where it is."""
+        """Return the world rotation and position of every joint."""
         values = iter(self.frames[frame])
         matrices, places = [], []
         for joint, parent in enumerate(self.parents):

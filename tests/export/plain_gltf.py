@@ -1,4 +1,4 @@
-"""A small glTF 2.0 reader that knows nothing of the viewer: the rules of the specification, and
+"""A small glTF 2.0 reader that shares no code with the viewer: the rules of the specification, and
 the vertices and joints that a program draws, in double precision."""
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Gltf:
             assert "uri" not in declared and 0 <= size - declared["byteLength"] <= 3
         return text
 
-    # What is in the file.
+    # File contents
 
     def accessor(self, index: int) -> np.ndarray:
         """Return an array: (N,) of scalars, else (N, components)."""
@@ -72,7 +72,7 @@ class Gltf:
         return self.buffer[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
 
     def named(self, name: str) -> int:
-        """Return the one node of this name."""
+        """Return the only node with this name."""
         (found,) = [n for n, node in enumerate(self.nodes) if node.get("name") == name]
         return found
 
@@ -97,10 +97,10 @@ class Gltf:
             for sampler in self.root["animations"][0]["samplers"]
         )
 
-    # What a program draws.
+    # Posing and skinning
 
     def transforms(self, time: float | None = None) -> list[dict]:
-        """Return every node's own properties, animated if there is a time."""
+        """Return every node's local transform, animated if a time is given."""
         nodes = [dict(node) for node in self.nodes]
         for channel in self.root["animations"][0]["channels"] if time is not None else ():
             sampler = self.root["animations"][0]["samplers"][channel["sampler"]]
@@ -113,7 +113,7 @@ class Gltf:
         return nodes
 
     def world(self, time: float | None = None) -> np.ndarray:
-        """Return every node's matrix in the scene: (N, 4, 4)."""
+        """Return every node's world matrix: (N, 4, 4)."""
         nodes = self.transforms(time)
         local = [matrix(node) for node in nodes]
         result = []
@@ -125,7 +125,7 @@ class Gltf:
         return np.array(result)
 
     def vertices(self, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions and normals in the scene, morphed and skinned."""
+        """Return morphed and skinned positions and normals in world space."""
         node = self.transforms(time)[self.mesh_node]
         positions = self.attribute("POSITION").astype(float)
         normals = self.attribute("NORMAL").astype(float)
@@ -161,7 +161,7 @@ class Gltf:
             for n in range(count)
         ]
 
-    # The rules.
+    # Rules of the specification
 
     def _check(self) -> None:
         root = self.root
@@ -212,7 +212,7 @@ class Gltf:
             assert abs(math.hypot(*node.get("rotation", [1.0])) - 1.0) < 1e-12
             assert len(node.get("rotation", [0] * 4)) == 4
             assert len(node.get("translation", [0] * 3)) == len(node.get("scale", [0] * 3)) == 3
-        if "skins" in self.root:  # what is above a skinned mesh would not move it
+        if "skins" in self.root:  # the ancestors of a skinned mesh would not move it
             assert self.mesh_node in scene["nodes"]
             assert not {"translation", "rotation", "scale"} & set(self.nodes[self.mesh_node])
 
@@ -241,7 +241,7 @@ class Gltf:
             assert item["count"] == count and item["type"] == SIDES.get(name, "VEC4")
             views.append(item["bufferView"])
             assert self.root["bufferViews"][item["bufferView"]]["target"] == 34962
-        assert len(set(views)) == len(views)  # without a stride a view is one attribute
+        assert len(set(views)) == len(views)  # without a stride a buffer view holds one attribute
         item = self.root["accessors"][mesh["primitives"][0]["attributes"]["POSITION"]]
         assert len(item["min"]) == len(item["max"]) == 3
         lengths = np.linalg.norm(self.attribute("NORMAL").astype(float), axis=1)
@@ -286,7 +286,7 @@ class Gltf:
 
 
 def line(times: np.ndarray, values: np.ndarray, time: float, turns: bool) -> list[float]:
-    """Return a curve between its keys: rotations on the arc, all else in a straight line."""
+    """Interpolate a curve between its keys: rotations by slerp, all else linearly."""
     if time <= times[0] or time >= times[-1]:
         return values[0 if time <= times[0] else -1].tolist()
     row = int(np.searchsorted(times, time, side="right")) - 1

@@ -1,4 +1,4 @@
-"""Readers of ``.obj``, ``.mtl`` and binary ``.ply`` that share nothing with the exporters."""
+"""Readers of ``.obj``, ``.mtl`` and binary ``.ply`` that share no code with the exporters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def read_obj(path: Path) -> SimpleNamespace:
-    """Return ``v``, ``vt``, ``vn`` and the faces of an ``.obj``; a keyword not known is an error.
+    """Return ``v``, ``vt``, ``vn`` and the faces of an ``.obj``; an unknown keyword is an error.
 
     ``faces`` holds one (material, ((v, vt, vn), …)) for each triangle, indices as written.
     """
@@ -27,7 +27,7 @@ def read_obj(path: Path) -> SimpleNamespace:
         elif keyword == "usemtl":
             material = rest
         elif keyword == "mtllib":
-            found.libraries += rest.split(" ")  # the format takes several, parted by blanks
+            found.libraries += rest.split(" ")  # the format allows several, separated by spaces
         elif keyword == "o":
             found.objects += rest.split(" ")
         else:
@@ -92,5 +92,5 @@ def read_ply(path: Path) -> SimpleNamespace:
 
 
 def columns(rows: list[dict], *names: str) -> np.ndarray:
-    """Return properties of an element side by side."""
+    """Return properties of an element as columns of one array."""
     return np.array([[row[name] for name in names] for row in rows])

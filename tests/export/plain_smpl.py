@@ -1,4 +1,4 @@
-"""The forward pass of the SMPL family as its paper writes it, loop by loop (Loper et al. 2015)."""
+"""The forward pass of the SMPL family as in its paper, with explicit loops (Loper et al. 2015)."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def smpl_forward(
     arrays
         As ``synthetic_smpl.model`` makes them.
     shape
-        Weights of the columns of ``shapedirs``: of the first, or of ``columns``.
+        Weights of the first columns of ``shapedirs``, or of those in ``columns``.
     pose
         (J, 3) rotation vectors.
     columns
-        Which columns ``shape`` is for.
+        Columns that ``shape`` weights.
     correct
         Whether pose blend shapes are added.
     """

@@ -18,7 +18,7 @@ balljoint root {
 """
 LOPSIDED_SKEL = ARMS_SKEL.replace("offset -1 0 0\n", "offset -2 0 0\n")
 
-# Vertex 1 belongs half to each joint; the second turns about y, the line through both.
+# Vertex 1 belongs half to each joint; the second rotates about y, the line through both.
 TWIST_SKEL = "balljoint low { balljoint high { offset 0 1 0 } }"
 TWIST_SKIN = """
 positions 3 { 1 0 0  1 1 0  1 2 0 }
@@ -82,7 +82,7 @@ def _table(rows: list[tuple[int, ...]]) -> str:
 
 
 def pose_190(n_joints: int, **numbers: float) -> str:
-    """Return a PIG pose: 3 numbers of translation, 3 a joint, scale; set as ``n5=0.5``."""
+    """Return a PIG pose: 3 values of translation, 3 per joint, scale; set as ``n5=0.5``."""
     values = [0.0] * (3 + 3 * n_joints) + [1.0]
     for name, value in numbers.items():
         values[int(name[1:])] = value

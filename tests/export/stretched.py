@@ -1,4 +1,4 @@
-"""A chain of joints whose bones and mesh grow with a blend shape, by lengths that are plain."""
+"""A chain of joints whose bones and mesh grow with a blend shape, by known lengths."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ WORST = 3
 
 
 def chain(unit: str = "m") -> Figure:
-    """Return three joints upon each other, a metre apart; each bone grows by 0.1 m a weight.
+    """Return three joints stacked a metre apart; each bone grows by 0.1 m per unit of weight.
 
-    A vertex lies at each joint, and follows it; the last lies a metre above the highest joint,
-    follows that, and moves by 0.5 m a weight.
+    One vertex lies at each joint and follows it; the last lies a metre above the highest joint,
+    follows that joint, and moves by 0.5 m per unit of weight.
     """
     every = np.arange(3, dtype=np.int32)
     rows = [[(0, 1.0)], [(1, 1.0)], [(2, 1.0)], [(2, 1.0)]]
@@ -44,7 +44,7 @@ def chain(unit: str = "m") -> Figure:
 
 
 def chain_animation(unit: str = "m", weights=WEIGHTS, **tracks) -> SampledAnimation:
-    """Return the chain, its root turned by a right angle about z in all frames."""
+    """Return the chain with its root rotated by 90 degrees about z in all frames."""
     count = len(weights)
     turns = np.zeros((count, 3, 4))
     turns[..., 3] = 1.0

@@ -24,7 +24,7 @@ from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 
-# Metres and radians: angles come back through an arctangent of numbers near 1.
+# Metres and radians: angles are recovered with an arctangent of values near 1.
 ATOL = 1e-13
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55}
 GAPS = np.array([-1, 0, 1, -1, -1, 2, 3])  # frames 0, 3 and 4 are missing
@@ -44,7 +44,7 @@ def family(tmp_path_factory):
 
 
 def written(animation, path, **options):
-    """Export an animation; return the arrays of the file and the notes."""
+    """Export an animation; return the arrays in the file and the warnings."""
     notes = faults.lines(export_animation(animation, path, "amass", MotionOptions(**options)))
     with np.load(path) as arrays:
         return dict(arrays), notes
@@ -91,7 +91,7 @@ def test_transl_follows_the_formula_of_the_specification(family, tmp_path):
         turned = rotation(motion.vectors[frame, 0]) @ pelvis
         expected = motion.translations[frame] + turned - pelvis
         assert_allclose(arrays["trans"][frame], expected, rtol=0, atol=ATOL)
-        # Angles below pi come back as they were.
+        # Angles below pi round-trip.
         assert_allclose(arrays["poses"][frame], motion.vectors[frame].ravel(), rtol=0, atol=ATOL)
 
 
@@ -135,7 +135,7 @@ def test_other_up_axis_rotates_the_world(family, tmp_path):
             )
             for arrays in (plain, turned)
         )
-        # (x, y, z) -> (x, -z, y) stands what is y up on z.
+        # (x, y, z) -> (x, -z, y) converts from y up to z up.
         expected = np.stack([before[:, 0], -before[:, 2], before[:, 1]], axis=1)
         assert_allclose(after, expected, rtol=0, atol=ATOL)
 
@@ -205,7 +205,7 @@ def test_gaps_split_the_file(family, tmp_path):
         assert "present" not in arrays
 
 
-# What the format cannot hold
+# Data that the format cannot represent
 
 
 def test_losses_are_reported(family, tmp_path):
@@ -216,7 +216,7 @@ def test_losses_are_reported(family, tmp_path):
     clip = SampledClip("a", Timing(30.0, np.arange(2)), rotations, moved,
                        np.array([[0.5, 0, 0]] * 2), np.array([1.0, 1.5]))  # fmt: skip
     arrays, notes = written(clip_animation(figure, clip), tmp_path / "a.npz")
-    # A root that moves within the figure is a body that moves.
+    # A root that moves within the figure moves the whole body.
     assert_array_equal(arrays["trans"], [[1.5, 2.0, 3.0]] * 2)
     assert notes[1].startswith(f"{tmp_path}/a.npz: joints differ from the motion by up to ")
     assert notes[2:] == [

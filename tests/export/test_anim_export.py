@@ -1,4 +1,4 @@
-""".anim export: the clip itself, or keys per frame with a measured error."""
+""".anim export: the clip's own keys, or one key per frame with a measured error."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def rig(limits=()):
 
 
 def keyed(end=1.0):
-    """The root goes from 0 to 3 along x, and turns about z by -0.5 to 0.5."""
+    """The root moves from 0 to 3 along x, and rotates about z from -0.5 to 0.5."""
     moves = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 3.0]), (("flat", "flat"),) * 2)
     turns = Channel(
         5,
@@ -53,7 +53,7 @@ def keyed(end=1.0):
 
 
 def turning(angles, rate=2.0, rows=None, **more):
-    """A sampled clip in which the second joint turns about z by these angles."""
+    """A sampled clip in which the second joint rotates about z by these angles."""
     turns = np.zeros((len(angles), 2, 4))
     turns[:, :, 3] = 1.0
     turns[:, 1, 2] = np.sin(np.asarray(angles) / 2)
@@ -97,14 +97,14 @@ def test_part_of_a_clip_becomes_keys_on_its_frames(tmp_path):
     assert_array_equal(again.channels[0].times, times)
     assert (again.start, again.end) == (times[0], times[-1])
     assert_array_equal(evaluate_all(again, times)[1], evaluate_all(clip, times)[1])
-    # Channels that stay still need one key each.
+    # Constant channels need one key each.
     assert [len(channel.times) for channel in again.channels] == [6, 1, 1, 1, 1, 6, 1, 1, 1]
     assert notes[0] == f"{path}: 9 channels with 19 keys, 0.2 to 0.7 s, smooth tangents"
     assert len(notes) == 2 and "differ from the motion between frames" in notes[1]
 
 
 def test_error_between_frames_matches_hand_calculation(tmp_path):
-    """Frames at 0 and 1: with slopes of the only span, straight; the clip is there at 1.5."""
+    """Frames at 0 and 1: with the slope of the span, a straight line; the clip is at 1.5."""
     clip = Clip(
         "bump",
         (
@@ -136,7 +136,7 @@ def test_angles_of_limited_joints_stay_within_limits(tmp_path):
     figure = rig(limits={"z": (-1.0, 1.0)})
     again, notes = written(Actor(figure, clip=turning([0.5, 2.0])), tmp_path / "a.anim")
     assert_allclose(again.channels[8].values, [0.5, 1.0], atol=1e-12)
-    # The joint itself does not move: only its turn is off.
+    # The joint itself does not move: only its rotation is wrong.
     assert len(notes) == 1
 
 
@@ -181,8 +181,8 @@ def test_placement_moves_the_root_and_leftovers_are_reported(tmp_path):
         ".anim translates only the root: translations of other joints, up to 0.5 "
         "units, are omitted",
     ]
-    # The file's figure has a scale of 1 about the root's place, which is half the one here, and its
-    # second joint is where it rests.
+    # The figure in the file has a scale of 1 about the root's position, half of the scale here, and
+    # its second joint is at rest.
     skeleton = rig().skeleton
     assert_array_equal(skeleton.parents, [-1, 0])
     root, offset = skeleton.rest_translations
@@ -234,7 +234,7 @@ def test_exporter_is_found_by_its_suffix():
 
 
 def test_written_clip_reproduces_the_poses_of_the_frames(tmp_path):
-    """All three axes, against rotations multiplied by hand."""
+    """All three axes, against explicit products of rotations."""
     rng = np.random.default_rng(4)
     angles = rng.uniform(-1.4, 1.4, (6, 3))
     turns = np.array([

@@ -19,7 +19,7 @@ from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animati
 from viewer.rig.scene import Actor
 from viewer.rig.skin import skin_from_lists
 
-TOLD = 5e-3  # three digits are told
+TOLD = 5e-3  # messages give three digits
 
 
 def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> list[Diagnostic]:
@@ -27,7 +27,7 @@ def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> li
 
 
 def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 3, 4)) -> Actor:
-    """Return an arm a metre long, turned about z by 2 radians to and fro, a key a second."""
+    """Return an arm a metre long that swings about z by 2 radians, one key per second."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, kind, 0.0) for kind in ("x", "y", "z")]
     skeleton = hand_made.skeleton([-1, 0], rows, None, [[0.0] * 3, [1.0, 0, 0]])
@@ -40,7 +40,7 @@ def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 
 
 
 def densest(actor: Actor, rate: float) -> float:
-    """Return how far the arm's end is from straight lines between angles: 20000 times a second."""
+    """Return the arm tip's distance from linear interpolation of the angles, sampled at 20 kHz."""
     times = np.linspace(0.0, actor.clip.end, int(actor.clip.end * 20000) + 1)
     frames = np.arange(int(np.floor(actor.clip.end * rate + 1e-9)) + 1) / rate
     times = times[times <= frames[-1]]
@@ -57,7 +57,7 @@ def error_between(notes: list[Diagnostic]) -> Diagnostic:
 
 
 def between(notes: list[Diagnostic]) -> float:
-    """Return by how many units joints differ between frames."""
+    """Return the difference of joints between frames, in units."""
     note = error_between(notes)
     assert note.values["estimate"] == ""
     return note.values["joint"].values["distance"]
@@ -79,14 +79,14 @@ def test_loss_between_frames_matches_dense_sampling(tmp_path, rate):
 
 @pytest.mark.parametrize("mode", ["cycle", "cycle_offset", "bounce"])
 def test_loss_of_repeating_curves_is_reported(tmp_path, mode):
-    """Three keys within 1.9 s, of which a clip of 40 s repeats kinks and jumps."""
+    """A clip of 40 s repeats three keys within 1.9 s, with kinks and jumps."""
     actor = swinging((mode, mode), 40.0, (0.0, 0.3, 1.9))
     size = pytest.approx(densest(actor, 1.0), rel=TOLD)
     assert between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
 
 
 def test_vertex_loss_between_frames_is_reported_too(tmp_path):
-    """A vertex three metres out, on the joint that turns."""
+    """A vertex three metres away from the rotating joint that it follows."""
     actor = swinging()
     mesh = Mesh(np.diag([3.0, 1, 1]), np.eye(3), np.array([[0, 1, 2]]))
     skin = skin_from_lists([[(0, 1.0)]] * 3, np.tile(np.eye(4), (2, 1, 1)))
@@ -102,7 +102,7 @@ def test_vertex_loss_between_frames_is_reported_too(tmp_path):
 
 @pytest.mark.slow
 def test_motions_too_long_to_check_say_so(tmp_path):
-    """Two minutes at 20 fps: more spans between frames than are all sampled."""
+    """Two minutes at 20 fps: too many frame intervals to sample them all."""
     actor = swinging(end=120.0)
     notes = write(sample_animation(actor, 20.0), tmp_path, "bvh", "a.bvh")
     note = error_between(notes)

@@ -1,4 +1,4 @@
-"""BVH exports of figures that rest rotated, scaled or in several parts, and their angles."""
+"""BVH exports of figures with several parts or a rotated or scaled rest pose, and their angles."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_end_sites_are_half_the_last_bone_or_reach_to_the_skin(tmp_path: Path) -
     found, _ = write(rig_animation(replace(chain(), boxes=boxes)), tmp_path)
     np.testing.assert_allclose(found.ends[2], [0, 0.75, 0])
     found, _ = write(rig_animation(chain(1)), tmp_path)
-    np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone to go by
+    np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone gives its direction
 
 
 def test_end_sites_of_the_bundled_body_lie_on_its_skin(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_angles_reproduce_rotations_even_at_gimbal_lock(order: str, rows: list) 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_angles_are_unwrapped(order: str, which: int) -> None:
-    # One axis turns round several times, through where the middle angle passes 90 degrees.
+    # One axis makes several full turns, and the middle angle passes 90 degrees.
     wanted = np.tile([0.3, 0.2, -0.4], (400, 1))
     wanted[:, which] += np.linspace(0, 15, 400)
     turns = np.array([angle_product(order, row) for row in wanted])

@@ -36,7 +36,7 @@ def family(tmp_path_factory):
 
 
 def frames_in(folder):
-    """Return what the frame files hold, by frame."""
+    """Return the contents of the frame files, by frame."""
     files = sorted((folder / "smpl").iterdir())
     return {int(file.stem): json.loads(file.read_text()) for file in files}
 

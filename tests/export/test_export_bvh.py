@@ -54,7 +54,7 @@ def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -
     assert notes[0] == (
         "PATH: 24 joints, 12 frames (0 to 11) at 30 fps, centimetres, y up, channels ZYX"
     )
-    assert len(notes) == 1  # nothing is lost, so nothing is said
+    assert len(notes) == 1  # nothing is lost, so nothing is reported
 
 
 def test_the_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_up_axes(body: Figure, world: str, up: str, turn: np.ndarray, tmp_path: 
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, world_up=world, up=up)
     assert_places(found, animation, 100.0, turn)
-    # With all channels 0 the rest pose stands along the file's up axis.
+    # With all channels 0 the rest pose is upright along the file's up axis.
     height = np.array(found.offsets[found.names.index("left_knee")])
     assert np.abs(height).argmax() == (2 if up == "z" else 1)
     assert f" {up or 'y'} up," in notes[0]
@@ -169,10 +169,10 @@ def test_a_changing_shape_is_reported_with_its_size(tmp_path: Path) -> None:
     )
     assert said and said[2] == found_names[joint]
     assert float(said[1]) == pytest.approx(10 * off.max(), rel=5e-3)  # three digits are told
-    # Nobody else's bones or mesh: the skin in the shape of frame 0, on the joints of frame 7.
+    # Calculated without the exporter: the skin in the shape of frame 0, on the joints of frame 7.
     assert float(said[3]) > float(said[1])
     assert notes[2] == "the shape changes over time: bone lengths are those of frame 0"
-    # The root is where it was; the others hang from it in the first frame's shape.
+    # The root is unchanged; the others follow it in the first frame's shape.
     np.testing.assert_allclose(
         found.places(7)["pelvis"], 100 * joints_of(changing)[7, 0], atol=1e-5
     )

@@ -20,11 +20,11 @@ from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 
-EXACT = 1e-12  # metres; sums of a few dozen numbers below 2
+EXACT = 1e-12  # metres; sums of a few dozen values below 2
 
 
 def write(tmp_path, actor, name="out.npz"):
-    """Return the arrays; those with Python objects in them cannot be read."""
+    """Write and return the arrays; object arrays are refused."""
     export(actor, tmp_path / name)
     with np.load(tmp_path / name, allow_pickle=False) as archive:
         return dict(archive)
@@ -42,7 +42,7 @@ def test_every_part_is_named(tmp_path):
     assert arrays["parents"].tolist() == [-1, 0]
     assert_array_equal(arrays["joints"], [[0, 0, 0], [1, 0, 0]])
     assert arrays["vertices"].dtype == arrays["world"].dtype == np.float64
-    assert arrays["own_numbers"].tolist() == [0] * 6  # DOFs, where a file has no other numbers
+    assert arrays["own_numbers"].tolist() == [0] * 6  # DOFs, if there are no other values
 
 
 def test_world_matrices_hold_the_joints(tmp_path):
@@ -50,7 +50,7 @@ def test_world_matrices_hold_the_joints(tmp_path):
     actor.pose.dofs[:] = 0, 0, np.pi / 2, 0, np.pi / 2, 0  # root about z, tip about y
     actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [0, 0, 3]
     arrays = write(tmp_path, actor)
-    # The tip is at (1, 0, 0), turned to (0, 1, 0), twice as far, and 3 higher.
+    # The tip is at (1, 0, 0), rotated to (0, 1, 0), scaled by 2, and moved up by 3.
     assert_allclose(arrays["joints"], [[0, 0, 3], [0, 2, 3]], rtol=0, atol=EXACT)
     assert_array_equal(arrays["world"][:, :3, 3], arrays["joints"])
     about_z = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])

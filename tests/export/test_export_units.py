@@ -1,4 +1,4 @@
-"""Figures in centimetres and other units, through every writer that knows units."""
+"""Figures in centimetres and other units, through every writer that handles units."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_a_requested_unit_is_used_without_a_note(walk, tmp_path, capsys, unit, m
 
 
 def test_the_error_in_millimetres_uses_the_unit_of_the_file(tmp_path):
-    # 0.04 of a centimetre is rounded away from each place: 0.4 mm along each axis that has it.
+    # Rounding removes 0.04 cm from each coordinate that has it: 0.4 mm along each axis.
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.array([[0, 0, 0], [0, 100.0, 0]]))
     turns = np.tile([0.0, 0, 0, 1], (1, 2, 1))
     shifts = np.array([[[7.04, 0.0, 0.0], [0.0, 0.0, 0.0]]])
@@ -138,7 +138,7 @@ ROOT = np.array([1.0, 95.0, 2.0])  # centimetres: J0
 
 
 def smpl_animation(unit="cm", n_frames=3):
-    """Return a bare skeleton with SMPL's joints, its places and its root's rotations."""
+    """Return a bare skeleton with SMPL's joints, its joint positions and its root rotations."""
     names = FAMILY[24].names
     joints = ROOT + np.arange(24)[:, None] * [0.0, 3.0, 0.5]
     parents = np.arange(24) - 1

@@ -1,4 +1,4 @@
-"""glTF files of one pose, read back by a reader of the tests that checks the specification."""
+"""glTF files of one pose, read back by a separate reader that checks the specification."""
 
 import io
 from dataclasses import replace
@@ -113,7 +113,7 @@ def test_body_is_baked_in_shape_and_pose(tmp_path):
         "not held by glTF: 10 blend shapes as such, pose correctives, the symmetry map, the joint "
         "regressor",
     ]
-    # The place is above the skeleton, and moves nothing else.
+    # The placement is a node above the skeleton, and moves nothing else.
     node = gltf.nodes[gltf.named(actor.figure.name)]
     assert node["translation"] == [0.5, -1, 2] and node["scale"] == [1.25] * 3
 
@@ -201,7 +201,7 @@ def test_morphs_are_targets(tmp_path):
     assert mesh["weights"] == [0.5, -1] and mesh["extras"]["targetNames"] == ["lift", "wide"]
     target = mesh["primitives"][0]["targets"][0]
     assert gltf.accessor(target["POSITION"]).tolist()[1] == [0, 0, 2]
-    # The normal (0, 3, 4) is written at a fifth of its length, and so is what is added to it.
+    # The normal (0, 3, 4) is normalised, so it and its morph offset are divided by 5.
     assert_allclose(gltf.accessor(target["NORMAL"])[1], [0, -0.6, -0.6], rtol=0, atol=EXACT)
     assert notes[1:] == ["2 blend shapes are morph targets", "not held by glTF: 1 blend shape"]
 
@@ -243,7 +243,7 @@ def test_points_without_triangles_and_empty_figures(tmp_path):
     actor = seamed_actor(mesh=Mesh(POSITIONS, np.zeros((5, 3)), np.zeros((0, 3))), unit="m")
     gltf, _ = write(tmp_path, actor)
     assert_allclose(gltf.vertices()[0], POSITIONS, rtol=0, atol=0)
-    assert gltf.vertices()[1].tolist() == [[0, 1, 0]] * 5  # where nothing has a normal
+    assert gltf.vertices()[1].tolist() == [[0, 1, 0]] * 5  # where no vertex has a normal
     mesh = Mesh(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
     skeleton = ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3)))
     skin = skin_from_lists([], np.eye(4)[None])

@@ -1,4 +1,4 @@
-"""glTF animations, played by a reader of the tests and held to the poses they were made from."""
+"""glTF animations, played by a separate reader and compared with the original poses."""
 
 import json
 from dataclasses import replace
@@ -29,7 +29,7 @@ from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning, deform
 
 LIMIT = "not held by glTF"
-ROOM = 3e-5  # metres: keys in single precision, one behind the other down a body's longest chain
+ROOM = 3e-5  # metres: keys in single precision, accumulated along a body's longest chain
 
 
 def quaternions(vectors) -> np.ndarray:
@@ -39,7 +39,7 @@ def quaternions(vectors) -> np.ndarray:
 
 
 def roof_animation(rows=None, count=4, rate=10.0, **tracks) -> SampledAnimation:
-    """Return the roof's joints turning more and more about z, on either side of the sphere."""
+    """Return the roof's joints rotating ever further about z, with quaternions of either sign."""
     vectors = np.zeros((count, 2, 3))
     vectors[:, 0, 2] = 0.5 * np.arange(count)
     vectors[:, 1, 2] = -0.25 * np.arange(count)
@@ -83,7 +83,7 @@ def test_frames_are_keys(tmp_path):
         f"{tmp_path / 'out.glb'}: 7 vertices (5 before they were split along texture seams), "
         f"3 triangles, 2 joints, 4 frames (7 to 10) at 10 fps, {size} bytes"
     ]
-    # Whoever does not play it sees the rest pose.
+    # Programs that do not play it show the rest pose.
     assert_drawn(gltf, animation.figure, Actor(animation.figure).pose)
 
 
@@ -102,7 +102,7 @@ def test_moving_rows_get_channels(tmp_path):
     ]
     assert found[2:] == [("root", "translation"), ("roof", "translation"), ("roof", "scale")]
     assert gltf.nodes[gltf.named("tip")]["translation"] == [1, 0, 4]
-    assert len(notes) == 1  # only joints below the root are worth a word
+    assert len(notes) == 1  # only joints below the root are reported
     moves[:, 1, 1] = [0, 1, 0, 1]
     animation = roof_animation(translations=moves)
     gltf, notes = write(tmp_path, animation)
@@ -169,7 +169,7 @@ def test_keyed_clip_is_sampled(tmp_path):
     gltf, notes = write(tmp_path, animation)
     assert "11 frames (0 to 10) at 5 fps" in notes[0]
     rest = gltf.vertices()[0]
-    # Two a second along x, also between frames.
+    # 2 units per second along x, also between frames.
     for time in (0.0, 0.6, 1.1, 2.0):
         found = gltf.vertices(time)[0] - rest
         assert_allclose(found, [[2 * time, 0, 0]] * 3, rtol=0, atol=EXACT)
@@ -182,7 +182,7 @@ def test_fox_moves(tmp_path):
     animation = sample_animation(Actor(figure, clip=clip))
     gltf, _ = write(tmp_path, animation)
     played = 6 - 1
-    # As the frames have it: the fox's own limits are not imposed on a motion.
+    # As in the frames: the fox's joint limits are not applied to a motion.
     skin = figure.skin
     palette = world_frames(figure, animation.frames)[played] @ skin.inverse_bind
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
@@ -269,7 +269,7 @@ def test_skeleton_alone_moves(tmp_path):
     animation = roof_animation(figure=Figure("bare", skeleton=skeleton, unit="m"))
     gltf, _ = write(tmp_path, animation, "bare.gltf")
     assert "meshes" not in gltf.root
-    # The lower joint turns by 0.5 a frame about z.
+    # The lower joint rotates by 0.5 per frame about z.
     place = gltf.world(0.2)[gltf.named("high"), :3, 3]
     assert_allclose(place, [-np.sin(1.0), 1 + np.cos(1.0), 0], rtol=0, atol=EXACT)
 
@@ -291,7 +291,7 @@ def test_other_skinning_is_the_reference_for_losses(tmp_path):
 
 
 def test_long_animations_stay_small_and_exact(tmp_path):
-    """Ten thousand frames: every key is at its place."""
+    """Ten thousand frames: every key has its exact time and value."""
     count = 10_000
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.eye(3)[:2])
     animation = roof_animation(count=count, rate=120.0, figure=Figure("bare", skeleton=skeleton))

@@ -1,4 +1,4 @@
-"""Influences in glTF files, and reported losses of what the format cannot hold."""
+"""Influences in glTF files, and reported losses of data that the format cannot represent."""
 
 from dataclasses import replace
 
@@ -140,7 +140,7 @@ def test_raw_weights_of_an_animal_model(tmp_path):
 def test_distant_meshes_report_single_precision_loss(tmp_path):
     mesh = replace(seamed_mesh(), positions=POSITIONS + np.array([2.0**24 + 1.0, 0, 0]))
     _, notes = write(tmp_path, Actor(Figure("far", mesh, unit="m")))
-    # Above 2^24 single precision knows even numbers only.
+    # Above 2^24 single precision represents even integers only.
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to 1000 mm (vertex 0): the mesh "
         "is far from its origin for glTF's single precision"

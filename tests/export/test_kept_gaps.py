@@ -26,7 +26,7 @@ FILLED = {
 
 
 def moving_roof():
-    """Frames 7 to 10 of a mesh that goes from x = 0 to x = 3; those between are missing."""
+    """Frames 7 and 10 of a mesh that moves from x = 0 to x = 3; those between are missing."""
     figure = seamed_actor(unit="m").figure
     clip = SampledClip(
         "go",
@@ -103,7 +103,7 @@ def test_folders(tmp_path, gaps, rows, note):
 
 
 def test_folders_of_interpolated_frames(tmp_path):
-    # Half-way between two unit quaternions lies their sum, at length 1.
+    # Half-way between two unit quaternions is their normalised sum.
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
     animation = family_animation(family_figure("smpl", tmp_path), motion)
     export_animation(animation, tmp_path / "out", "easymocap", MotionOptions(gaps="interpolate"))

@@ -38,11 +38,11 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
 from viewer.rig.units import METRES
 
-TOLD = 5e-3  # three digits are told
+TOLD = 5e-3  # messages give three digits
 
 
 def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
-    """Return the only measured error: of joints and vertices, size in mm and place."""
+    """Return the only measured error: of joints and vertices, its size in mm and location."""
     measured = errors(notes)
     assert len(measured) <= 1
     found = {}
@@ -57,7 +57,7 @@ def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
 
 
 def errors(notes: list[Diagnostic]) -> list[Diagnostic]:
-    """Return the measured errors of whole files."""
+    """Return the measured errors that apply to whole files."""
     keys = ("X002.joints", "X002.vertices", "X002.both")
     return [note for note in notes if note.key in keys]
 
@@ -73,7 +73,7 @@ def write(
 
 @pytest.mark.parametrize("unit", ["m", "cm", "in"])
 def test_bvh_reports_joint_and_skin_error_where_bones_stretch(tmp_path, unit):
-    """Each bone grows by 0.1, so the highest joint is 0.2 away, and what it carries 0.5."""
+    """Each bone grows by 0.1, so the highest joint is off by 0.2, and its vertex by 0.5."""
     animation = chain_animation(unit)
     found = said(write(animation, tmp_path, "bvh", "a.bvh", digits=9))
     metres = {"m": 1.0, "cm": 0.01, "in": 0.0254}[unit]
@@ -81,7 +81,7 @@ def test_bvh_reports_joint_and_skin_error_where_bones_stretch(tmp_path, unit):
         "joints": (pytest.approx(200 * metres, rel=TOLD), f"high, frame {WORST}"),
         "vertices": (pytest.approx(500 * metres, rel=TOLD), f"vertex 3, frame {WORST}"),
     }
-    # So says a second reader: the file has the first frame's bones, turned by a right angle.
+    # Verified by a second reader: the file has the first frame's bones, rotated by 90 degrees.
     file = PlainBvh(tmp_path / "a.bvh")
     scale = metres / 0.01
     for joint, name in enumerate(NAMES):
@@ -129,7 +129,7 @@ def test_gltf_reports_the_same_loss_for_the_baked_shape(tmp_path):
 
 @pytest.mark.slow
 def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
-    """SMPL-X, faces that move: what a skin on the file's joints lacks, by plain formulas."""
+    """SMPL-X with expressions: the error of a skin on the file's joints, by plain formulas."""
     figure = replace(family_figure("smplx", tmp_path), correctives=None)
     motion = family_motion(55, frames=12, expression=4.0 * waves(12, 10, seed=5.0))
     animation = family_animation(figure, motion)
@@ -164,7 +164,7 @@ def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
 
 
 def weighted(weights, count: int, peak: int, far: float) -> SampledAnimation:
-    """Return points at the origin of a joint each; the last joint jumps aside in one frame."""
+    """Return one point at the origin of each joint; the last joint jumps aside in one frame."""
     n_joints = len(weights[0])
     joints = np.zeros((n_joints, 3))
     points = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -238,11 +238,11 @@ def test_negligible_influences_are_reported_without_an_error(tmp_path):
     assert ("X005.influences", {"most": 5}) in faults.told(notes)
 
 
-# Formats without a place for something
+# Formats that cannot store some data
 
 
 def test_amass_and_easymocap_report_omissions(tmp_path):
-    """A knee that comes out of its joint by 0.25 m, with all below it, is not in the file."""
+    """A knee translated by 0.25 m, with all joints below it, is not in the file."""
     figure = family_figure("smpl", tmp_path)
     knee = figure.skeleton.names.index("left_knee")
     rotations = np.tile([0.0, 0, 0, 1], (40, 24, 1))
@@ -257,7 +257,7 @@ def test_amass_and_easymocap_report_omissions(tmp_path):
 
 
 def test_anim_reports_the_mesh_error_too(tmp_path):
-    """A tip a metre long, turned by 1 radian where its limit is 0.5: 2 sin 0.25 away."""
+    """A tip a metre long, rotated by 1 radian where its limit is 0.5: off by 2 sin 0.25."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, "x", 0.0), (1, "y", 0.0), (1, "z", 0.0, -0.5, 0.5)]
     offsets = np.array([[0.0] * 3, [0.0, 1.0, 0.0]])
@@ -294,7 +294,7 @@ def test_lossless_exports_report_nothing(tmp_path):
 
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "skel"])
 def test_still_bodies_in_another_shape_lose_nothing(tmp_path, suffix):
-    """Correctives add nothing at rest, so nothing is off by 0 mm either."""
+    """Correctives add nothing at rest, so no error is reported, not even 0 mm."""
     np.savez(tmp_path / "body.npz", **model("smplx"))
     actor = viewer.load(tmp_path / "body.npz").actors[0]
     actor.pose.shape_weights[:3] = 2.0, -1.0, 0.5
@@ -305,7 +305,7 @@ def test_still_bodies_in_another_shape_lose_nothing(tmp_path, suffix):
 
 
 def test_corrective_loss_is_taken_from_the_worst_frame(tmp_path):
-    """More frames than are looked at at once, by all of them the slow way."""
+    """More frames than one batch, compared with a slow evaluation of every frame."""
     figure = family_figure("smpl", tmp_path)
     animation = family_animation(figure, family_motion(24, frames=150))
     notes = write(animation, tmp_path, "gltf", "a.glb")
@@ -323,7 +323,7 @@ def test_corrective_loss_is_taken_from_the_worst_frame(tmp_path):
 
 
 def spike(at: float) -> SampledAnimation:
-    """Return the chain moved along x, by 3 m at one key and back, a frame a second."""
+    """Return the chain moved along x, by 3 m at one key and back, at one frame per second."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     skeleton = hand_made.skeleton([-1], rows, None, [[0.0] * 3])
     mesh = Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]]))
@@ -337,7 +337,7 @@ def spike(at: float) -> SampledAnimation:
 
 @pytest.mark.parametrize("at", [1.25, 2.5])
 def test_a_peak_between_frames_is_reported(tmp_path, at):
-    """Frames on both sides of the peak lie on its flanks; straight between them is lower."""
+    """The frames around the peak lie on its flanks; a straight line between them is lower."""
     animation = spike(at)
     before, after = np.floor(at), np.ceil(at)
     ends = 3.0 * before / at, 3.0 * (4.0 - after) / (4.0 - at)
@@ -353,7 +353,7 @@ def test_a_peak_between_frames_is_reported(tmp_path, at):
 
 
 def test_captures_at_another_rate_report_dropped_frames(tmp_path):
-    """Every second frame is written; the one between stands 2 m aside."""
+    """Every second frame is written; in the one between, the figure stands 2 m aside."""
     moves = np.zeros((7, 3))
     moves[3, 0] = 2.0
     figure = chain_animation().figure
@@ -368,7 +368,7 @@ def test_captures_at_another_rate_report_dropped_frames(tmp_path):
 
 
 def test_upside_down_motions_are_compared_as_written(tmp_path):
-    """Turned over, a capture at another rate still differs by what it leaves out alone."""
+    """Upside down, a resampled capture still differs only by the frames that it leaves out."""
     moves = np.zeros((7, 3))
     moves[:, 1] = np.arange(7)
     moves[3, 0] = 2.0

@@ -1,4 +1,4 @@
-"""Materials in files of other programs: every field of glTF, and of the PBR extension of .mtl."""
+"""Materials in exported files: every field of glTF, and of the PBR extension of .mtl."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ def test_gltf_keeps_every_field(tmp_path):
     assert set(gltf.root["extensionsUsed"]) == set(material["extensions"])
     assert (material["alphaMode"], material["alphaCutoff"]) == ("MASK", 0.75)
     assert material["doubleSided"] is False
-    # The two pictures are written once each.
+    # Both images are written once.
     assert len(gltf.root["images"]) == 2
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_gltf_places_textures_as_they_were(tmp_path, angle):
-    """T R S of the file's coordinates, whose v is from the first row, gives the same place."""
+    """T R S of the file's coordinates, whose v starts at the first row, gives the same point."""
     cos, sin = math.cos(angle), math.sin(angle)
     matrix = np.array([[2.0 * cos, -3.0 * sin, 0.25], [2.0 * sin, 3.0 * cos, -0.5]])
     material = Material("", Texture("a.png", PICTURE, transform=matrix), is_physical=True)
@@ -103,7 +103,7 @@ def test_gltf_places_textures_as_they_were(tmp_path, angle):
 
 
 def test_gltf_packs_metallic_and_roughness(tmp_path):
-    """Roughness goes into green, metallic into blue; the smaller picture is enlarged."""
+    """Roughness goes into green, metallic into blue; the smaller image is enlarged."""
     metal = Texture("m.png", np.full((1, 1, 4), 40, np.uint8), channel=3)
     rough = Texture("r.png", ORM, channel=0)
     material = Material("", None, None, 1.0, 1.0, metal, rough, is_physical=True)

@@ -1,4 +1,4 @@
-"""Wavefront ``.obj``, read back by a parser of the tests."""
+"""Wavefront ``.obj``, read back by a separate parser."""
 
 import faults
 import numpy as np
@@ -63,7 +63,7 @@ def test_seam_gives_one_vertex_several_texture_coordinates(tmp_path):
     vertices, coordinates, _ = corners(obj)
     assert sorted(set(coordinates[vertices == 1])) == [1, 3]
     assert sorted(set(coordinates[vertices == 2])) == [2, 5]
-    assert len(obj.v) == 5  # none was doubled
+    assert len(obj.v) == 5  # none was duplicated
 
 
 def test_mesh_with_one_coordinate_per_vertex_repeats_its_index(tmp_path):
@@ -91,7 +91,8 @@ def test_posed_vertices_and_normals_are_written(tmp_path):
     actor = seamed_actor()
     actor.pose.dofs[5] = np.pi / 2  # tip about z: joint 1, the sixth DOF
     obj, _ = write(tmp_path, actor)
-    # Vertex 3 is half the root's (1, 2, 1), half (0, 2) from the tip turned to (-2, 0).
+    # Vertex 3 follows the root by half, at (1, 2, 1), and the tip by half, where (0, 2) from it
+    # rotates to (-2, 0).
     expected = POSITIONS.copy()
     expected[3] = [(1 + 1 - 2) / 2, (2 + 0) / 2, (1 + 1) / 2]
     assert_allclose(obj.v, expected, rtol=0, atol=1e-9)
@@ -101,7 +102,7 @@ def test_posed_vertices_and_normals_are_written(tmp_path):
 def test_placed_figure_is_scaled_then_moved(tmp_path):
     actor = seamed_actor()
     actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [10, 0, -1]
-    actor.placement = np.diag([7.0, 7, 7, 1])  # where it stands in the scene is no part of it
+    actor.placement = np.diag([7.0, 7, 7, 1])  # its placement in the scene is not exported
     obj, _ = write(tmp_path, actor)
     assert_allclose(obj.v, 2 * POSITIONS + [10, 0, -1], rtol=0, atol=1e-9)
 
@@ -220,7 +221,7 @@ def test_companion_files_have_names_without_blanks(tmp_path, stem):
     assert names(tmp_path) == sorted([f"{stem}.obj", library, picture])
 
 
-# Figures that lack something
+# Figures with missing parts
 
 
 def test_mesh_without_joints_is_written_unchanged(tmp_path):

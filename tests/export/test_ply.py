@@ -1,4 +1,4 @@
-"""Binary ``.ply``: header and every byte behind it, read back by a parser of the tests."""
+"""Binary ``.ply``: the header and every byte after it, read back by a separate parser."""
 
 import faults
 import numpy as np

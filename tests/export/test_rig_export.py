@@ -24,11 +24,11 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning, deform, joint_matrices
 
-EXACT = 1e-12  # metres; sums of a few dozen numbers below 2
+EXACT = 1e-12  # metres; sums of a few dozen values below 2
 
 
 def there_and_back(actor, folder, **skinning):
-    """Return the actor that the two files hold, and what the exporter said."""
+    """Return the actor read from the two files, and the exporter's messages."""
     notes = export(actor, folder / "rig.skel", Skinning(**skinning))
     scene = viewer.load(*sorted(folder.glob("rig.sk*")))
     known = re.compile("drawn untextured$|do not sum to 1 .*; used as stored$")
@@ -37,7 +37,7 @@ def there_and_back(actor, folder, **skinning):
 
 
 def told_error(notes):
-    """Return the largest error of the vertices, number and unit; 0 if there is none."""
+    """Return the largest reported vertex error, value and unit; 0 if there is none."""
     measured = [note for note in notes if note.code == "X002"]
     if not measured:
         return 0.0, ""
@@ -48,7 +48,7 @@ def told_error(notes):
 
 
 def parts_not_held(notes):
-    """Return the parts of the figure that the files do not hold."""
+    """Return the parts of the figure that the files cannot store."""
     return [part for note in notes if note.key == "X003.parts" for part in note.values["parts"]]
 
 
@@ -95,7 +95,7 @@ def test_reported_error_is_that_of_the_omitted_correctives(tmp_path, body):
     plain = smpl_forward(arrays, SHAPE, numbers, correct=False)[0]
     worst = 1000 * np.linalg.norm(whole - plain, axis=1).max()
     assert worst > 1
-    assert told_error(notes) == (pytest.approx(worst, rel=5e-3), "mm")  # three digits are told
+    assert told_error(notes) == (pytest.approx(worst, rel=5e-3), "mm")  # messages give three digits
     assert_allclose(vertices(again), plain, rtol=0, atol=EXACT)
 
 
@@ -128,7 +128,8 @@ def test_weights_follow_their_joints_into_the_new_order(tmp_path, body):
 
 
 def test_joints_are_listed_depth_first(tmp_path):
-    # 0 has 1 and 2; 1 has 3 and 5; 2 has 4: breadth-first in, depth-first out.
+    # The children of 0 are 1 and 2, of 1 are 3 and 5, of 2 is 4: breadth-first input, depth-first
+    # output.
     joints = ball_skeleton(tuple("abcdef"), np.array([-1, 0, 0, 1, 2, 1]), np.eye(6, 3))
     actor = Actor(Figure("tree", skeleton=joints))
     again, _ = there_and_back(actor, tmp_path)
@@ -143,7 +144,7 @@ def test_several_roots_stay_roots(tmp_path):
     again, _ = there_and_back(actor, tmp_path)
     assert again.figure.skeleton.names == ("a", "c", "b")
     found = joint_matrices(again.figure, again.pose)[:, :3, 3]
-    # a and c as they were, then b, all moved.
+    # a and c unchanged, then b, all moved.
     assert_allclose(found, [[6, 6, 7], [5, 6, 8], [5, 7, 7]], rtol=0, atol=EXACT)
 
 
@@ -185,7 +186,7 @@ def test_boxes_are_kept_or_generated(tmp_path):
     assert_array_equal(again.figure.skeleton.boxes, boxes)
     again, _ = there_and_back(seamed_actor(), tmp_path)
     sizes = again.figure.skeleton.boxes[:, 1] - again.figure.skeleton.boxes[:, 0]
-    assert (sizes > 0).all() and (sizes < 0.2).all()  # small beside a bone of length 1
+    assert (sizes > 0).all() and (sizes < 0.2).all()  # small relative to a bone of length 1
 
 
 # Place
@@ -220,7 +221,7 @@ def test_error_of_a_figure_without_unit_is_relative_to_its_size(tmp_path, monkey
     actor = seamed_actor()
     actor.pose.figure_scale = 1.5
     _, notes = there_and_back(actor, tmp_path)
-    # The box of the mesh reaches from (0, 0, 0) to (3, 3, 3): its diagonal is sqrt(27), too.
+    # The box of the mesh reaches from (0, 0, 0) to (3, 3, 3): its diagonal is sqrt(27) as well.
     assert told_error(notes) == (pytest.approx(50, rel=5e-3), "% of the size")
 
 
@@ -249,7 +250,7 @@ def test_error_caused_by_raw_weights_is_reported(tmp_path):
     actor = viewer.load(write_pig(tmp_path / "pig", skinning_weights=rows)).actors[0]
     actor.pose.figure_translation[:] = 3, 4, 0
     _, notes = there_and_back(actor, tmp_path)
-    # As part of the skin only half of the 5 m reach vertex 0.
+    # As part of the skin only half of the 5 m apply to vertex 0.
     assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
     lost = ["part-up", "part-body-parts", "part-symmetry", "part-reduced", "part-regressor"]
     assert [part.key for part in parts_not_held(notes)] == lost
@@ -273,8 +274,8 @@ def test_loss_of_dual_quaternions_is_reported(tmp_path):
     actor = seamed_actor(weights=weights, unit="m")
     actor.pose.dofs[3] = np.pi / 2  # the tip about x, the line through both joints
     _, notes = there_and_back(actor, tmp_path, method="dqs")
-    # DQS turns by 45 degrees and keeps the distance r from the line, LBS draws in to r cos 45;
-    # farthest out is vertex 4, sqrt(18) from the line.
+    # DQS rotates by 45 degrees and preserves the distance r from the line, LBS reduces it to r cos
+    # 45; the farthest vertex is 4, sqrt(18) from the line.
     gap = 18**0.5 * (1 - 0.5**0.5)
     assert told_error(notes) == (pytest.approx(1000 * gap, rel=5e-3), "mm")
 
@@ -295,7 +296,7 @@ def test_texture_is_copied_too(tmp_path):
     assert_array_equal(again.figure.mesh.materials[0].image, PICTURE)
 
 
-# What the format cannot hold
+# Data that the format cannot represent
 
 
 def refused(actor, folder, error=RigError):

@@ -1,4 +1,4 @@
-"""Rigged meshes as files: all of them or none, and correctives where there is no place for them."""
+"""Rigged meshes as files: all or none, and correctives in formats that cannot store them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from viewer.rig.skinning import deform
 
 @pytest.fixture(scope="module")
 def rigged():
-    """A bent arm with correctives, whose own mesh got its rig back."""
+    """A bent arm with correctives, rigged onto its own mesh."""
     plain = arm()
     offsets = np.random.default_rng(4).normal(scale=0.02, size=(9, plain.mesh.n_vertices, 3))
     template = Figure(
@@ -66,7 +66,7 @@ def test_skel_rig_matches_the_target_and_reports_losses(rigged, tmp_path):
     assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
     files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
     actor = viewer.load(*files).actors[0]
-    # The text formats hold six digits after the point or more.
+    # The text formats have six or more decimals.
     assert_allclose(deform(actor.figure, actor.pose)[0], target.positions, atol=1e-5)
 
 

@@ -1,4 +1,4 @@
-"""Exporters whose disk is full, whose folder is locked, whose target is odd: nothing is lost."""
+"""Exporters with a full disk, a locked folder or an unusual target: nothing is lost."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from viewer.formats import all_or_none, save_text
 from viewer.media import saving
 
 SUFFIXES = [kind.suffixes[0] for kind in EXPORTERS.values() if kind.writes_pose]
-# Files that each one writes for the figure below, which has two pictures.
+# Files that each exporter writes for the figure below, which has two textures.
 SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1}
-# What is there already, by the suffix of the output.
+# Existing files, by the suffix of the output.
 BESIDE = {".skel": (".skin",)}
 
 
@@ -42,7 +42,7 @@ def contents(folder):
 
 
 class Fault:
-    """Lets the n-th call of a step fail, and all after it where a disk stays full."""
+    """Makes the n-th call of a step fail, and all later ones if the disk stays full."""
 
     def __init__(self, monkeypatch, step: str, number: int) -> None:
         self.calls, self.number, self.step = 0, number, step
@@ -78,7 +78,7 @@ class Fault:
 
 
 class HalfWay:
-    """A stream that calls something when half of the bytes are written."""
+    """A stream that calls a function when half of the bytes are written."""
 
     def __init__(self, stream, meet) -> None:
         self.stream, self.meet = stream, meet
@@ -144,7 +144,7 @@ def test_interrupt_keeps_existing_files(rig, tmp_path, monkeypatch, capsys, suff
     assert contents(folder) == before
 
 
-# Odd targets
+# Unusual targets
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -169,7 +169,7 @@ def test_folder_that_cannot_be_written_is_refused(rig, tmp_path, capsys, suffix)
     folder.mkdir()
     folder.chmod(0o555)
     if os.access(folder, os.W_OK):
-        folder = Path("/proc")  # root writes anywhere but into a file system of the kernel's own
+        folder = Path("/proc")  # root can write anywhere except in a kernel file system
     assert run(["convert", *rig, "-o", str(folder / f"person{suffix}")]) == 5
     error = capsys.readouterr().err
     assert error.startswith(f"viewer: {folder}/") and error.count("\n") == 1

@@ -1,4 +1,4 @@
-"""Text of ``.anim`` files for tests, and their reading."""
+"""``.anim`` files as text for tests, and functions that read them."""
 
 from faults import Fault, warnings_of
 

@@ -1,4 +1,4 @@
-"""Small files for tests of faults, and tolerant reading of them."""
+"""Small files for tests of errors, and functions that read them tolerantly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Refusals of BVH texts."""
+"""Refusals of BVH files given as text."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ Frame Time: 0.0333333
 
 
 def read(text: str | bytes) -> tuple[SkeletonMotion, list[Fault | Phrase]]:
-    """Read a text; return also its warnings as (key, line, values), and what was guessed."""
+    """Read a text; also return its warnings as (key, line, values), and the estimates."""
     data = text if isinstance(text, bytes) else text.encode()
     source = Source("a.bvh", data)
     motion = bvh.read(source)

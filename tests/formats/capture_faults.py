@@ -1,4 +1,4 @@
-"""Faults that EasyMocap folders with one broken frame are read with."""
+"""Errors reported for EasyMocap folders with one broken frame."""
 
 from capture_files import body, noticed, opened, points, write_frames
 

@@ -13,7 +13,7 @@ from viewer.formats.easymocap import open_capture
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
-    """Return numbers from -0.6 to 0.6 with three decimals, all different."""
+    """Return values from -0.6 to 0.6 with three decimals, all different."""
     count = int(np.prod(shape))
     return np.round(0.6 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3), 3).reshape(shape)
 

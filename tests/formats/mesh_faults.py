@@ -1,4 +1,4 @@
-"""Meshes with one fault each, and the fault that is noted."""
+"""Meshes with one error each, and the error reported for it."""
 
 from __future__ import annotations
 

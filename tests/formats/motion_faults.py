@@ -1,4 +1,4 @@
-"""Skeletons and motions with one fault each, and the fault that is noted."""
+"""Skeletons and motions with one error each, and the error reported for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bytes of ``.npz`` and ``.npy`` files for tests, and their reading."""
+"""``.npz`` and ``.npy`` files as bytes for tests, and functions that read them."""
 
 from __future__ import annotations
 

@@ -23,12 +23,12 @@ PATH = Path("model.pkl")
 
 
 def opened(data: bytes) -> Archive:
-    """Return the archive of some bytes, without a file."""
+    """Return the archive opened from bytes, without a file."""
     return open_archive(Source(PATH, data))
 
 
 def refusal(data: bytes) -> Fault:
-    """Return the refusal of some bytes, which must name the file."""
+    """Return the refusal of bytes, which must name the file."""
     with pytest.raises(FormatError) as caught:
         archive = opened(data)
         for key in archive.keys:

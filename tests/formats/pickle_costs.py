@@ -1,4 +1,4 @@
-"""What reading of a pickle may cost."""
+"""Limits on the cost of reading a pickle."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """A PIG model of five vertices and three joints for tests, and functions that read it.
 
-Two triangles share the edge from vertex 1 to vertex 2; on the texture they are apart, so that
-these two vertices have two texture coordinates each. Vertex 4 belongs to no triangle. All
-numbers are whole multiples of a quarter, for sums by hand.
+Two triangles share the edge from vertex 1 to vertex 2; in the texture they are separate, so that
+these two vertices have two texture coordinates each. Vertex 4 belongs to no triangle. All values
+are multiples of a quarter, for hand calculation.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def refusal(path):
 
 
 def arrays(*, dense=True):
-    """Return the same model as an archive holds it, matrices as dense (3, 5) arrays."""
+    """Return the same model as the arrays of an archive, matrices as dense (3, 5) arrays."""
     given = {
         name.removesuffix(".txt"): np.array([row.split() for row in text.splitlines()], float)
         for name, text in GOOD.items()

@@ -1,4 +1,4 @@
-"""Reading of pose files for tests."""
+"""Functions that read pose files for tests."""
 
 from faults import warnings_of
 

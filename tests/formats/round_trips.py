@@ -1,4 +1,4 @@
-"""Figures written and read again, and their comparison."""
+"""Writing and reading figures, and comparing them."""
 
 import math
 import tempfile
@@ -62,5 +62,5 @@ def assert_equal_meshes(found, wanted):
 def assert_equal_skins(found, wanted):
     for name in ("starts", "joints", "weights"):
         assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
-    # The file holds the bindings, not their inverses.
+    # The file stores the bind matrices, not their inverses.
     assert_allclose(found.inverse_bind, wanted.inverse_bind, rtol=1e-12, atol=1e-12)

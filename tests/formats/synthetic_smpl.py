@@ -126,7 +126,7 @@ def _rounded(values: np.ndarray, bits: int = 24) -> np.ndarray:
 
 
 def _waves(seed: float, *shape: int) -> np.ndarray:
-    """Return numbers from -1 to 1 that do not repeat along any axis."""
+    """Return values from -1 to 1 that do not repeat along any axis."""
     indices = np.indices(shape, dtype=float) + 1.0
     phase = np.full(shape, seed)
     for axis, index in enumerate(indices):
@@ -208,7 +208,7 @@ def _order_by_distance(points: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _regressor(template: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Return rows of sixteenths over the nearest vertices and a distant one, to part the joints."""
+    """Return rows of sixteenths over the nearest vertices and a distant one, to separate joints."""
     regressor = np.zeros((len(targets), len(template)))
     nearest = _order_by_distance(targets, template)
     for joint, row in enumerate(regressor):

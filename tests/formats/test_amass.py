@@ -257,7 +257,7 @@ def test_empty_motions_are_refused(tmp_path, arrays, key):
     assert fault_of(caught.value.diagnostic) == fault
 
 
-# The same thing twice
+# The same data twice
 
 
 @pytest.mark.parametrize(
@@ -321,7 +321,7 @@ def test_unknown_keys_are_named(tmp_path):
     assert motion_of(path)[1] == [("F007.motion-keys", None, {"keys": ["contact"]})]
 
 
-# Broken
+# Broken files
 
 
 @pytest.mark.parametrize(

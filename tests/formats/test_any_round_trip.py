@@ -38,7 +38,7 @@ def skeletons(draw):
     n_joints = draw(st.integers(1, 8))
     parents, path = [-1], [0]
     for joint in range(1, n_joints):
-        # Depth-first: a parent is the joint before, one of its ancestors, or none.
+        # Depth-first: a parent is the previous joint, one of its ancestors, or none.
         parent = draw(st.sampled_from([-1, *path]))
         path = [*path[: path.index(parent) + 1], joint] if parent >= 0 else [joint]
         parents.append(parent)

@@ -142,7 +142,7 @@ def test_single_array(tmp_path: Path) -> None:
 
 
 def test_single_array_may_end_like_text(tmp_path: Path) -> None:
-    """A byte 26 ends a text file, but not an array."""
+    """Byte 26 ends a text file, but not an array."""
     path = tmp_path / "x.npy"
     np.save(path, np.array([1, 26], np.uint8))
     source = Source.open(path)

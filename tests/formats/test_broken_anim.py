@@ -1,4 +1,4 @@
-"""``.anim`` files with faults: refused with their line, or read with a warning."""
+"""``.anim`` files with errors: refused with their line, or read with a warning."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""EasyMocap keypoints with faults, and the lines at which records have theirs."""
+"""EasyMocap keypoints with errors, and the lines of the errors in records."""
 
 import json
 
@@ -111,7 +111,7 @@ def test_the_line_of_a_record_is_named_where_a_key_is_missing(tmp_path):
         ('{"a": {"b": 1},\n"b": 2}', ("b",), 2),  # not the one inside
         ('{"a": "b",\n"b": 2}', ("b",), 2),  # nor a value of that name
         ("[[1,\n2],\n[3]]", (1, 0), 3),
-        ('["}",\n"\\"]",\n3]', (2,), 3),  # brackets and quotes in texts
+        ('["}",\n"\\"]",\n3]', (2,), 3),  # brackets and quotes in strings
         ('[{"a": []},\n{"a": 1}]', (1, "b"), 2),  # its record
         ("[]", (0,), None),
     ],

@@ -201,7 +201,7 @@ def test_vertices_without_weights_stay_in_the_rest_pose(folder):
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = 1.0
     assert_array_equal(deform(figure, pose)[0][[1, 3]], [[1, 0, 0], [1, 1, 0]])
-    # They would not move if the weights were normalised either.
+    # They would not move with normalised weights either.
     assert dict(figure.facts)["normalising"] == "would move rest vertices by up to 0.00 mm"
     assert dict(figure.facts)["weights"] == "raw; their sums are 1.000 to 1.000"
 

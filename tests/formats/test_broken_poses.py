@@ -1,4 +1,4 @@
-"""Pose files with faults: refused with code, place and values."""
+"""Pose files with errors: refused with code, location and values."""
 
 from pathlib import Path
 

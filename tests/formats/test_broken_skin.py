@@ -1,4 +1,4 @@
-"""Broken ``.skin`` files with the fault that each is refused for, and large files."""
+"""Broken ``.skin`` files with the error that each is refused for, and large files."""
 
 import tracemalloc
 from pathlib import Path

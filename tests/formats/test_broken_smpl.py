@@ -37,7 +37,7 @@ def refusal_of(path):
 
 
 def changed(key, index, value, dtype=np.float64):
-    """Return one array of the model with a single number changed."""
+    """Return one array of the model with a single value changed."""
     array = SMPL[key].astype(dtype)
     array[index] = value
     return {key: array}
@@ -104,7 +104,7 @@ def table(*parents):
         ({"kintree_table": np.zeros(0)}, ("F002.value", None, {"item": "kintree_table",
          "expected": Phrase("wanted-numbers", shape=(2, "J")), "found": Phrase("found-array",
          shape=(0,), dtype="float64")})),
-        # Invalid numbers
+        # Invalid values
         (changed("v_template", (3, 1), np.nan), ("F003.finite", None, {"item": "v_template",
          "found": NAN, "at": Phrase("row-vertex", index=3)})),
         (changed("v_template", slice(4), np.inf), ("F003.finite", None, {"item": "v_template",

@@ -1,4 +1,4 @@
-"""Mutated or truncated BVH files, or with inserted words: a motion or one line."""
+"""BVH files mutated, truncated or with inserted words: each gives a motion or one line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_name_with_control_characters_stays_on_one_line() -> None:
 
 
 def check(data: bytes) -> None:
-    """Read a file; if it loads, it must also move."""
+    """Read a file; if it loads, playing it must work too."""
     source = Source("dir/a.bvh", data)
     try:
         motion = bvh.read(source)

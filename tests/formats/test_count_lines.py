@@ -1,4 +1,4 @@
-"""Wrong counts are refused at the line of the count, with both numbers."""
+"""Wrong counts are refused at the line of the count, with both values."""
 
 import pytest
 from bvh_text import GOOD as BVH

@@ -1,4 +1,4 @@
-"""Pickles that are cut short, changed or random: named values or one line."""
+"""Truncated, modified or random pickles: each gives named values or one line."""
 
 from __future__ import annotations
 

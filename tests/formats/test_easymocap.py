@@ -1,4 +1,4 @@
-"""EasyMocap folders: people by number, gaps, all layouts of poses, keypoints, the timeline."""
+"""EasyMocap folders: person ids, gaps, all pose layouts, keypoints, the timeline."""
 
 import json
 

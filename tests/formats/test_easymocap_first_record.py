@@ -1,4 +1,4 @@
-"""A faulty first record: it is a gap, and does not define the layout of the others."""
+"""An invalid first record: it becomes a gap, and does not define the layout of the others."""
 
 import json
 
@@ -12,7 +12,7 @@ INFINITE = json.loads("1e400")
 
 
 def fault_in(parts, path):
-    """Return the line and the text of the only fault."""
+    """Return the line and the text of the only error."""
     ((key, line, values),) = noticed(parts, path)
     assert key == "F007.record"
     return line, values["problem"]

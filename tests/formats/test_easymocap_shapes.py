@@ -62,7 +62,7 @@ def test_last_valid_shapes_are_kept(tmp_path):
     values = [None, 1.0, None, 2.0, float("nan"), None, None, 4.0]
     write_frames(tmp_path / "smpl", {frame: record(value) for frame, value in enumerate(values)})
     _, parts, _ = opened(tmp_path)
-    # The record with an invalid number is a gap, and its shape is not repeated.
+    # The record with an invalid value is a gap, and its shape is not repeated.
     assert rows_of(parts, 0) == [0, 1, 2, 3, 5, 6, 7]
     found = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 4.0]
     rows = [part.bodies[0] for part in parts]

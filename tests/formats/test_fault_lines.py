@@ -1,6 +1,6 @@
 """Refusals of text formats give the line, counted over seeded mutations of tiny files.
 
-Only faults of a whole file have no line: an empty file, or one in no known format.
+Only errors about a whole file have no line: an empty file, or an unknown format.
 """
 
 import json
@@ -65,7 +65,7 @@ def refusal(source):
 
 
 def assert_lines(problems, fewest):
-    """Check the fraction of refusals, each with the refused bytes, that have a line."""
+    """Check which fraction of the refusals, given with the refused bytes, has a line."""
     told = [(problem, data) for problem, data in problems if data.strip()]
     assert len(told) >= fewest
     without = [str(problem) for problem, _ in told if problem.line is None]
@@ -112,7 +112,7 @@ def test_pig_tables(tmp_path):
             name = rng.choice(list(PIG))
             (folder / name).write_bytes(mutate(PIG[name].encode(), rng))
             problem = refusal(Source.open(folder))
-            # Another file may be at fault, as the contents of one restrict those of the others.
+            # Another file may be reported, as the contents of one restrict those of the others.
             problems += [(problem, problem.path.read_bytes())] if problem else []
             (folder / name).write_text(PIG[name])
     assert_lines(problems, TRIES)

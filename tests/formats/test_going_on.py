@@ -1,4 +1,4 @@
-"""Readers that continue after faults: neutral values replace invalid ones."""
+"""Readers that continue after errors: neutral values replace invalid ones."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
     assert "v_template: expected finite numbers, found nan at vertex 3" in texts
     assert "weights: expected finite numbers, found inf at vertex 4" in texts
     assert "weights: vertex 5: expected weights that sum to 1, found 0.5" in texts
-    # Valid rows are scaled to a sum of exactly 1, faulty ones are as in the file.
+    # Valid rows are scaled to a sum of exactly 1, invalid ones are as in the file.
     sums = np.bincount(
         np.repeat(np.arange(figure.skin.n_vertices), np.diff(figure.skin.starts)),
         figure.skin.weights,
@@ -133,7 +133,7 @@ def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_reader_continues_only_after_recoverable_errors(seed: int) -> None:
-    """Files that the strict reader refuses have a fault; files that it accepts have none."""
+    """Files that the strict reader refuses have an error; files that it accepts have none."""
     rng = random.Random(seed)
     texts = {**FILES, "dir/b.skin": SKIN.encode(), "dir/a.obj": OBJ.encode(),
              "dir/a.ply": PLY.encode(), "dir/a.bvh": BVH.encode()}  # fmt: skip

@@ -1,4 +1,4 @@
-"""The work for files with many joints grows linearly with their number.
+"""The work for files with many joints grows linearly with the number of joints.
 
 Function calls are counted for some number of joints and for four times as many; no time is
 measured.
@@ -21,7 +21,7 @@ from viewer.rig.posing.pose_record import record_of
 from viewer.rig.skeleton import ball_skeleton, dof_label, dof_labels, joint_labels
 
 FEW, MANY = 200, 800
-LINEAR = 4.4  # times the work for four times the joints, as part of it is constant
+LINEAR = 4.4  # ratio of the work for four times the joints; less than 4 if part of it is constant
 SKEL = "balljoint j{} {{\n offset 0 1 0\n rotxlimit -1 1\n pose 0.5 0 0\n"
 BVH = "j{}\n{{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
 

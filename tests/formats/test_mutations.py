@@ -95,7 +95,7 @@ TOKENS = [
 
 
 def check(path, data):
-    """Read one file; if it loads, it must also move."""
+    """Read one file; if it loads, it can also be posed."""
     source = Source(path, data)
     try:
         figure = read(source)
@@ -128,7 +128,7 @@ def move(figure):
 
 
 def star_skeleton(n_joints):
-    """Return a skeleton for a skin that has none: every joint a child of the first."""
+    """Return a skeleton for a skin without one: every joint is a child of the first."""
     return Skeleton(
         names=("",) * n_joints,
         parents=[-1] + [0] * (n_joints - 1),

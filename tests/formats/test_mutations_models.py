@@ -1,4 +1,4 @@
-"""Thousands of broken models and poses: each moves to finite positions or gives one line."""
+"""Thousands of broken models and poses: each is posed to finite positions or gives one line."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""Readers that continue after faults: one fault of each kind, with its place and effect."""
+"""Readers that continue after errors: one error of each kind, with its location and effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pickles of all common writers: their contents are read, as views of the file."""
+"""Pickles by all common writers: arrays are read as views of the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PIG models from a folder of tables or an archive: all files, and all ways to write them."""
+"""PIG models from a folder of tables or an archive: all files, and all spellings."""
 
 import pickle
 
@@ -27,7 +27,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.skinning import deform, joint_matrices
 
-EXACT = 1e-15  # metres; a rounding or two of numbers near 1
+EXACT = 1e-15  # metres; a rounding error or two of values near 1
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def test_weights_are_kept_as_stored(folder):
 def test_fact_reports_the_effect_of_normalising(folder):
     rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.25\n2 3 0.999\n2 4 0.5\n1 4 0.503\n"
     told = facts(silent(write(folder, skinning_weights=rows)))
-    # The last vertex is 3 m from the origin, its sum is 1.003: 9 mm, more than any other.
+    # The last vertex is 3 m from the origin, its weights sum to 1.003: 9 mm, the largest error.
     assert told["normalising"] == "would move rest vertices by up to 9.00 mm"
     assert told["weights"] == "raw; their sums are 0.998 to 1.003"
 
@@ -137,7 +137,7 @@ def test_body_part_names_may_have_blanks_or_be_missing(folder):
 def test_root_uses_euler_angles_and_others_rotation_vectors(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
-    # 90 degrees about z, the root's first number; 90 degrees about x for joint 1.
+    # 90 degrees about z, the root's first value; 90 degrees about x for joint 1.
     numbers = [0, 0, 0, np.pi / 2, 0, 0, np.pi / 2, 0, 0, 0, 0, 0, 1]
     assert apply_record(PoseRecord(vector=np.array(numbers)), figure, pose) == []
     # Joint 2 is at (0, 1, 0.5) from joint 1: about x (0, -0.5, 1), plus (1, 0, 0), about z.
@@ -193,7 +193,7 @@ def test_without_texture_coordinates_the_figure_is_untextured(folder, gone):
     assert warnings == [("F007.pig-texture", None, {})]
 
 
-# Pictures in the folder
+# Images in the folder
 
 RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
 

@@ -33,7 +33,7 @@ def pig(folder):
 
 
 def numbers(joints=None, translation=(0, 0, 0), scale=1.0):
-    """Return the authors' 190 numbers."""
+    """Return the authors' 190 values."""
     vector = np.zeros(190)
     vector[:3], vector[189] = translation, scale
     for joint, turn in (joints or {}).items():
@@ -241,7 +241,7 @@ def test_pose_file_of_190_values_round_trips(pig, folder, tmp_path, separator):
     pose = scene.actors[0].pose
     viewer.write(record_of(pig, pose), tmp_path / "again.txt")
     again = np.loadtxt(tmp_path / "again.txt")
-    # To angles about x, y, z and back: some roundings of numbers near 1.
+    # To angles about x, y, z and back: some rounding errors of values near 1.
     assert_allclose(again, VECTOR, rtol=0, atol=1e-14)
 
 

@@ -1,4 +1,4 @@
-"""Pose files: round trips, smplx's names, faults, and use with a figure."""
+"""Pose files: round trips, smplx's names, errors, and use with a figure."""
 
 import json
 
@@ -37,7 +37,7 @@ def figures(tmp_path_factory):
 
 
 def parts(**values):
-    """Return the record read from these values."""
+    """Return the record read from given values."""
     source = Source("a.json", json.dumps(values).encode())
     return pose.read(source), warnings_of(source.diagnostics)
 
@@ -51,7 +51,7 @@ def waves(count, seed=0.0):
 
 
 def some_pose(figure):
-    """Return a pose in which all numbers differ from the defaults."""
+    """Return a pose in which all values differ from the defaults."""
     posed = rest_pose(figure.skeleton)
     low, high = np.maximum(figure.skeleton.dof_limits.T[0], -1), figure.skeleton.dof_limits.T[1]
     posed.dofs[:] = np.clip(waves(len(posed.dofs)), low, high)
@@ -90,7 +90,7 @@ def test_raw_pose_values_round_trip_as_text(figures, tmp_path, kind):
     assert warnings == []
     found = rest_pose(figure.skeleton)
     apply_record(record, figure, found)
-    # Conversion to rotation vectors and back: some rounding errors of numbers below 2.
+    # Conversion to rotation vectors and back: some rounding errors of values below 2.
     assert_allclose(turns(figure, found), turns(figure, given), rtol=0, atol=1e-14)
 
 

@@ -1,4 +1,4 @@
-"""Poses and pictures that are opened together with a figure."""
+"""Poses and images that are opened together with a figure."""
 
 import json
 
@@ -123,7 +123,7 @@ def test_pose_of_another_figure_is_refused_with_both(files, figure, pose, messag
     assert fault_of(caught.value.diagnostic) == message
 
 
-# Pictures
+# Images
 
 
 def test_image_is_applied_to_the_first_figure_without_a_texture(files):

@@ -1,4 +1,4 @@
-"""Motions beyond the range of single precision, refused at the line of the number."""
+"""Motions beyond the range of single precision, refused at the line of the value."""
 
 import numpy as np
 import pytest

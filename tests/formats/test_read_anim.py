@@ -142,7 +142,7 @@ def test_clip_of_another_skeleton_names_both_dof_counts(tmp_path: Path) -> None:
 
 
 def test_clip_of_a_body_says_why_it_does_not_fit(tmp_path: Path) -> None:
-    """The wasp's 72 channels and SMPL's 72 numbers have different meanings."""
+    """The wasp's 72 channels and SMPL's 72 values have different meanings."""
     np.savez(tmp_path / "smpl.npz", **model("smpl", 32))
     channel = "channel { extrapolate linear linear keys 1 { 0 0 flat flat } } "
     (tmp_path / "a.anim").write_text(f"animation {{ range 1 2 numchannels 72 {72 * channel} }}")

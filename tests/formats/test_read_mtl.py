@@ -1,4 +1,4 @@
-"""Material libraries: the PBR extension, opacity, placement, and what is not understood."""
+"""Material libraries: the PBR extension, opacity, texture placement, and unknown statements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FACE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
 
 @pytest.fixture
 def materials(tmp_path):
-    """Return what reads the materials of a library, and the diagnostics."""
+    """Return a function that reads a library's materials and its diagnostics."""
     rows = {"grey": (128, 64, 32, 255), "white": (255, 255, 255, 255)}
     for name, color in rows.items():
         (tmp_path / f"{name}.png").write_bytes(encode_png(np.full((2, 4, 4), color, np.uint8)))
@@ -64,7 +64,7 @@ def test_older_materials_keep_blinn_phong(materials):
     )
     assert said == []
     assert (plain.base_color, plain.is_physical) == ((0.5, 0.5, 0.5, 1.0), False)
-    # A black colour beside a picture is a habit of exporters.
+    # Exporters often write a black colour together with a texture.
     assert black.base_color is None and white.base_color is None
 
 

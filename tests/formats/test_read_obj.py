@@ -109,7 +109,7 @@ def test_a_concave_quad_is_split_at_its_reflex_corner() -> None:
 
 @pytest.mark.parametrize("turn", range(0, 12, 3))
 def test_a_concave_polygon_is_covered_exactly(turn: int) -> None:
-    # A comb of three teeth: 12 corners, area by the shoelace formula, in a slanted plane.
+    # A comb with three teeth: 12 corners, area by the shoelace formula, in a slanted plane.
     flat = [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3),
             (0, 3)]  # fmt: skip
     flat = flat[turn:] + flat[:turn]
@@ -351,7 +351,7 @@ def test_exported_files_round_trip(tmp_path) -> None:
     written, mesh = actor.figure.mesh, scene.actors[0].figure.mesh
     assert scene.warnings == ()
     posed, normals = viewer.deform(actor.figure, actor.pose)
-    # Nine digits of lengths up to 10.
+    # Nine digits, for lengths up to 10.
     np.testing.assert_allclose(mesh.positions, posed, atol=1e-8)
     np.testing.assert_allclose(mesh.normals, normals, atol=1e-8)
     assert np.array_equal(mesh.triangles, written.triangles)

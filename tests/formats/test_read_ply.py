@@ -329,7 +329,7 @@ def test_exported_files_round_trip(tmp_path) -> None:
     written, mesh = actor.figure.mesh, scene.actors[0].figure.mesh
     assert scene.warnings == ()
     posed, _ = viewer.deform(actor.figure, actor.pose)
-    np.testing.assert_allclose(mesh.positions, posed, atol=1e-6)  # float32 of lengths up to 10
+    np.testing.assert_allclose(mesh.positions, posed, atol=1e-6)  # float32, for lengths up to 10
     assert np.array_equal(mesh.triangles, written.triangles)
     corners = written.triangles if written.uv_triangles is None else written.uv_triangles
     np.testing.assert_allclose(mesh.uvs[mesh.uv_triangles], written.uvs[corners], atol=1e-7)

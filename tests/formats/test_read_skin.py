@@ -213,5 +213,5 @@ def test_ill_conditioned_bind_matrix_is_a_warning():
 def test_far_vertex_is_a_warning():
     figure, warnings = read(GOOD.replace("  0 2 0\n", "  0 1e30 0\n"))
     assert figure.mesh.positions[2].tolist() == [0, 1e30, 0]
-    # Half of three vertices are no cloud: the median distance is 2.
+    # Three vertices are not dense: the median distance is 2.
     assert warnings == ["a.skin:4: stray vertex 2, 1e+30 units from the others"]

@@ -27,7 +27,7 @@ PLY = (
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return a model's folder, with a secret picture next to it, and links that lead there."""
+    """Return a model's folder, with a secret image next to it, and links that lead there."""
     model = tmp_path / "model"
     (tmp_path / "secret").mkdir()
     (model / "sub").mkdir(parents=True)
@@ -87,7 +87,7 @@ def skin_text(name):
 
 
 def write_model(folder, kind, name):
-    """Write a model that names a picture; return its path, and the file and line of the name."""
+    """Write a model that names an image; return its path, and the file and line of the name."""
     path = folder / f"a.{kind}"
     if kind == "obj":
         (folder / "m.mtl").write_text(f"newmtl a\nmap_Kd {name}\n")

@@ -1,4 +1,4 @@
-"""The .rig reader: the names of files that belong together."""
+"""The .rig reader: names of files that belong together."""
 
 from pathlib import Path
 

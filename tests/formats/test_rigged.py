@@ -26,7 +26,7 @@ from viewer.rig.skin import skin_from_lists
 
 
 def glazed() -> Material:
-    """Return a material without a base texture, and with everything else."""
+    """Return a material with every property except a base texture."""
     picture = np.arange(32, dtype=np.uint8).reshape(4, 2, 4)
     rough = Texture("orm.png", picture, channel=1, wrap=("repeat", "mirror"), is_smooth=False)
     bumps = Texture("gone.png", uv_set=1, transform=[[0.5, 0.0, 0.25], [0.0, 2.0, -1.0]])
@@ -90,7 +90,7 @@ def arrays_of(**changes):
 
 
 def same(found, wanted):
-    """Compare two of our dataclasses, part by part."""
+    """Compare two dataclass instances field by field."""
     for part in fields(wanted):
         one, other = getattr(found, part.name), getattr(wanted, part.name)
         if isinstance(other, np.ndarray):

@@ -82,7 +82,7 @@ def test_handmade_skin_round_trips():
     found, _ = again(wanted, skin)
     assert_equal_meshes(found.mesh, wanted.mesh)
     assert_equal_skins(found.skin, wanted.skin)
-    assert np.array_equal(found.mesh.materials[0].image, image)  # its picture was written too
+    assert np.array_equal(found.mesh.materials[0].image, image)  # its texture was written too
 
 
 def test_mesh_without_skin_round_trips():
@@ -104,7 +104,7 @@ def test_other_images_are_not_replaced(tmp_path):
 def test_textures_in_subfolders_round_trip(tmp_path):
     image = np.arange(16, dtype=np.uint8).reshape(2, 2, 4)
     textured = mesh(materials=(Material("", Texture("sub/b.png", image)),))
-    for _ in range(2):  # the second time the same picture is there already
+    for _ in range(2):  # the second time the same texture exists already
         write(Figure("a", textured), tmp_path / "a.skin")
     found = skin.read(Source.open(tmp_path / "a.skin")).mesh.materials[0]
     assert found.texture == "sub/b.png" and np.array_equal(found.image, image)

@@ -1,4 +1,4 @@
-"""Texture coordinates, materials and pictures of ``.skin`` files."""
+"""Texture coordinates, materials and textures of ``.skin`` files."""
 
 import pytest
 from PIL import Image
@@ -121,7 +121,7 @@ def test_truncated_texture_is_a_warning(folder):
 
 
 def test_texture_that_ends_in_ctrl_z_is_complete(folder):
-    # The last byte of a 24 bit BMP of one pixel's width is padding: take four pixels.
+    # The last byte of a one-pixel-wide 24-bit BMP is padding, so four pixels are used.
     Image.new("RGB", (4, 1), (26, 26, 26)).save(folder / "dark.bmp")
     assert (folder / "dark.bmp").read_bytes().endswith(b"\x1a" * 12)
     figure, warnings = textured(folder, "material { texture dark.bmp }")

@@ -374,7 +374,7 @@ def test_invalid_values_in_lazy_arrays_are_refused_on_reading(load):
 
 @pytest.mark.parametrize("dtype", ["f2", ">f2", "f4", ">f8"])
 def test_numbers_of_any_width_make_a_model(load, dtype):
-    """Weights rounded to halves add up to 1 within 2^-11 of each; one per vertex is exact."""
+    """Weights rounded to half precision sum to 1 within 2^-11 of each; one per vertex is exact."""
     weights = np.eye(24)[SMPL["weights"].argmax(axis=1)]
     figure = load(SMPL, **{"weights": weights.astype(dtype), "f": SMPL["f"].astype(dtype)})
     assert figure.skin.weights.tolist() == [1.0] * len(weights)

@@ -1,4 +1,4 @@
-"""Body models posed like the package smplx and by the published formulas."""
+"""Body models posed as by the package smplx and by the published formulas."""
 
 from functools import cache
 from pathlib import Path

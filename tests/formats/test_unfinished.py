@@ -1,4 +1,4 @@
-"""Temporary files that are removed when the process is terminated."""
+"""Temporary files are removed when the process is terminated."""
 
 import pytest
 

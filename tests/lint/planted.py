@@ -1,4 +1,4 @@
-"""Figures and motions with one fault each."""
+"""Figures and motions with one error each."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def lists(skin: Skin) -> list[list[tuple[int, float]]]:
 
 
 def weighted(rows: dict[int, list[tuple[int, float]]], figure: Figure | None = None) -> Figure:
-    """Return the column with other influences of some vertices."""
+    """Return the column with changed influences of some vertices."""
     figure = figure or column()
     every = lists(figure.skin)
     for vertex, row in rows.items():
@@ -43,7 +43,7 @@ def weighted(rows: dict[int, list[tuple[int, float]]], figure: Figure | None = N
 
 
 def bound(joint: int, matrix: np.ndarray) -> Figure:
-    """Return the column with another inverse bind matrix."""
+    """Return the column with one inverse bind matrix replaced."""
     figure = column()
     matrices = figure.skin.inverse_bind.copy()
     matrices[joint] = matrix
@@ -51,7 +51,7 @@ def bound(joint: int, matrix: np.ndarray) -> Figure:
 
 
 def meshed(triangles: Callable[[np.ndarray], np.ndarray]) -> Figure:
-    """Return the column with other triangles and the same normals."""
+    """Return the column with replaced triangles and the same normals."""
     figure = column()
     changed = triangles(figure.mesh.triangles.copy())
     mesh = replace(figure.mesh, triangles=changed, triangle_materials=None)
@@ -59,7 +59,7 @@ def meshed(triangles: Callable[[np.ndarray], np.ndarray]) -> Figure:
 
 
 def moved(vertex: int, by: tuple[float, float, float]) -> Figure:
-    """Return the column with one vertex elsewhere."""
+    """Return the column with one vertex moved."""
     figure = column()
     positions = figure.mesh.positions.copy()
     positions[vertex] += by
@@ -110,7 +110,7 @@ def turned(*indices: int) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def moebius() -> Figure:
-    """Return a band of 12 quads with half a turn in it."""
+    """Return a band of 12 quads with a half twist."""
     count = 12
     angles = np.arange(count) * 2 * np.pi / count
     across = np.stack(
@@ -156,7 +156,7 @@ def one_jump(root: np.ndarray, _: np.ndarray) -> None:
 
 
 def one_turn(_: np.ndarray, rotations: np.ndarray) -> None:
-    rotations[20, 2] = 1.0, 0.0, 0.0, 0.0  # by half a turn about x, at the left knee
+    rotations[20, 2] = 1.0, 0.0, 0.0, 0.0  # by 180 degrees about x, at the left knee
 
 
 def slide(root: np.ndarray, _: np.ndarray) -> None:
@@ -197,7 +197,7 @@ def point_jump(points: np.ndarray) -> None:
 
 
 def five_joints() -> Figure:
-    """Return the column on five joints in a row, vertex 8 with influences of all of them."""
+    """Return the column on five joints in a row, vertex 8 influenced by all of them."""
     figure = column()
     names = ("a", "b", "c", "d", "e")
     skeleton = make_skeleton(names, [-1, 0, 1, 2, 3], [[0, 0, 0]] + [[0, 1, 0]] * 4)
@@ -262,13 +262,13 @@ def not_affine() -> np.ndarray:
 
 
 def scaled(*factors: float) -> np.ndarray:
-    """Return a bind matrix of joint 1 that also scales."""
+    """Return a bind matrix for joint 1 that also scales."""
     matrix = np.diag([*factors, 1.0])
     matrix[:3, 3] = matrix[:3, :3] @ [0.0, -2.0, 0.0]
     return matrix
 
 
-# name: (maker, code, where, what is expected there, first)
+# name: (maker, code, location, expected values, first)
 FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     "sum too small": (lambda: weighted({5: [(0, 0.9)]}), "W001", "vertices", [5]),
     "sum too large": (

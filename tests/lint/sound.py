@@ -1,4 +1,4 @@
-"""Small valid figures and motions, for tests that plant one fault in them."""
+"""Small valid figures and motions, for tests that introduce one error."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def make_mesh(positions, triangles) -> Mesh:
 
 
 def make_skeleton(names, parents, offsets, limits=(-3.0, 3.0)) -> Skeleton:
-    """Build a skeleton whose joints turn about x, y and z, the root also moving."""
+    """Build a skeleton whose joints rotate about x, y and z; the root also translates."""
     count = len(names)
     dofs = 3 + 3 * count
     bounds = np.tile(limits, (dofs, 1))
@@ -81,7 +81,7 @@ def legs() -> Figure:
 
 
 def standing(figure: Figure, **changes) -> SampledClip:
-    """Return a motion of 60 frames at 30 a second that moves nothing."""
+    """Return a motion of 60 frames at 30 fps in which nothing moves."""
     count = figure.skeleton.n_joints
     clip = SampledClip(
         name="still",
@@ -93,7 +93,7 @@ def standing(figure: Figure, **changes) -> SampledClip:
 
 
 def keypoints() -> tuple[Figure, PointClip]:
-    """Return three points that stand still for 60 frames, all seen."""
+    """Return three points that are still and visible for 60 frames."""
     limbs = np.array([[0, 1], [1, 2]])
     layout = PointLayout("three", ("hip", "knee", "ankle"), limbs, np.zeros(3, dtype=np.int32))
     rows = np.tile([[0, 1, 0, 0.9], [0, 0.5, 0, 0.9], [0, 0, 0, 0.9]], (FRAMES, 1, 1))

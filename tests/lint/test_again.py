@@ -63,7 +63,7 @@ def test_reader_findings_jump_to_the_location_they_name(files: list[Path]) -> No
     found = {f.code: f for f in checked(files)}
     assert (found["M007"].actor, found["M007"].vertices.tolist()) == (0, [1])
     assert (found["S003"].actor, found["S003"].joints.tolist()) == (0, [0])
-    # The ninth channel turns the second joint, beside three that move the root.
+    # The ninth channel rotates the second joint; the first three translate the root.
     assert (found["C001"].actor, found["C001"].joints.tolist()) == (0, [1])
 
 
@@ -76,9 +76,9 @@ def test_edited_data_has_no_line(files: list[Path]) -> None:
     scene.actors[0] = replace(scene.actors[0], figure=replace(figure, skin=skin))
     found = {f.code: f for f in checked(files, scene)}
     assert found["W001"].message.startswith("weights of 2 vertices") and found["W001"].file is None
-    # The skeleton is the file's own still.
+    # The skeleton is still the one from the file.
     assert found["S003"].file.name == "a.skel" and found["S003"].actor == 0
-    # Of the reader's words about the skin nobody knows whether they are of this mesh.
+    # It is unknown whether the reader's messages about the skin apply to this mesh.
     assert found["M007"].file.name == "a.skin" and found["M007"].actor is None
 
 

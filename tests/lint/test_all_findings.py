@@ -22,7 +22,7 @@ def saved(folder: Path, figure: Figure) -> list[str]:
 
 
 def section(lines: list[str], name: str) -> int:
-    """Return the index of the line behind a section's header."""
+    """Return the index of the line after a section's header."""
     return next(k for k, line in enumerate(lines) if line.startswith(f"{name} ")) + 1
 
 
@@ -145,7 +145,7 @@ def test_an_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> 
 
 
 def test_all_errors_in_a_rig_file_are_found(tmp_path: Path) -> None:
-    """The files that a .rig names are looked at one by one: a broken one hides no other."""
+    """The files that a .rig names are checked one by one: errors in one do not hide others."""
     (tmp_path / "a.rig").write_text("rig a { skeleton a.skel skin a.skin }")
     (tmp_path / "a.skel").write_text(skel_text.GOOD.replace("{", "[", 1))
     (tmp_path / "a.skin").write_text(skin_text.GOOD.replace("2 0 0.25", "2 0 0.5", 1))
@@ -191,6 +191,6 @@ def test_without_a_unit_lengths_are_in_figure_units(tmp_path: Path) -> None:
     assert "offset 0.0 2.0 0.0" in skel
     (tmp_path / "a.skel").write_text(skel.replace("offset 0.0 2.0 0.0", "offset 0.0 3.0 0.0"))
     (bound,) = [f for f in linted(tmp_path, lines) if f.code == "B004"]
-    # One unit of a column of 2 x 4 x 2: its diagonal is the root of 24.
+    # One unit of a column of 2 x 4 x 2, whose diagonal is sqrt(24).
     assert "knee by 1 units (20.4 % of its size)" in bound.message
     assert bound.line == section(lines, "bindings") + 7

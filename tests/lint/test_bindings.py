@@ -34,10 +34,10 @@ def test_other_joints_are_compared_despite_a_singular_one() -> None:
 
 
 def test_a_stray_vertex_does_not_hide_joints_that_were_bound_elsewhere() -> None:
-    """0.1 is 2 % of the column's size, and nothing beside a box of 1700."""
+    """0.1 is 2 % of the column's size, but negligible relative to a box of 1700."""
     figure = column()
     mesh, skin = figure.mesh, figure.skin
-    # Enough vertices that one of them is a stray: the column three times.
+    # The column three times: enough vertices for one of them to count as a stray.
     positions = np.tile(mesh.positions, (3, 1))
     positions[-1] = 1000.0
     counts = np.tile(np.diff(skin.starts), 3)

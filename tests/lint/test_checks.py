@@ -100,7 +100,7 @@ def test_every_finding_can_be_framed(name: str) -> None:
 
 
 def test_placement_scale_is_applied() -> None:
-    """A figure in centimetres placed in metres moves as fast as it is drawn."""
+    """The speed of a figure in centimetres that is placed in metres is measured as drawn."""
     scene = made(FAULTS["jump"][0])
     before = [f.message for f in lint_scene(scene)]
     actor = scene.actors[0]

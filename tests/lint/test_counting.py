@@ -32,7 +32,7 @@ def jump_of(scene: Scene, options: LintOptions | None = None) -> Finding:
 
 
 def shown_frame(scene: Scene, time: float) -> int:
-    """Return what the window's timeline says at a time."""
+    """Return the frame that the window's timeline shows at a time."""
     playback = Clock()
     playback.show(scene)
     playback.seek(time)
@@ -43,7 +43,7 @@ def shown_frame(scene: Scene, time: float) -> int:
 def test_a_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -> None:
     scene = Scene([jumping(start, 2.0, offset=offset)])
     found = jump_of(scene)
-    # It is looked at 60 times a second, of 0 to 4 s: from frame 60, at 2 s, to half a frame on.
+    # It is sampled at 60 fps from 0 to 4 s: from frame 60, at 2 s, to half a frame later.
     assert found.frames.tolist() == [60]
     assert found.times == pytest.approx([start + offset + 2.0 + 1 / 60])
     assert found.message.startswith("1 of 121 frames: foot moves at")
@@ -53,7 +53,7 @@ def test_a_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -
 
 def test_frames_use_the_requested_rate() -> None:
     found = jump_of(Scene([jumping(0.0, 2.0)]), LintOptions(frame_rate=24.0))
-    # Looked at 72 times a second.
+    # Sampled at 72 fps.
     assert found.frames.tolist() == [48] and found.times == pytest.approx([2.0 + 1 / 72])
     assert found.message.startswith("1 of 97 frames")
 

@@ -39,7 +39,7 @@ def cost(scene: Scene, **invalid: Ints) -> Finding:
     return found
 
 
-# Joint 4 is 2 m away from where it rests, so 0.05 of it is 100 mm; all else stays.
+# Joint 4 is 2 m from its rest position, so 0.05 of it is 100 mm; nothing else moves.
 TOLD = (
     "pruning to 4 moves the mesh by up to 100 mm (vertex 8), 100 mm on average over these "
     "vertices, in 6 poses"
@@ -52,7 +52,7 @@ def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
         f"2 vertices have more than 4 influences (maximum: 5); {TOLD}; 1 vertex is omitted "
         "because a required position or bind matrix is invalid"
     )
-    assert found.vertices.tolist() == [8, 5]  # what nobody knows comes last
+    assert found.vertices.tolist() == [8, 5]  # unknown values come last
     found = cost(scene({8: CROWDED, 5: LAST, 6: LAST}))
     assert found.message.endswith(
         f"{TOLD}; 2 vertices are omitted because a required position or bind matrix is invalid"
@@ -82,6 +82,6 @@ def test_overflowing_errors_are_left_out() -> None:
     whole = scene({8: CROWDED, 5: LAST}, singular=False)
     figure = whole.actors[0].figure
     matrices = figure.skin.inverse_bind.copy()
-    matrices[5, :3, :3] *= 1e308  # squares of what it moves are infinite
+    matrices[5, :3, :3] *= 1e308  # squares of its displacements are infinite
     whole.actors[0].figure = replace(figure, skin=replace(figure.skin, inverse_bind=matrices))
     assert f"{TOLD}; 1 vertex is omitted because" in cost(whole).message

@@ -19,7 +19,7 @@ _K = np.arange(FRAMES)
 
 
 def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]:
-    """Check legs whose root is so much higher in every frame than on the floor."""
+    """Check legs whose root is raised above the floor by a given height in each frame."""
     figure = legs()
     clip, count = standing(figure), len(heights)
     places = np.zeros((count, figure.skeleton.n_joints, 3))
@@ -80,7 +80,7 @@ def test_a_ramp_without_a_level_is_ambiguous(depth: float, floor: float) -> None
 def test_feet_sunk_for_some_time_are_found_near_the_default_ground(
     floor: float, depth: float, count: int
 ) -> None:
-    # At rest the feet of the legs are on floor 0: there, they may rest while they are sunk.
+    # At rest the feet are on floor 0, so sunk feet may be resting there.
     sunk = found(np.where((_K >= 20) & (20 + count > _K), -depth, 0.0), floor)
     assert [f.code for f in sunk] == ["C008"]
     assert sorted(sunk[0].frames.tolist()) == list(range(120, 120 + count))
@@ -91,7 +91,7 @@ def test_feet_sunk_for_some_time_are_found_near_the_default_ground(
 def test_a_short_rest_on_the_default_ground_far_below_is_ambiguous(
     height: float, count: int
 ) -> None:
-    # It stands or sits higher, or has sunk: nobody knows.
+    # It stands or sits higher, or has sunk: this is undecidable.
     (note,) = found(np.where(count > _K, 0.0, height), 0.0)
     assert note.code == "C013" and f"feet rest at 2 heights ({0.1 + height:g}" in note.message
 
@@ -176,7 +176,7 @@ def test_the_longest_level_wins_but_for_near_ties() -> None:
         lowest = np.where(np.arange(240) < count, -0.02, 0.03)
         return ground_of(lowest, here, 1 / 60, 1.7, (0.0,)).height
 
-    # Of 240 frames 30 to 60 are at most a third of the others, 70 are more, 80 and more half.
+    # Of 240 frames, 30 to 60 are at most a third of the others; 70 are more; 80 or more are half.
     assert [ground(count) for count in (30, 45, 60)] == [0.03] * 3
     assert ground(70) is None
     assert [ground(count) for count in (80, 120, 200)] == [-0.02] * 3

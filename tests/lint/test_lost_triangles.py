@@ -24,7 +24,7 @@ def grid(n: int, wraps: bool) -> np.ndarray:
 
 
 def bowl(n: int, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return an open sheet, its middle low or high: positions and triangles."""
+    """Return an open sheet with its middle low or high: positions and triangles."""
     y, x = np.divmod(np.arange(n * n), n)
     middle = (n - 1) / 2
     z = height * ((x - middle) ** 2 + (y - middle) ** 2)
@@ -38,7 +38,7 @@ def ring(n: int) -> tuple[np.ndarray, np.ndarray]:
     positions = np.stack([radii * np.cos(turns), radii * np.sin(turns), np.sin(tilts)], axis=1)
     triangles = grid(n, wraps=True)
     a, b, c = np.moveaxis(positions[triangles], 1, 0)
-    # Independent of the check: away from the middle circle is outside.
+    # Independent of the check: outwards is away from the centre circle.
     middle = (a + b + c) / 3
     core = middle * [1, 1, 0]
     outward = middle - 3 * core / np.linalg.norm(core, axis=1, keepdims=True)

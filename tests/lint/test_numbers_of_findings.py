@@ -32,7 +32,7 @@ def test_values_in_messages() -> None:
     assert texts["C003"] == (
         "2 of 60 frames: pelvis moves at 90 m/s (limit 13.8 m/s) at frame 120, 0.667 s"
     )
-    # All of the 59 steps of 0.5 / 30 m.
+    # All 59 steps of 0.5 / 30 m.
     assert "left_ankle slides by 983 mm in total, at up to 0.5 m/s (frame " in texts["C007"]
 
 
@@ -57,9 +57,9 @@ def test_values_of_mesh_and_gap_findings() -> None:
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_one_item_uses_the_singular(name: str) -> None:
-    """No count of 1 has a plural behind it, nor "are" or "have"."""
+    """A count of 1 is not followed by a plural, "are" or "have"."""
     for finding in findings_of(FAULTS[name][0]):
-        text = re.sub(r"[\d.]+ of ", "", finding.message)  # the whole decides: 1 of 60 frames
+        text = re.sub(r"[\d.]+ of ", "", finding.message)  # the whole motion counts: 1 of 60
         of_one = re.findall(r"(?<![\d.:])1 ((?!units\b)[a-zA-Z]+s)\b(?! to | at )", text)
         assert set(of_one) <= {"has", "is"}, finding.message
         one = re.match(r"1 (?:of \d+ )?[\w ]*?\b(are|have|lie|move|list|point|belong)\b", text)
@@ -73,7 +73,7 @@ def test_a_gap_is_shown_just_before_it() -> None:
 
 
 def test_long_absences_are_counted_as_absences() -> None:
-    """Person 1 is there in frames 100 to 119, 2 of them missing."""
+    """Person 1 is present in frames 100 to 119, except 2 of them."""
     rows = np.arange(FRAMES)
     rows[20:] = rows[5] = rows[6] = -1
     timing = Timing(RATE, rows, first_frame=100, holds=False)
@@ -82,7 +82,7 @@ def test_long_absences_are_counted_as_absences() -> None:
 
 
 def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
-    """Each side of a sheet has its own; a sheet whose sides share vertices agrees with one."""
+    """Each side of a sheet has its own normals; shared ones agree with one side."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     front = np.array([[0, 1, 2], [0, 2, 3]])
     sides = Mesh(
@@ -101,7 +101,7 @@ def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
 
 
 def test_the_influence_limit_error_is_the_vertex_displacement() -> None:
-    """All joints but the root stay; e is moved by a translation of its own: 0.05 of it is lost."""
+    """All joints but the root stay; e has its own translation, of which 0.05 is lost."""
     figure = five_joints()
     scene = scene_of(figure)
     scene.actors[0].pose.translations[1:, 0] = 0.0
@@ -109,7 +109,7 @@ def test_the_influence_limit_error_is_the_vertex_displacement() -> None:
     locked = replace(figure.skeleton, dof_limits=np.zeros_like(figure.skeleton.dof_limits))
     scene.actors[0].figure = replace(figure, skeleton=locked)
     (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
-    # The whole: 0.05 of 2 m. The cut keeps nothing of e: 100 mm in the present pose, 0 at rest.
+    # With all influences: 0.05 of 2 m. The limit drops e: 100 mm in the current pose, 0 at rest.
     assert found.message == (
         "1 vertex has more than 4 influences (maximum: 5); pruning to 4 moves the mesh "
         "by up to 100 mm (vertex 8), 100 mm on average over these vertices, in 6 poses"
@@ -143,7 +143,7 @@ def test_seams_are_not_borders() -> None:
 
 
 def test_low_confidence_is_counted_over_the_frames_that_see_a_keypoint() -> None:
-    """Low in 3 of the 10 frames that see it; in 3 of 60, which is 5 %; and once of 2."""
+    """Low in 3 of the 10 frames that see it; in 3 of 60, which is 5 %; and in 1 of 2."""
 
     def change(points: np.ndarray) -> None:
         points[10:, 0, 3] = 0.0

@@ -63,7 +63,7 @@ def test_unseen_captured_points_have_no_location() -> None:
     scene.actors[0].points = clip.points[0].copy()
     scene.actors[0].points[2, 3] = 0.0
     assert places_of(about(joints=[1, 2]), scene).joints.tolist() == [[0, 0.5, 0]]
-    # A camera still has something to look at.
+    # There is still a position for the camera to look at.
     assert points_of(about(joints=[2]), scene).tolist() == [[0, 1, 0], [0, 0.5, 0]]
 
 

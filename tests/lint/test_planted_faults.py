@@ -1,4 +1,4 @@
-"""One fault each, planted in a valid figure or motion: its code and location are found."""
+"""One error introduced into a valid figure or motion: its code and location are reported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_a_planted_fault_is_found_where_it_is(name: str) -> None:
     assert found[0].actor == 0 and found[0].message and found[0].hint
 
 
-# What else a planted fault truly brings with it.
+# Other findings that an introduced error really causes.
 COMPANIONS = {
     "sum too large": {"Y002"},
     "negative": {"Y002"},
@@ -32,14 +32,14 @@ COMPANIONS = {
     "three on an edge": {"M005"},
     "triangle twice": {"M006"},
     "stray vertex": {"Y001", "M001"},  # triangles to it are slivers
-    "vertex a hundred sizes away": {"Y001", "M003"},  # it pulls the volume inside out
-    "fast turn": {"C003"},  # the ankle goes where the knee turns it
+    "vertex a hundred sizes away": {"Y001", "M003"},  # it turns the volume inside out
+    "fast turn": {"C003"},  # the ankle follows the knee's rotation
 }
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_planted_fault_causes_no_other_serious_finding(name: str) -> None:
-    """Errors and warnings are the fault's own, or follow from it as listed."""
+    """Errors and warnings are those of the introduced error, or follow from it as listed."""
     maker, code, _, _ = FAULTS[name]
     heavy = {finding.code for finding in findings_of(maker) if finding.severity != "note"}
     assert heavy - {code} <= COMPANIONS.get(name, set()), name

@@ -1,4 +1,4 @@
-"""Faults planted in files: reader errors and reader warnings."""
+"""Errors introduced into files: reader errors and reader warnings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LATE_KEYS = CLIP.replace("0 0 flat flat\n1 1", "1 0 flat flat\n0.5 1")
 
 
 def linted(folder: Path, texts: dict[str, str | bytes]) -> list[Finding]:
-    """Write files, lint them together, and return what was found, files without their folder."""
+    """Write files, lint them together, and return the findings, file names without their folder."""
     paths = []
     for name, text in texts.items():
         paths.append(folder / name)
@@ -111,7 +111,7 @@ def test_other_files_are_still_checked(tmp_path: Path) -> None:
     assert [(f.code, f.file.name, f.line) for f in found if f.severity == "error"] == [
         ("F002", "bad.skel", 1),
         ("F002", "none.obj", 1),
-        ("F004", "none.obj", None),  # it is no skin for the joint that is left
+        ("F004", "none.obj", None),  # the skin does not fit the remaining joint
     ]
     assert [f.code for f in found if f.code == "W001"] == ["W001"]
 
@@ -157,9 +157,9 @@ def put(key: str, place: tuple[int, ...], value: float) -> Callable[[dict[str, n
 
 
 MODELS = {
-    "parent after its child": (smpl(parents(1, 9)), "S001"),  # 9 hangs from 6, 3 and 0
+    "parent after its child": (smpl(parents(1, 9)), "S001"),  # 9 descends from 6, 3 and 0
     "own parent": (smpl(parents(5, 5)), "S002"),
-    "cycle": (smpl(parents(1, 4)), "S002"),  # the knee 4 hangs from the hip 1
+    "cycle": (smpl(parents(1, 4)), "S002"),  # the knee 4 is a child of the hip 1
     "late parent": (smpl(parents(1, 2)), "S001"),
     "negative weight": (smpl(put("weights", (3, 0), -0.5)), "W002"),
     "weight not finite": (smpl(put("weights", (3, 0), np.nan)), "W003"),
@@ -229,5 +229,5 @@ def test_every_code_is_planted_somewhere() -> None:
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
     planted |= {code for _, code in MODELS.values()} | {"F001"}
-    # What nobody can plant in a file that is read: remarks are not faults.
+    # Codes that a readable file cannot cause: remarks are not errors.
     assert set(CODES) - planted == {"F007"}

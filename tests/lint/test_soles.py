@@ -27,7 +27,7 @@ def test_rotated_feet_touch_where_their_mesh_does(turn: float) -> None:
     positions = deform(figure, pose)[0]
     found = soles_of(figure, True).heights(joint_matrices(figure, pose)[None], HEIGHT, 1.0)[0]
     for height, side in zip(found, (1.0, -1.0), strict=True):
-        # Points that are chosen for some tilts are lowest up to 2 mm for all of them.
+        # Points chosen for some tilts are the lowest, to 2 mm, for all of them.
         assert height == pytest.approx(positions[side * positions[:, 0] > 0.0, 1].min(), abs=2e-3)
 
 

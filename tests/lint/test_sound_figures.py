@@ -1,4 +1,4 @@
-"""Valid figures have no errors or warnings; known faults of real files are listed here."""
+"""Valid figures have no errors or warnings; known errors in real files are listed here."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_tiny_rig_has_no_findings(tmp_path: Path) -> None:
 COURSE = {
     ("wasp.skel", "wasp.skin", "wasp_walk.anim"): set(),
     ("tube.skel", "tube.skin"): set(),
-    # The right knee's pose is -3, 1, 2, its limits are -2 to 0, 0 and 0: truly a fault.
+    # The right knee's pose is -3, 1, 2, its limits are -2 to 0, 0 and 0: a real error.
     ("test.skel",): {"S004"},
 }
 
@@ -63,7 +63,7 @@ def test_the_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> 
         assert heavy(findings) == [
             ("S006", '4 joints with duplicate names: "R leg" (2), "L leg" (2)')
         ]
-        # Its weights are raw, and off by 0.002 at most.
+        # Its weights are raw, with sums off by at most 0.002.
         assert "W001" in notes(findings)
 
 

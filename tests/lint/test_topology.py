@@ -9,7 +9,7 @@ from viewer.lint._topology import components, edges_of, orientations, welded
 
 
 def walked(count: int, pairs: np.ndarray) -> list[int]:
-    """Return the smallest member of each node's component by walking."""
+    """Return the smallest member of each node's component by graph traversal."""
     beside: list[list[int]] = [[] for _ in range(count)]
     for a, b in pairs.tolist():
         beside[a].append(b)

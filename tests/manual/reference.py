@@ -1,7 +1,7 @@
 """Reference tables of the manual, generated from the registries.
 
 A page marks where a table belongs with ``<!-- table: NAME -->`` and ``<!-- end -->``.
-``make manual`` writes the tables into the pages, ``test_pages.py`` fails when one is stale.
+``make manual`` writes the tables into the pages, ``test_pages.py`` fails if one is out of date.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _BLOCK = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->\n)", re.DOTALL
 
 
 def with_tables(text: str) -> str:
-    """Return a page with its tables as the registries have them now."""
+    """Return a page with its tables generated from the current registries."""
     return _BLOCK.sub(lambda block: f"{block[1]}\n{TABLES[block[2]]()}\n{block[4]}", text)
 
 
@@ -185,7 +185,7 @@ def _title(group: argparse._ArgumentGroup) -> str:
 
 
 def _names(action: argparse.Action) -> str:
-    """Return how an option is written, its value included."""
+    """Return an option's spellings with its value."""
     if not action.option_strings:
         return f"`{action.metavar or action.dest}`"
     value = action.metavar or ("" if action.nargs == 0 else action.dest.upper())

@@ -1,4 +1,4 @@
-"""Small images for videos, and their frames by an independent reader."""
+"""Small images for videos, and an independent reader of their frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ av = pytest.importorskip("av")
 
 
 def counting(frame: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
-    """Return a gray that says which frame it is."""
+    """Return the grey value that encodes a frame number."""
     return np.full((size[1], size[0], 4), (20 * frame,) * 3 + (255,), dtype=np.uint8)
 
 

@@ -18,7 +18,7 @@ def plain(color, size=(40, 30)):
 def test_label_is_white_on_a_dark_tag_in_the_lower_left_corner():
     pixels = plain((200, 200, 200, 255), (60, 40))
     write_label(pixels, "17")
-    # Letters of 9 pixels with a margin of 3; 62 % of the tag's grey of 16 covers the picture.
+    # Letters of 9 pixels with a margin of 3; the tag's grey of 16 covers the image by 62 %.
     assert pixels[-1, 0].tolist() == [86, 86, 86, 255] == pixels[-15, 0].tolist()
     assert pixels[-16, 0].tolist() == [200, 200, 200, 255]
     assert pixels[-12:-3, 3:16, 0].max() > 220

@@ -146,7 +146,7 @@ def test_save_refuses_a_folder_that_cannot_be_written(tmp_path):
     folder.mkdir()
     folder.chmod(0o555)
     if os.access(folder, os.W_OK):
-        # Root writes anywhere but into a file system of the kernel's own.
+        # root can write anywhere except in a kernel file system.
         assert refused("/proc/a.skel").startswith("/proc/a.skel: ")
     else:
         assert refused(folder / "a.skel") == f"{folder / 'a.skel'}: Permission denied"
@@ -220,7 +220,7 @@ def test_file_size_limit_keeps_the_old_file(tmp_path):
         ("a{b", None),
         ("}", None),
         ("\ud800", None),
-        ("\udcc3\udca9", None),  # would come back as the letter that these bytes are in UTF-8
+        ("\udcc3\udca9", None),  # would be read back as the letter that these bytes encode in UTF-8
     ],
 )
 def test_as_words_accepts_only_text_that_round_trips(name, words):

@@ -34,7 +34,7 @@ def test_colours_round_trip(tmp_path, suffix):
     frames = decoded(path)
     assert len(frames) == 5
     middles = [frames[2][12, 16], frames[2][12, 48], frames[2][36, 16], frames[2][36, 48]]
-    # Rounding to 8 bits of limited range, twice, and what the encoder leaves out.
+    # Rounding to 8 bits of limited range, twice, and the encoder's loss.
     assert np.abs(np.array(middles, dtype=int) - list(COLORS.values())).max() <= 3
 
 
@@ -113,7 +113,7 @@ def test_webm_holds_transparency(tmp_path):
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         assert stream.metadata["alpha_mode"] == "1"
-        # FFmpeg's own decoder leaves the alpha out; libvpx's does not.
+        # FFmpeg's own decoder drops alpha; libvpx's does not.
         decoder = av.CodecContext.create("libvpx-vp9", "r")
         packets = [packet for packet in container.demux(stream) if packet.size]
         frames = [frame for packet in packets for frame in decoder.decode(packet)]
@@ -134,7 +134,7 @@ def test_gif_holds_transparency(tmp_path):
         picture.seek(1)
         second = np.array(picture.convert("RGBA"))
     assert first[12, 16, 3] == 0 and (first[12, 48], first[36, 16])[0][3] == 255
-    # What the first frame showed there is gone.
+    # The first frame's content there is gone.
     assert second[36, 16, 3] == 0 and second[12, 16, 3] == 255
 
 
@@ -154,7 +154,7 @@ def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
 
 
 def delays(path: Path) -> list[int]:
-    """Return what a GIF says of each frame, in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
+    """Return a GIF's frame delays in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
     data, found, place = path.read_bytes(), [], 0
     while (place := data.find(b"\x21\xf9\x04", place)) >= 0:
         found.append(int.from_bytes(data[place + 4 : place + 6], "little"))
@@ -194,7 +194,7 @@ def test_gif_colours_come_from_all_sampled_frames(tmp_path):
 
 @pytest.mark.parametrize("transparent", [False, True])
 def test_gif_of_gradients_with_a_moving_bar_is_correct_in_every_frame(tmp_path, transparent):
-    """Most pixels stay from frame to frame, and are not stored again."""
+    """Most pixels do not change between frames, and are not stored again."""
     path = tmp_path / "x.gif"
     x, y = np.meshgrid(np.linspace(60, 220, 96), np.linspace(80, 240, 64))
     still = np.stack([x, (x + y) / 2, y, np.full_like(x, 255)], axis=-1).astype(np.uint8)
@@ -219,7 +219,7 @@ def test_gif_of_gradients_with_a_moving_bar_is_correct_in_every_frame(tmp_path, 
             shown = np.array(animation.convert("RGBA")).astype(int)
             assert (shown[..., 3] == pixels[..., 3]).all(), index
             error = np.abs(shown - pixels)[pixels[..., 3] == 255].max(axis=-1)
-            # Ordered dither, and the noise: 80 pixels that have hardly a palette of their own.
+            # Ordered dither, and the noise: 80 pixels hardly affect the palette.
             assert error.mean() <= 6 and (error > 60).sum() <= 40, index
 
 

@@ -82,7 +82,7 @@ def test_unwritable_video_paths_are_refused_at_once(tmp_path, name, words):
     assert str(caught.value).endswith(words)
 
 
-# Nothing broken stays
+# No broken files remain
 
 
 def test_video_appears_only_when_complete(tmp_path):
@@ -156,7 +156,7 @@ for limit in (0, 1000, size // 3, size - 40_000, size - 1000, size - 1):
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
 def test_full_disk_is_one_line_and_leaves_no_file(tmp_path, suffix):
-    """A limit on the size of files stands for the end of a disk."""
+    """A limit on file sizes simulates a full disk."""
     path = tmp_path / f"x{suffix}"
     run = subprocess.run(
         [sys.executable, "-c", _FULL, str(path)],

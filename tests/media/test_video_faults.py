@@ -1,4 +1,4 @@
-"""Videos whose file fails, at every write and at every fill level: one line, nothing left."""
+"""Videos with write errors, at every write and every fill level: one line, no file remains."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ FULL = "No space left on device"
 
 
 def noisy_frames(n_frames: int, n_more: int = 0) -> list[np.ndarray]:
-    """Return frames that no encoder makes small, and more of a plain colour."""
+    """Return frames that do not compress, and more of a plain colour."""
     noise = np.random.default_rng(1).integers(0, 255, (n_frames, *SIZE[::-1], 4), dtype=np.uint8)
     noise[..., 3] = 255
     return [*noise, *[np.full((*SIZE[::-1], 4), 255, dtype=np.uint8)] * n_more]
 
 
 def record(path: Path, frames: list[np.ndarray]) -> list[str]:
-    """Write a video as the recorder does, whose queue still holds frames when one has failed."""
+    """Write a video as the recorder does: its queue still holds frames when one has failed."""
     sink, said = VideoSink(path, SIZE, 25.0), []
     for index, pixels in enumerate(frames):
         try:
@@ -95,7 +95,7 @@ def test_failure_at_any_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, 
             said = record(path, frames)
         if not said:
             break
-        # Every frame that is tried after the first error meets the same one.
+        # Every frame after the first error raises the same error.
         assert set(said) == {f"{path}: {FULL}"}
         assert [each.name for each in tmp_path.iterdir()] == [path.name]
         assert path.read_bytes() == b"precious"
@@ -106,7 +106,7 @@ def test_failure_at_any_write_keeps_the_old_file(tmp_path, monkeypatch, suffix, 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_failure_on_close_is_reported(tmp_path, monkeypatch, suffix):
-    """Network drives report a full disk only there."""
+    """Network drives report a full disk only on close."""
     path = tmp_path / f"x{suffix}"
     path.write_bytes(b"precious")
 
@@ -157,7 +157,7 @@ for level in range(17):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_disk_fill_level_gives_one_line_or_a_video(tiny_disk, suffix):
-    """In a process of its own, which FFmpeg used to end with a segmentation fault."""
+    """In a separate process, as FFmpeg used to crash with a segmentation fault."""
     folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
     run = subprocess.run(
         [sys.executable, "-c", _LEVELS, str(tiny_disk), suffix],

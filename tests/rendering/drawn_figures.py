@@ -19,7 +19,7 @@ ROTATIONS = (3, 4, 5)
 
 
 def skeleton(parents, offsets, boxes=None) -> Skeleton:
-    """Return a skeleton whose every joint turns freely about x, y and z."""
+    """Return a skeleton whose joints all rotate freely about x, y and z."""
     n_joints = len(parents)
     return Skeleton(
         names=tuple(f"j{joint}" for joint in range(n_joints)),
@@ -58,7 +58,7 @@ def random_figure(
 ) -> Figure:
     """Return a cloud of vertices bound at random to a random tree of joints.
 
-    counts: fewest and most influences a vertex; sums: of its weights; empty: share of vertices
+    counts: range of influences per vertex; sums: of its weights; empty: fraction of vertices
     without any; skew: bindings with shear and other scales per axis.
     """
     indices = np.arange(n_joints)
@@ -184,5 +184,5 @@ def bent(figure: Figure, *turns: tuple[int, str, float]) -> Actor:
 
 
 def scene_of(*meshes: Mesh) -> Scene:
-    """Return a scene of meshes that follow no skeleton."""
+    """Return a scene of meshes without skeletons."""
     return Scene([Actor(Figure(f"mesh {i}", mesh)) for i, mesh in enumerate(meshes)])

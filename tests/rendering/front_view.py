@@ -1,4 +1,4 @@
-"""Pictures of small scenes from the front, parallel, unlit or evenly lit: pixels can be named."""
+"""Orthographic front views of small scenes, unlit or evenly lit, so that pixels are predictable."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import skin_from_lists
 
-PIXELS = 80  # a side; x and y from -2 to 2, so a unit is 20 pixels
+PIXELS = 80  # pixels per side; x and y from -2 to 2, so a unit is 20 pixels
 
 
 def front_view(offscreen, scene: Scene, **options) -> np.ndarray:
-    """Return the picture of a scene seen from +z, transparent where nothing is."""
+    """Return the image of a scene seen from +z, transparent where it is empty."""
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     shown = DisplayOptions(background="transparent", grid=False, samples=1)
     for name, value in options.items():
@@ -25,12 +25,12 @@ def front_view(offscreen, scene: Scene, **options) -> np.ndarray:
 
 
 def pixel(picture, x, y) -> list[int]:
-    """Return the colour at a place of the z = 0 plane."""
+    """Return the colour at a point of the z = 0 plane."""
     return picture[int(PIXELS * (0.5 - y / 4)), int(PIXELS * (0.5 + x / 4))].tolist()
 
 
 def drawn(picture) -> np.ndarray:
-    """Return which pixels show anything: (H, W) bool."""
+    """Return which pixels are covered: (H, W) bool."""
     return picture[..., 3] > 0
 
 

@@ -1,6 +1,6 @@
-"""The pictures in tests/golden of scalar quantities: one of each, on a figure that shows it.
+"""Golden images of scalar quantities: one of each, on a figure that shows it.
 
-Without legends: letters look different with every version of Pillow; see test_legend_picture.py.
+Without legends: text looks different with every version of Pillow; see test_legend_picture.py.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def _body() -> Figure:
 
 
 def _posed_body() -> Scene:
-    """Return the body on one leg, an elbow bent, its trunk turned."""
+    """Return the body on one leg, an elbow bent, its trunk twisted."""
     actor = Actor(_body())
     skeleton, pose = actor.figure.skeleton, actor.pose
     assert skeleton is not None and pose is not None
@@ -43,7 +43,7 @@ def _posed_body() -> Scene:
 
 
 def _uneven_arm() -> Scene:
-    """Return an arm whose weights add up to less and less than 1 along it, with three parts."""
+    """Return an arm with three parts, whose weight sums decrease from 1 along it."""
     figure = arm(4)
     mesh, skin = figure.mesh, figure.skin
     assert mesh is not None and skin is not None

@@ -1,4 +1,4 @@
-"""The pictures in tests/golden: what is drawn in each, 300 x 300, one function a picture."""
+"""The golden images: contents of each, 300 x 300, one function per image."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_points
 
 SIZE = 300, 300
-LINES = 0.06  # rasterisers place the pixels of thin lines differently
+LINES = 0.06  # rasterisers cover different pixels with thin lines
 
 
 @dataclass
 class Shot:
-    """One picture: a scene, what is shown of it, and from where."""
+    """One image: a scene, display options and a camera."""
 
     scene: Scene
     options: DisplayOptions = field(default_factory=DisplayOptions)
@@ -60,7 +60,7 @@ class Shot:
 
 
 def options(**changes) -> DisplayOptions:
-    """Return options whose picture needs no grid and has a silhouette."""
+    """Return options without a grid and with a transparent background, for a silhouette."""
     return DisplayOptions(**{"background": "transparent", "grid": False, **changes})
 
 

@@ -15,9 +15,10 @@ RATE, SPEED, MISSING = 10.0, 2.0, 5
 
 
 def moving_arm(turns: bool = True) -> Actor:
-    """Return an arm of three joints and a motion of 11 frames at 10 a second.
+    """Return an arm of three joints and a motion of 11 frames at 10 fps.
 
-    It moves along x by 2 a second; its elbow turns about y up to a quarter. Frame 5 is missing.
+    It moves along x at 2 units per second; its elbow rotates about y by up to 90 degrees. Frame 5
+    is missing.
     """
     frames = np.delete(np.arange(11), MISSING)
     rows = np.full(11, -1, dtype=np.int32)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 SAME_DIFFERENCE = 2  # of 255, in any channel ...
-SAME_SHARE = 0.0005  # ... but for this share of the pixels
+SAME_SHARE = 0.0005  # ... except for this fraction of the pixels
 OTHER_SSIM_ERROR = 0.02  # 1 - mean structural similarity of the luma
-OTHER_SILHOUETTE = 0.005  # share of pixels drawn in one picture and not in the other
+OTHER_SILHOUETTE = 0.005  # fraction of pixels covered in one image but not in the other
 
 _WINDOW = 8  # side of SSIM's windows, pixels
 
 
 def differing_share(first, second) -> float:
-    """Return the share of pixels with a channel that differs by more than SAME_DIFFERENCE."""
+    """Return the fraction of pixels with a channel that differs by more than SAME_DIFFERENCE."""
     difference = np.abs(first.astype(np.int16) - second.astype(np.int16)).max(axis=-1)
     return float((difference > SAME_DIFFERENCE).mean())
 
@@ -36,14 +36,14 @@ def ssim_error(first, second) -> float:
 
 
 def silhouette_share(first, second) -> float:
-    """Return the share of pixels that are drawn (alpha at least half) in only one picture."""
+    """Return the fraction of pixels that are covered (alpha at least half) in only one image."""
     return float(((first[..., 3] >= 128) != (second[..., 3] >= 128)).mean())
 
 
 def complaints(
     found, wanted, same_rasteriser: bool, ssim_limit: float = OTHER_SSIM_ERROR
 ) -> list[str]:
-    """Return what is wrong with a picture, nothing if it may pass for the wanted one."""
+    """Return the differences of an image from the expected one; empty if it is accepted."""
     if found.shape != wanted.shape:
         return [f"size {found.shape} instead of {wanted.shape}"]
     if same_rasteriser:
@@ -60,7 +60,7 @@ def complaints(
 
 
 def _on_grey(pixels):
-    """Return the colours over mid-grey, so that what is transparent has a colour too."""
+    """Return the colours over mid-grey, so that transparent pixels have a colour too."""
     alpha = pixels[..., 3:].astype(np.float64) / 255.0
     return pixels[..., :3] * alpha + 128.0 * (1.0 - alpha)
 

@@ -13,7 +13,7 @@ N = 100  # pixels a side
 
 
 def lights(ambient=1.0, key=0.0, azimuth=0.0, inclination=0.0, **changes) -> Lights:
-    """Return white ambient light and, of strength ``key``, a white light from the camera's side."""
+    """Return white ambient light and a white light of strength ``key`` from the camera's side."""
     return Lights(
         key=Light(azimuth, inclination, (1.0, 1.0, 1.0), key),
         rim=Light(0.0, 0.0, (1.0, 1.0, 1.0), 0.0),
@@ -30,7 +30,7 @@ def plain(**changes) -> DisplayOptions:
 
 
 def front(**changes) -> Camera:
-    """Return a camera that sees -2 to 2 at the origin, parallel, from +z; a unit is 25 pixels."""
+    """Return an orthographic camera at +z that sees -2 to 2; a unit is 25 pixels."""
     values = {"azimuth": 0.0, "inclination": 0.0, "fov": 90.0, "distance": 2.0, **changes}
     return Camera(**{"orthographic": True, **values})
 
@@ -46,7 +46,7 @@ def draw(offscreen, scene, options=None, camera=None, selected=-1, size=(N, N)):
 
 
 def covered(pixels) -> tuple[int, int, int, int]:
-    """Return first row, last row, first column, last column of what is drawn."""
+    """Return first row, last row, first column, last column of the covered pixels."""
     rows, columns = np.nonzero(pixels[..., 3] >= 128)
     return rows.min(), rows.max(), columns.min(), columns.max()
 

@@ -239,7 +239,8 @@ def test_pan_moves_the_scene_with_the_pointer(orthographic):
     camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 30.0, 20.0, orthographic=orthographic)
     point = camera.target.copy()
     pan(camera, -0.25, -0.1)
-    # A quarter of the height is half a unit of device coordinates, upwards; across by aspect 2.
+    # A quarter of the height is half a unit of device coordinates, upwards; horizontally divided by
+    # the aspect 2.
     np.testing.assert_allclose(project(camera, point, aspect=2.0)[0, :2], [0.25, 0.2], atol=1e-9)
 
 

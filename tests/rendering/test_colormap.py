@@ -1,4 +1,4 @@
-"""The colour map: lightness rises from one end to the other, as the eye sees it."""
+"""The colour map: perceived lightness rises from one end to the other."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def recording_of(*actors, times=(0.0, 0.2, 0.4, 1.0), **changes) -> Recording:
 
 
 def is_seen(camera: Camera, points: np.ndarray) -> bool:
-    """Return whether all points are within the picture, by the camera's matrices alone."""
+    """Return whether all points are within the image, by the camera's matrices alone."""
     box = np.array([points.min(axis=0), points.max(axis=0)])
     matrix = camera.projection_matrix(ASPECT, box) @ camera.view_matrix()
     clip = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ matrix.T
@@ -59,7 +59,7 @@ def test_box_and_points_cover_all_frames():
     assert is_seen(camera, every)
     exact = Camera()
     fit(exact, every, ASPECT)
-    # Outermost points may miss a little.
+    # The outermost points may differ a little.
     assert camera.distance == pytest.approx(exact.distance, rel=0.005)
     np.testing.assert_allclose(camera.target, exact.target, atol=1e-12)
 
@@ -102,7 +102,7 @@ def test_following_camera_fits_what_stays_around_it():
     still = scene_points(Scene([Actor(arm(3))]))
     np.testing.assert_allclose(points.min(axis=0), still.min(axis=0), atol=1e-12)
     np.testing.assert_allclose(points.max(axis=0), still.max(axis=0), atol=1e-12)
-    assert box[1, 0] == pytest.approx(3.0 + 2.0)  # one second at 2 a second
+    assert box[1, 0] == pytest.approx(3.0 + 2.0)  # one second at 2 units per second
 
 
 @pytest.mark.parametrize("up", ["y", "z"])

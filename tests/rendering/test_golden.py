@@ -26,7 +26,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Scene, scene_box
 
 SHOTS = {**STILL_SHOTS, **MOTION_SHOTS, **SCALAR_SHOTS}
-KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for pictures that differ
+KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for images that differ
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def draw(offscreen: Offscreen, shot: Shot):
 
 
 def golden_renderer() -> str:
-    """Return the renderer that drew the stored pictures."""
+    """Return the renderer that drew the stored images."""
     return (GOLDEN / "renderer.txt").read_text().strip()
 
 
@@ -71,7 +71,7 @@ def test_image_matches_golden_image(offscreen, name):
 
 
 def write(path: Path, pixels) -> None:
-    """Store a picture, without alpha if it has none."""
+    """Store an image, without alpha if it is opaque."""
     picture = Image.fromarray(pixels)
     if (pixels[..., 3] == 255).all():
         picture = picture.convert("RGB")
@@ -84,7 +84,7 @@ def test_every_golden_image_is_rendered():
 
 
 def changed_scenes() -> dict[str, Shot]:
-    """Return pictures of what must not pass for the bent arm."""
+    """Return images that must not be accepted as the bent arm."""
     figure = arm(4)
     mesh = figure.mesh
     moved = bent(figure, *BEND[:2], (3, "y", 0.8 + 0.12))
@@ -128,10 +128,10 @@ def test_the_metric_detects_changes(offscreen, name, same_rasteriser):
 
 
 def test_the_metric_detects_one_missing_triangle(offscreen):
-    """Between rasterisers it is too small to see; on the same one it is not."""
+    """The tolerance between rasterisers hides it; that for the same one does not."""
     figure = arm(4, sides=8, rings=16)
     wanted = draw(offscreen, Shot(Scene([bent(figure, *BEND)]), options()))
-    # Of one ring, the one that is nearest to the camera and highest.
+    # In one ring, the triangle nearest to the camera and highest.
     posed, _ = viewer.deform(figure, bent(figure, *BEND).pose)
     _, up, backward = camera_axes(Fixed(Scene([]), options()).camera)
     middles = posed[figure.mesh.triangles].mean(axis=1)

@@ -43,7 +43,7 @@ def furnace(offscreen):
 
 
 def dark(**changes) -> Lights:
-    """Return lights of which only the studio shines."""
+    """Return lights with only the studio on."""
     off = Light(0.0, 0.0, (1.0, 1.0, 1.0), 0.0)
     return Lights(key=off, rim=off, ambient=0.0, specular=0.0, **changes)
 
@@ -75,7 +75,7 @@ def encoded(linear):
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
 def test_white_surfaces_vanish_in_a_white_furnace(furnace, metallic, roughness):
-    """No energy is lost or added: every pixel of a white sphere has the light of the room."""
+    """No energy is lost or added: every pixel of a white sphere has the radiance of the room."""
     material = Material("", None, WHITE, metallic, roughness, is_physical=True)
     ball = replace(sphere(radius=1.0, rings=24, sides=48), materials=(material,))
     ball = replace(ball, triangle_materials=np.zeros(ball.n_triangles, np.int32))
@@ -160,7 +160,7 @@ def test_a_sphere_has_the_colours_of_the_formula(offscreen, metallic, roughness)
     a, i = math.radians(30.0), math.radians(40.0)
     key = np.array([math.cos(i) * math.sin(a), math.sin(i), math.cos(i) * math.cos(a)])
     wanted = encoded(toned(reference(normals, metallic, roughness, base, key)))
-    # Interpolated normals of 128 sides, and eight bits.
+    # Interpolated normals on 128 sides, and eight bits.
     assert np.abs(shown[inside][:, :3] - wanted).max() <= 3.0
 
 
@@ -192,7 +192,7 @@ def test_unlit_and_emissive_colours_are_shown_as_they_are(furnace):
 
 
 def test_maps_multiply_their_factors_by_their_channel(furnace):
-    """Black metal reflects nearly nothing; occlusion takes the room's light away."""
+    """Black metal reflects almost nothing; occlusion removes the room's light."""
     half = texture([(0, 128, 255)], channel=1)
     occluded = Material("", None, WHITE, occlusion_texture=half, is_physical=True)
     found = pixel(draw(furnace, occluded), 0, 0)
@@ -234,7 +234,7 @@ def test_textures_are_placed_wrapped_and_taken_from_the_second_set(offscreen):
 
     assert seen() == [red, green, blue, white]
     assert seen(uv_set=1) == [white, green, blue, red]
-    # Twice as often: the lower left quarter is a whole picture, whose middle texels change.
+    # Repeated twice: the lower left quarter is a whole image, whose middle texels change.
     moved = [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0]]
     assert seen(transform=moved, wrap=("repeat", "clamp")) == [green, red, white, blue]
     assert seen(transform=moved, wrap=("clamp", "clamp")) == [green, green, white, white]
@@ -343,7 +343,7 @@ def test_backgrounds_are_white_or_the_studio(furnace):
 
 
 def test_the_studio_stands_upright_behind_the_scene(offscreen):
-    """A parallel camera at the horizon sees the room's back: what the map has at -z, +y up."""
+    """An orthographic horizontal camera sees the back of the room: the map at -z, +y up."""
     shown = front_view(offscreen, scene_of(square()), background="environment", lights=dark())
     with np.load(resource("assets", "studio", "studio.npz")) as stored:
         light = stored["light"].astype(float)
@@ -356,7 +356,7 @@ def test_the_studio_stands_upright_behind_the_scene(offscreen):
 
 
 def test_transparent_pictures_catch_the_shadow_in_their_alpha(offscreen):
-    """Black of some opacity under the ball where the light is hidden, nothing far from it."""
+    """Translucent black under the ball where the light is occluded, nothing far from it."""
     camera = Camera(azimuth=0.0, inclination=40.0, distance=6.0)
     pictures = []
     for quality in ("draft", "normal"):

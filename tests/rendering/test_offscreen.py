@@ -122,7 +122,7 @@ def test_another_context_can_be_made_current_again(scene):
 
 
 def in_threads(work, count: int) -> list[object]:
-    """Run ``work`` in threads at once; return what went wrong."""
+    """Run ``work`` in several threads at once; return the errors."""
     problems: list[object] = []
 
     def run() -> None:
@@ -163,7 +163,7 @@ def test_an_offscreen_may_be_used_by_one_thread_after_another(scene):
 
 
 def run_alone(code: str) -> str:
-    """Run code in a fresh process and return what it prints; it must say nothing else."""
+    """Run code in a fresh process and return its output; its error stream must be empty."""
     head = f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'tests')!r}]\n"
     result = subprocess.run(
         [sys.executable, "-c", head + code],
@@ -276,7 +276,7 @@ def test_an_image_without_memory_reports_its_size(ctx, monkeypatch, samples, wor
         raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
 
     class Lavish:
-        """A context that makes everything but has no room for a framebuffer."""
+        """A context that creates everything except framebuffers, for lack of memory."""
 
         def __getattr__(self, name):
             if name == "framebuffer" and how == "refused" and made[1 if samples > 1 else 0 :]:

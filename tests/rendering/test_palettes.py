@@ -18,7 +18,7 @@ EYES = {"usual": np.eye(3), "no long cones": np.array(PROTAN), "no middle": np.a
 
 
 def lab(pixels, eyes=EYES["usual"]):
-    """Return OKLab (Ottosson 2020) of sRGB pixels as some eyes see them."""
+    """Return OKLab (Ottosson 2020) of sRGB pixels under a colour vision deficiency."""
     share = pixels[:, :3] / 255.0
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     linear = np.clip(linear @ eyes.T, 0.0, 1.0)
@@ -64,7 +64,7 @@ def test_neighbouring_joints_differ(name, eyes):
     for joint, parent in enumerate(parents):
         siblings = [other for other in range(joint) if parents[other] == parent]
         for other in [*siblings, *([parent] if parent >= 0 else [])]:
-            # A step of 0.02 is just noticed where areas touch.
+            # A step of 0.02 is just noticeable between adjacent areas.
             assert np.linalg.norm(colors[joint] - colors[other]) > 0.05, (joint, other)
 
 
@@ -110,7 +110,7 @@ def test_difference_map_is_white_in_the_middle_and_darkens_to_both_sides():
     assert (pixels[127, :3] == pixels[127, 0]).all() and pixels[127, 0] > 240
     lightness = lab(pixels)[:, 0]
     assert (np.diff(lightness[:128]) > 0.0).all() and (np.diff(lightness[127:]) < 0.0).all()
-    # Equal amounts are equally dark.
+    # Equal magnitudes are equally dark.
     assert np.abs(lightness - lightness[::-1]).max() < 0.02
     assert pixels[0, 2] > pixels[0, 0] and pixels[-1, 0] > pixels[-1, 2]
 

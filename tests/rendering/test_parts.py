@@ -1,4 +1,4 @@
-"""Body parts in distinct colours, hidden parts, and the reduced mesh."""
+"""Body parts in distinct colours, hidden parts, and reduced meshes."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_hidden_parts_are_not_drawn_but_their_borders_are(offscreen):
     assert whole.sum() == 60 * 60
     for hidden, right_edge in (((1,), 0.75), ((1, 2), 0.0)):
         found = drawn(front_view(offscreen, scene, hidden_parts=hidden))
-        # Triangles with one corner in a part that is shown stay: up to the next column.
+        # Triangles with one corner in a visible part remain: up to the next column.
         across = np.flatnonzero(found.any(axis=0))
         assert across[0] == 10
         assert across[-1] + 1 == 40 + 20 * right_edge
@@ -111,7 +111,7 @@ def test_reduced_mesh_is_drawn_on_request(offscreen):
     found = drawn(front_view(offscreen, scene, reduced=True))
     assert 0.45 < found.sum() / 3600 < 0.55
     rows, columns = np.nonzero(found)
-    # Below the diagonal: x beyond y, with rows counted from the top.
+    # Below the diagonal: x greater than y, with rows counted from the top.
     assert (columns + rows >= 78).all()
 
 

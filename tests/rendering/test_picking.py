@@ -31,7 +31,7 @@ def parallel() -> Camera:
 
 
 def click(offscreen, scene: Scene, x, y, camera=None, size=(PIXELS, PIXELS), **options):
-    """Pick where the parallel front view shows (x, y): from -2 to 2 over the picture."""
+    """Pick at (x, y) in the orthographic front view: -2 to 2 across the image."""
     shown = DisplayOptions(**options)
     column, row = size[0] * (0.5 + x / 4), size[1] * (0.5 - y / 4)
     with offscreen.context:
@@ -105,7 +105,7 @@ def test_images_of_any_aspect_ratio_are_picked_correctly(offscreen):
                 size[1] / 4,
                 scene_box(scene),
             )
-            # A quarter of the picture's height above its middle: 1 of 2 units.
+            # A quarter of the image's height above its centre: 1 of 2 units.
             pixel = 4.0 / size[1]
             assert found.point == pytest.approx([0.0, 1.0, 0.0], abs=pixel)
 
@@ -202,7 +202,7 @@ def test_instances_are_told_apart(offscreen, monkeypatch, count):
         found = click(offscreen, scene, x + 0.05, y, size=(400, 400))
         assert (found.actor, found.joint, found.keypoint) == (number + 1, -1, -1)
         corners = figure.mesh.positions[figure.mesh.triangles[found.triangle]]
-        # A pixel is 0.1 of the arm's units.
+        # A pixel is 0.1 units of the arm.
         assert corners[:, 0].min() - 0.1 <= 0.5 <= corners[:, 0].max() + 0.1
     assert click(offscreen, scene, -0.5, 1.6).actor == 0
 

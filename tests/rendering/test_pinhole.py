@@ -35,9 +35,9 @@ def camera_view(**changes) -> CameraView:
 
 
 def pixel(view: CameraView, point, size) -> np.ndarray:
-    """Return where our matrices put a scene point, in pixels counted from the first one's middle.
+    """Return a scene point projected by our matrices, in pixels from the centre of the first one.
 
-    OpenGL's window coordinates start at the picture's lower left corner.
+    OpenGL's window coordinates start at the image's lower left corner.
     """
     camera = Camera(fixed=view)
     clip = camera.projection_matrix(size[0] / size[1], BOX) @ camera.view_matrix() @ [*point, 1.0]
@@ -139,7 +139,7 @@ def test_depth_range_covers_the_scene_from_inside_too():
 
 @pytest.mark.parametrize("up", ["y", "z"])
 def test_leaving_the_fixed_view_stays_where_it_was(up):
-    """The orbit camera that is left stands at the same place and looks along the same axis."""
+    """The resulting orbit camera has the same position and viewing direction."""
     start = Camera(np.array([0.3, 0.2, -0.1]), 4.0, 40.0, -20.0, up=up)
     right, upward, backward = camera_axes(start)
     rotation = np.stack([right, -upward, -backward])
@@ -179,7 +179,7 @@ def test_a_fixed_camera_is_never_parallel():
 
 
 def test_distortion_matches_hand_calculation():
-    """Corner of the picture with K = diag(100, 100, 1), the principal point at (50, 50)."""
+    """Corner of the image with K = diag(100, 100, 1), the principal point at (50, 50)."""
     k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
 
     def error(*coefficients):

@@ -16,7 +16,7 @@ from viewer.rig.mesh import Mesh
 RED, GREEN, BLUE, YELLOW = (220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 210, 50)
 
 
-# Places
+# Positions
 
 
 def test_a_square_covers_the_expected_pixels(offscreen):
@@ -25,7 +25,7 @@ def test_a_square_covers_the_expected_pixels(offscreen):
 
 
 def test_perspective_covers_the_expected_pixels(offscreen):
-    """1 unit nearer at distance 2 everything is twice as large: -0.5 to 0.5 as -1 to 1."""
+    """1 unit nearer, from distance 2, doubles the size: -0.5 to 0.5 looks like -1 to 1."""
     camera = front(orthographic=False)
     assert covered(draw(offscreen, scene_of(square(1.0, 0.5)), camera=camera)) == (25, 74, 25, 74)
 
@@ -49,7 +49,7 @@ def test_placement_moves_an_actor(offscreen):
 
 
 def test_a_figure_far_from_the_origin_is_drawn_where_it_is(offscreen):
-    """10,000 units away float32 has steps of a thousandth; a 0.02 unit square keeps its pixels."""
+    """10,000 units away float32 has steps of 0.001; a 0.02 unit square keeps its pixels."""
     mesh = square(half=0.01)
     far = np.array([10_000.0, 5_000.0, -8_000.0])
     moved = replace(mesh, positions=mesh.positions + far)
@@ -91,7 +91,7 @@ def test_a_clockwise_ball_looks_like_a_counter_clockwise_one(offscreen):
     for flat in (False, True):
         options = plain(lights=Lights(), flat=flat)
         first, second = (draw(offscreen, scene_of(mesh), options) for mesh in (ball, turned))
-        # The same surface, rasterised from another corner: a unit of rounding.
+        # The same surface, rasterised from another corner: one step of rounding.
         assert np.abs(first.astype(int) - second).max() <= 2
 
 

@@ -33,7 +33,7 @@ def test_wireframe_draws_the_diagonal_dark_and_leaves_the_middle(offscreen):
     options = plain(wireframe=True)
     pixels = draw(offscreen, scene, options)
     dark = pixels[..., 0] < 160
-    # From the lower left to the upper right corner, one pixel a row.
+    # From the lower left to the upper right corner, one pixel per row.
     diagonal = [dark[row, 98 - row : 101 - row].any() for row in range(27, 73)]
     assert np.mean(diagonal) > 0.95
     # The tone curve shows 1 as 0.9: see test_tone.py.
@@ -89,7 +89,7 @@ def test_a_transparent_background_has_alpha_0(offscreen):
 
 
 def test_edges_have_straight_alpha(offscreen):
-    """A pixel half covered has half alpha and the colour of the figure, not a darker one."""
+    """A half-covered pixel has half alpha and the colour of the figure, not a darker one."""
     ball = replace(sphere(32), uvs=None)
     options = plain(samples=4)
     pixels = draw(offscreen, scene_of(ball), options)
@@ -100,7 +100,7 @@ def test_edges_have_straight_alpha(offscreen):
     assert partial.sum() > 50
     wanted = np.array([srgb(channel) for channel in SKIN_COLOR])
     error = np.abs(pixels[partial][:, :3] - wanted).max(axis=1)
-    # Stored times alpha in 8 bits, then divided by it.
+    # Stored premultiplied in 8 bits, then divided by alpha.
     assert (error <= 1.0 + 255.0 / alpha[partial]).all()
 
 
@@ -116,7 +116,7 @@ def test_grid_lines_are_drawn_only_if_asked(offscreen):
 
 
 def test_the_grid_hides_nothing(offscreen):
-    """It lies under the figure: from below the figure shows through between and behind lines."""
+    """It lies under the figure: from below, the figure is visible between and behind its lines."""
     scene = scene_of(sphere(16))
     camera = front(inclination=-50.0, distance=3.0)
     with_grid = draw(offscreen, scene, plain(grid=True), camera)
@@ -155,7 +155,7 @@ def test_a_flat_box_is_lit_from_both_sides(offscreen):
 
 
 def test_boxes_follow_the_pose(offscreen):
-    """A box along x, turned a quarter about z, stands upright."""
+    """A box along x, rotated by 90 degrees about z, stands upright."""
     figure = box_figure([[0, -0.1, -0.1], [1, 0.1, 0.1]])
     first, last, left, right = covered(draw(offscreen, Scene([bent(figure, (0, "z", np.pi / 2))])))
     assert abs(first - 25) <= 1 and abs(last - 49) <= 1
@@ -171,7 +171,7 @@ def test_the_selected_joint_is_highlighted_alone(offscreen):
     after = draw(offscreen, scene, options, camera, selected=1)
     changed = (before != after).any(axis=2)
     columns = np.nonzero(changed.any(axis=0))[0]
-    # Joint 1's box is 1.1 to 1.9, 0.4 aside of the middle: columns 40 to 59.
+    # Joint 1's box is 1.1 to 1.9, 0.4 from the centre: columns 40 to 59.
     assert (columns.min(), columns.max()) == (40, 59)
     red, green, blue = after[50, 50, :3].astype(int)
     assert red > green + 40 > blue + 80
@@ -194,7 +194,7 @@ def both_figure() -> Figure:
 
 
 def test_both_draws_the_boxes_as_one_translucent_layer(offscreen):
-    """Each box has two faces to look through, and there are two boxes: it is one layer still."""
+    """Each of the two boxes has two faces along a ray: it is still one layer."""
     scene = Scene([Actor(both_figure())])
     pixels = draw(offscreen, scene, plain(show="both", skeleton_opacity=0.4))
     assert set(np.unique(pixels[..., 3])) == {0, 102, 255}  # nothing, 0.4 of 255, the square
@@ -210,7 +210,7 @@ def test_both_tints_the_skin_with_the_nearest_boxes(offscreen):
 
 
 def test_both_leaves_nothing_behind(offscreen):
-    """Masks and depth tests are as before for the next picture."""
+    """Masks and depth tests are restored for the next image."""
     scene = Scene([Actor(both_figure())])
     wanted = draw(offscreen, scene_of(sphere(16)))
     draw(offscreen, scene, plain(show="both"))

@@ -23,7 +23,7 @@ def view():
 
 
 def test_pixels_are_those_of_a_pinhole(view):
-    # tan(45 deg) = 1: at a distance of 4 a unit is 50 / 4 pixels, from the middle (100, 50).
+    # tan(45 deg) = 1: at a distance of 4 a unit is 50 / 4 pixels, from the centre (100, 50).
     points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [1.0, 1.0, 2.0], [-2.0, -1.0, -1.0]])
     found = project(view, SIZE, points)
     wanted = [[100, 50], [112.5, 25], [125, 25], [80, 60]]
@@ -46,7 +46,8 @@ def test_pixels_unproject_to_points_at_a_given_depth(orthographic):
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=4.0, orthographic=orthographic)
     view, points = view_of(camera, SIZE, BOX), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 2.0]])
     found = unproject(view, SIZE, points, np.array([[112.5, 25.0], [100.0, 75.0]]))
-    # 12.5 pixels a unit at the target; at z = 2 half as much is seen, but not in parallel.
+    # 12.5 pixels a unit at the target; at z = 2 half as much is visible, except with an
+    # orthographic camera.
     assert_allclose(found, [[1, 2, 0], [0, -2 if orthographic else -1, 2]], atol=1e-12)
 
 
@@ -57,7 +58,7 @@ def test_segment_in_front_keeps_both_ends(view):
 
 
 def test_segment_that_ends_behind_the_eye_keeps_its_direction(view):
-    # In the plane x = y it is seen as a line to the right and upwards, whatever is cut off.
+    # In the plane x = y it projects to a line to the right and upwards, however it is clipped.
     ends, seen = project_segments(
         view, SIZE, np.array([[1.0, 1.0, 0.0]]), np.array([[1.0, 1.0, 9.0]])
     )
@@ -84,5 +85,5 @@ def test_segment_behind_the_eye_is_not_visible(view):
     ],
 )
 def test_marks_grow_with_the_image(size, scale):
-    # 720 x 1440 counts as 540 pixels high, which is less than marks go down to.
+    # 720 x 1440 counts as 540 pixels high, which is below the minimum for marks.
     assert picture_scale(size) == pytest.approx(scale)

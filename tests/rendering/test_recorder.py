@@ -24,7 +24,7 @@ TIMES = np.array([0.0, 0.1, 0.2, 0.35, 0.7, 1.0])
 
 
 class Kept:
-    """A sink that keeps what it is given, and can be told to fail."""
+    """A sink that keeps its frames, and can be made to fail."""
 
     def __init__(self, workers=1, n_samples=0, fails_at=None, problem=FULL):
         self.workers, self.n_samples, self.fails_at = workers, n_samples, fails_at
@@ -78,7 +78,7 @@ def run(offscreen, recording, sink) -> list[Progress]:
 
 
 def one_by_one(offscreen, recording, cameras=None) -> list[np.ndarray]:
-    """Return what single pictures show: posed here, drawn without the recorder."""
+    """Return single images: posed here, rendered without the recorder."""
     pictures = []
     actor = moving_arm()
     for index, seconds in enumerate(recording.times):
@@ -151,7 +151,7 @@ def test_turntable_is_a_seamless_loop(offscreen):
 
 
 def test_camera_follows_its_target(offscreen, scene):
-    """The arm moves along x by 2 a second and turns nothing else."""
+    """The arm moves along x at 2 units per second; only its elbow rotates."""
     straight = moving_arm(turns=False)
     options = DisplayOptions(background="transparent", grid=False)
     recording = recording_of(Scene([straight]), options=options)
@@ -164,7 +164,7 @@ def test_camera_follows_its_target(offscreen, scene):
     assert (fixed.frames[0] == followed.frames[0]).all()
     for frame in (1, 2):
         differs = (followed.frames[frame] != followed.frames[0]).any(axis=2)
-        assert differs.mean() < 0.02  # sums in another order move edges by the last bit
+        assert differs.mean() < 0.02  # summation in another order changes edges in the last bit
 
 
 def test_camera_waits_where_an_actor_is_absent(offscreen, scene):
@@ -286,7 +286,7 @@ def test_few_frames_are_queued_however_slow_the_sink(offscreen, scene):
     with offscreen.context:
         for progress in record(recording, offscreen.renderer, sink):
             drawn = progress.done
-            if drawn == 3:  # one being written, two that wait; the next must wait too
+            if drawn == 3:  # one being written, two queued; the next must wait too
                 threading.Timer(0.2, gate.set).start()
             assert drawn - len(sink.frames) <= 4
     assert drawn == 12 == len(sink.frames)

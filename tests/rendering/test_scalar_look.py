@@ -24,7 +24,7 @@ def test_largest_percent_of_values_is_left_out():
 
 
 def test_zero_values_do_not_count():
-    # 50 of 10,000 vertices move: nearly all numbers are 0, the range is that of the 50.
+    # 50 of 10,000 vertices move: nearly all values are 0, the range is that of the 50.
     numbers = np.zeros(10_000)
     numbers[:50] = np.linspace(-20, 30, 50)
     assert typical_span(numbers) == (-20.0, 30.0)

@@ -42,7 +42,7 @@ def rising(largest=1.0):
     """Return a scene whose view "correctives" rises from 0 at the left edge to the right one's."""
     figure = grid_figure()
     offsets = np.zeros((9, figure.mesh.n_vertices, 3))
-    # Half a turn about z drives row 0 with -2.
+    # A rotation by 180 degrees about z drives row 0 with -2.
     offsets[0, :, 1] = largest * (figure.mesh.positions[:, 0] + 1.5) / 6.0
     scene = alone(grid_figure(correctives=Correctives(offsets)))
     scene.actors[0].pose.dofs[5] = np.pi
@@ -50,7 +50,7 @@ def rising(largest=1.0):
 
 
 def view_of(offscreen, scene, name="correctives"):
-    """Draw without the correctives, so that the square stays where it is."""
+    """Draw without applying the correctives, so that the square does not move."""
     how = Skinning(correctives=False)
     return front_view(offscreen, scene, shading="scalar", scalar=name, skinning=how)
 
@@ -60,7 +60,7 @@ def test_colours_of_the_map_run_from_zero_to_the_largest_value(offscreen, larges
     picture = view_of(offscreen, rising(largest))
     pixels = colormap()[:, :3].astype(int)
     for x in (-1.4, -0.7, 0.0, 0.7, 1.4):
-        # Pixel centres are 0.025 apart from the place asked for, eight rows of 256.
+        # Pixel centres are 0.025 from the requested position, eight rows of 256.
         row = round(255 * (x + 1.5) / 3.0)
         near = pixels[max(row - 8, 0) : row + 9]
         assert np.abs(near - pixel(picture, x, 0.5)[:3]).max(axis=1).min() <= 6
@@ -231,7 +231,7 @@ def near(found, wanted, by=6):
 
 
 def test_weight_is_dark_grey_only_where_the_whole_triangle_has_none(offscreen):
-    # Only the corner at the lower right has weight of joint 2: the upper left triangle has none.
+    # Only the lower right corner is influenced by joint 2: the upper left triangle is not.
     rows = [[(0, 1.0)], [(2, 1.0)], [(0, 1.0)], [(0, 1.0)]]
     picture = shown(offscreen, two_joints(rows), "weight:j2")
     assert near(pixel(picture, -0.8, 0.8), NOTHING, 1)
@@ -294,7 +294,7 @@ def test_dominant_joints_meet_in_a_sharp_border(offscreen):
     row = picture[40, drawn(picture)[40]]
     is_first = np.array([near(found, colors[0]) for found in row])
     is_second = np.array([near(found, colors[1]) for found in row])
-    # In the middle, and at most two pixels are of neither colour.
+    # In the middle; at most two pixels have neither colour.
     assert is_first[:29].all() and is_second[31:].all()
     assert (is_first | is_second).sum() >= 58
 
@@ -380,7 +380,7 @@ def test_figure_without_the_quantity_is_drawn_normally(offscreen):
     half = together.shape[1] // 2
     np.testing.assert_array_equal(together[:, :half], apart[0][:, :half])
     np.testing.assert_array_equal(together[:, half:], apart[1][:, half:])
-    # The one that has it hidden: the other stays as it is, and the legend keeps its title.
+    # With the figure that has it hidden: the other is unchanged, and the legend keeps its title.
     having.visible = False
     alone_now = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
     np.testing.assert_array_equal(alone_now[:, half:], apart[1][:, half:])

@@ -28,7 +28,7 @@ def draw(offscreen, scene, options, camera, box=GROUND, size=(N, N)):
 
 
 def plate(height: float, half: float = 0.25) -> Mesh:
-    """Return a level square above the origin."""
+    """Return a horizontal square above the origin."""
     upright = square(half=half, material=WHITE)
     turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y becomes -z, z becomes y
     positions = upright.positions @ turn.T + [0.0, height, 0.0]
@@ -45,7 +45,7 @@ def with_shadows(**changes) -> DisplayOptions:
 
 
 def test_shadow_of_a_plate_lies_where_light_at_45_degrees_throws_it(offscreen):
-    """From +x: a plate of -0.25 to 0.25 at height 1 darkens x from -1.25 to -0.75."""
+    """Light from +x: a plate from -0.25 to 0.25 at height 1 darkens x from -1.25 to -0.75."""
     light = lights(0.2, 1.0, azimuth=90.0, inclination=45.0, follow_camera=False)
     pixels = draw(offscreen, scene_of(plate(1.0)), with_shadows(lights=light), from_above())
     alpha = pixels[..., 3].astype(float)
@@ -59,7 +59,7 @@ def test_shadow_of_a_plate_lies_where_light_at_45_degrees_throws_it(offscreen):
 
 
 def test_shadow_falls_on_another_figure(offscreen):
-    """Below a plate, light from straight above reaches a larger plate only beside it."""
+    """Below a plate, light from straight above reaches a larger plate only around it."""
     light = lights(0.2, 0.6, inclination=90.0, follow_camera=False)
     scene = scene_of(plate(1.0), plate(0.4, half=1.0))
     options = with_shadows(lights=light)
@@ -75,7 +75,7 @@ def test_shadow_falls_on_another_figure(offscreen):
 
 
 def test_surfaces_do_not_shadow_themselves(offscreen):
-    """A ball under a grazing light differs from one without shadows at its terminator only."""
+    """A ball under grazing light differs from one without shadows only at its terminator."""
     light = lights(0.2, 0.8, azimuth=60.0, inclination=20.0)
     camera, box = front(), np.array([[-1.0, -1, -1], [1, 1, 1]])
     options = with_shadows(lights=light)
@@ -180,7 +180,7 @@ def test_spheres_of_joints_contain_all_vertices(seed):
 
 
 def test_software_draws_fewer_passes_of_large_pictures(offscreen):
-    """8.3 megapixels take 0.85 s a pass by the estimate: 2 of 8 passes are too few."""
+    """8.3 megapixels take an estimated 0.85 s per pass: only 2 of 8 passes would be too few."""
     scene = Scene([])
     found = {}
     for size in ((640, 480), (2400, 1800), (3840, 2160), (8000, 8000)):

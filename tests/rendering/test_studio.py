@@ -1,4 +1,4 @@
-"""The studio's light: what the script makes is what is bundled, and both are the integrals."""
+"""The studio's light: the script reproduces the bundled file, and both equal the integrals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from viewer.resources import resource
 
 ROWS = np.array([3, 40, 70, 101])
-STEPS = 240  # of the quadrature, from pole to pole
+STEPS = 240  # steps of the quadrature, from pole to pole
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_the_bundled_light_is_what_the_script_makes(generator, bundled):
 
 
 def test_borders_continue_the_octahedral_map(generator):
-    """Beyond an edge lies the edge's own texel at the place mirrored about its middle."""
+    """Beyond an edge is the edge's own texel, mirrored about the centre of the edge."""
     points = generator.octahedral_directions(8)
     assert_allclose(points[0, 1:-1], points[1, 1:-1][::-1], atol=1e-12)
     assert_allclose(points[1:-1, -1], points[1:-1, -2][::-1], atol=1e-12)

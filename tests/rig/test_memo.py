@@ -1,4 +1,4 @@
-"""Cached results: number, lifetime, and use by several threads."""
+"""Cached results: count, lifetime, and use by several threads."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ CUBE = np.array([[a, b, c] for s in SIDES for a, b, c in ((s[0], s[1], s[2]), (s
 
 
 def atlas():
-    """Return a cube with a separate area of the picture for each side."""
+    """Return a cube with a separate area of the texture for each side."""
     uvs, corners = [], []
     for side in range(6):
         uvs += [[side, 0], [side + 1, 0], [side + 1, 1], [side, 1]]
@@ -70,7 +70,7 @@ def test_vertices_without_triangles_stay():
 
 
 def test_one_seam_doubles_the_vertices_along_it():
-    # A strip of two squares bent to a ring: vertices 0 and 1 are at both ends of the picture.
+    # A strip of two squares bent to a ring: vertices 0 and 1 are at both ends of the texture.
     ring = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5], [4, 0, 5], [5, 0, 1]])
     in_picture = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5], [4, 6, 5], [5, 6, 7]])
     mesh = Mesh(

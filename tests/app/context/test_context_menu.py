@@ -11,7 +11,7 @@ from viewer.app.weights.state import Weights
 
 @pytest.fixture
 def bones(drive, rig):
-    """A hand on the tiny figure with its skeleton."""
+    """A test driver on the tiny figure with its skeleton."""
     hand = drive(*rig)
     hand.state.options.show = "both"
     hand.step(2)

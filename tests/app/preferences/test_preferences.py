@@ -19,7 +19,7 @@ CHANGED = Preferences("light", 1.5, 18.0, False, "draft", 8, "z", {WIREFRAME: "S
 
 @pytest.fixture
 def shown(drive, rig):
-    """A hand on an app with the window open."""
+    """A test driver on an app with the window open."""
     hand = drive(*rig, size=(1280, 1000), samples=1)
     hand.key("comma", "ctrl")
     hand.step(3)

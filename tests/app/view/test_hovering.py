@@ -13,7 +13,7 @@ from viewer.rendering.outlined import Outlined
 
 @pytest.fixture
 def bones(drive, rig):
-    """A hand on the tiny figure with its skeleton."""
+    """A test driver on the tiny figure with its skeleton."""
     hand = drive(*rig)
     hand.state.options.show = "both"
     hand.step(2)
@@ -22,7 +22,7 @@ def bones(drive, rig):
 
 @pytest.fixture
 def pair(drive, rig):
-    """A hand on two tiny figures side by side."""
+    """A test driver on two tiny figures side by side."""
     return drive(*rig, *rig, size=(1280, 800))
 
 

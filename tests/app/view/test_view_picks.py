@@ -30,7 +30,7 @@ def column(drive, rig):
 
 
 def vertices(hand, index=0):
-    """Return where the vertices are drawn, scene space."""
+    """Return where the vertices are drawn, in scene space."""
     actor = hand.state.scene.actors[index]
     return deform(actor.figure, actor.pose, hand.state.options.skinning)[0]
 

@@ -86,7 +86,7 @@ def test_worst_joint_vertex_and_weight_are_named_and_exit_code_is_set(tmp_path, 
     assert lines[4] == "    weights: at most 0.5 (vertex 2), mean 0.125"
     assert lines[-1] == "  differs by more than the tolerance of 0.09"
     assert said(capsys, *arguments, "--tolerance", "0.5")[0] == 0  # the weights' 0.5 is within
-    assert said(capsys, *arguments)[0] == 0  # nothing was asked
+    assert said(capsys, *arguments)[0] == 0  # no tolerance was given
 
 
 def test_many_comparisons_form_a_table_and_an_unreadable_one_does_not_stop_the_others(

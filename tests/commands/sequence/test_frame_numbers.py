@@ -155,7 +155,7 @@ def test_render_and_convert_give_frames_the_same_numbers(hundred, tmp_path):
     with np.load(tmp_path / "m.npz") as arrays:
         assert arrays["frames"].tolist() == [101, 102, 103]
         assert_allclose(np.diff(arrays["joints"][:, 0, 1]), 1.0, atol=1e-9)
-    # And the one at a given number is the one that has it as its name.
+    # The mesh at a given frame number is the one in the file of that number.
     found = {}
     for frame in (101, 103):
         out = tmp_path / f"one{frame}.obj"

@@ -33,7 +33,7 @@ def single(files, seconds, camera, box, size=(64, 48), **options) -> np.ndarray:
         return offscreen.render(scene, size, camera, shown, box).astype(int)
 
 
-# Numbered pictures
+# Numbered images
 
 
 def test_numbered_images_match_the_frames(draw, walk, tmp_path):

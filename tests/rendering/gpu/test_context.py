@@ -1,4 +1,4 @@
-"""Machines without a usable OpenGL, simulated by the environment; each has its message."""
+"""Machines without a usable OpenGL, simulated by the environment; each has its own message."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TINY_SKEL = """balljoint root {
 
 
 def viewer_render(tmp_path, *arguments: str, **environment: str):
-    """Run ``viewer render`` on one joint in a fresh process; return it and the picture's path."""
+    """Run ``viewer render`` on one joint in a fresh process; return it and the image's path."""
     skel, output = tmp_path / "one.skel", tmp_path / "one.png"
     skel.write_text(TINY_SKEL)
     command = [sys.executable, "-m", "viewer", "render", str(skel), "-o", str(output)]
@@ -119,7 +119,7 @@ def test_an_old_shading_language_is_distinguished_from_an_old_opengl(tmp_path, n
             4,
             ("missing drawing", "EGL found 0 devices"),
         ),
-        # No server has this number.
+        # No server has this display number.
         ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
     ],
 )
@@ -259,7 +259,7 @@ def test_opengl_errors_are_raised_with_the_operation(ctx):
 
 
 def test_an_upload_without_memory_reports_the_requested_size(ctx, monkeypatch):
-    """moderngl raises nothing; only the context's error tells."""
+    """moderngl raises nothing; only the context's error state reveals it."""
     monkeypatch.setattr(moderngl.Context, "error", property(lambda self: "GL_OUT_OF_MEMORY"))
     with pytest.raises(
         RenderError,

@@ -1,4 +1,4 @@
-"""Triangles in an order in which neighbours follow one another, none lost, runs kept."""
+"""Triangle order for the vertex cache: neighbours are consecutive, none is lost, runs are kept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rendering.gpu.surfaces import PLAIN
 
 
 def shaded(triangles, kept=32) -> int:
-    """Return how many vertices are computed by a driver that keeps the last few."""
+    """Return how many vertices are shaded with a cache of the last few."""
     recent: list[int] = []
     count = 0
     for vertex in np.ravel(triangles).tolist():

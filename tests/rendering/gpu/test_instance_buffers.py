@@ -29,12 +29,12 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor, Scene, figure_pose, scene_box
 from viewer.rig.skinning import METHODS, Skinning
 
-TOLERANCE = 1e-5  # of the figure's size, as for single actors
+TOLERANCE = 1e-5  # relative to the figure's size, as for single actors
 VARYINGS = "v_position", "v_normal"
 
 
 class Instances:
-    """Instances that are read back instead of drawn."""
+    """Instances whose vertices are read back instead of drawn."""
 
     def __init__(self, ctx, figure: Figure, way: str = "") -> None:
         self.context, self.programs = ctx, Programs(ctx)
@@ -42,7 +42,7 @@ class Instances:
         self.instances = InstanceBuffers(ctx, self.mesh, way)
 
     def vertices(self, actors, how: Skinning, eye=(0.0, 0.0, 0.0)):
-        """Return what the vertex shader of the picture writes, relative to the eye."""
+        """Return the output of the drawing pass's vertex shader, relative to the eye."""
         matrix = np.eye(4)
         matrix[:3, 3] = -np.asarray(eye)
         view = View(matrix, np.eye(4), Camera())
@@ -109,7 +109,7 @@ def test_the_bundled_body_with_correctives_and_shape(ctx, how, way):
     for actor in actors:
         actor.pose.shape_weights[:2] = 1.5, -1.0
     check(instances, actors, how)
-    # Some rest, then all: their offsets must not stay.
+    # Some at rest, then all: old offsets must not remain.
     actors[1].pose = figure_pose(figure)
     actors[1].pose.shape_weights[:2] = 1.5, -1.0
     check(instances, actors, how)
@@ -175,7 +175,7 @@ def test_placement_and_scale_of_each_actor_are_applied(ctx):
         posed, directions = viewer.deform(figure, actor.pose)
         matrix = actor.placement[:3, :3]
         assert np.allclose(found, posed @ matrix.T + actor.placement[:3, 3], atol=1e-5 * 10)
-        # Normals turn by the inverse transpose: the placement stretches x to twice its length.
+        # Normals transform by the inverse transpose: the placement stretches x to twice its length.
         wanted = directions @ np.linalg.inv(matrix)
         wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
         turned = turned / np.linalg.norm(turned, axis=1, keepdims=True)

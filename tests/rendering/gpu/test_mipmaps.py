@@ -1,4 +1,4 @@
-"""Smaller versions of a texture: sizes, averages in linear light, and what is sampled from them."""
+"""Smaller versions of a texture: sizes, averages in linear light, and sampled values."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def level_as_drawn(ctx, texture, level: int, size):
 @pytest.mark.parametrize("size", [(16, 16), (64, 16), (5, 3), (1, 8)])
 @pytest.mark.parametrize("own", [True, False])
 def test_shaders_see_every_level(ctx, monkeypatch, size, own):
-    """Ours and the driver's agree with the averages; drivers treat odd sides as they like."""
+    """Ours and the driver's agree with the averages; drivers are free in treating odd sizes."""
     monkeypatch.setattr(mipmaps, "is_software", lambda context: own)
     pixels = noise(*size)
     texture = ctx.texture(size[::-1], 4, pixels.tobytes(), internal_format=SRGB8_ALPHA8)
@@ -105,7 +105,7 @@ def test_shaders_see_every_level(ctx, monkeypatch, size, own):
         wanted = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
         seen = level_as_drawn(ctx, texture, level, picture.shape[1::-1])[..., :3]
         if own or not odd:
-            # llvmpipe decodes sRGB with 0.0012 of error. Eight bits of sRGB are at most 0.009
-            # apart in linear light, and the driver rounds anew at every level.
+            # llvmpipe decodes sRGB with an error of 0.0012. Steps of 8-bit sRGB are at most 0.009
+            # in linear light, and the driver rounds again at every level.
             np.testing.assert_allclose(seen, wanted, rtol=0, atol=2e-3 if own else 0.01 * level)
     texture.release()

@@ -1,4 +1,4 @@
-"""Messages about OpenGL versions that are too old, or only seem new enough."""
+"""Messages about OpenGL versions that are too old, or that only appear new enough."""
 
 import pytest
 
@@ -14,7 +14,7 @@ MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
         ("2.1 Mesa 22.3.6", "1.20", {}, "OpenGL 3.3", "offers 2.1 with GLSL 1.20 ("),
         ("OpenGL ES 3.2 Mesa", "OpenGL ES GLSL ES 3.20", {}, "OpenGL 3.3", "offers 3.2 with GLSL"),
         ("3.3 (Core Profile)", "1.50", {}, "GLSL 3.30", "offers GLSL 1.50 ("),
-        # What is overridden counts for core profiles; a compatibility profile does not show it.
+        # The override applies to core profiles; a compatibility profile does not report it.
         (
             "4.5 (Compatibility Profile) Mesa 22.3.6",
             "4.50",

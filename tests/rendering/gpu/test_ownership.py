@@ -41,7 +41,7 @@ def test_guard_frees_on_failure():
 
 
 class Alive:
-    """Counts the objects that were made and not released."""
+    """Counts the objects that were created and not released."""
 
     def __init__(self, monkeypatch, refused: int) -> None:
         self.made, self.objects = 0, []
@@ -93,7 +93,7 @@ def test_refused_posed_mesh_leaves_nothing_behind(ctx, monkeypatch):
 
 
 class Spy:
-    """A context that remembers what it made."""
+    """A context that records the objects it creates."""
 
     def __init__(self, context: moderngl.Context, alive: Alive) -> None:
         self._context, self._alive = context, alive

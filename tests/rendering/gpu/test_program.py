@@ -25,7 +25,7 @@ def shaders(tmp_path, monkeypatch):
 
 
 def build(ctx, name: str):
-    """Compile every program that a file takes part in."""
+    """Compile every program that uses a file."""
     programs = Programs(ctx)
     try:
         if name.startswith("instance"):
@@ -52,7 +52,7 @@ def build(ctx, name: str):
 
 
 def lines_to_break(text: str) -> list[int]:
-    """Return lines, counted from 1, behind which a statement without meaning is an error."""
+    """Return lines, counted from 1, after which a meaningless statement is an error."""
     lines = text.splitlines()
     return [
         number for number, line in enumerate(lines, 1) if line.startswith("    ") and ";" in line
@@ -131,7 +131,7 @@ def test_every_shading_mode_compiles(ctx, shading):
     programs = Programs(ctx)
     programs.drawing("mesh", shading)
     for effects in ((), ("SHADOWS",), ("SHADOWS", "OCCLUSION")):
-        if shading != "scalar":  # which shows numbers on any material
+        if shading != "scalar":  # which shows scalars on any material
             programs.drawing("mesh", shading, materials=True, effects=effects)
     programs.release()
 

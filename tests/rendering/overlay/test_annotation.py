@@ -21,7 +21,7 @@ def lettering():
 
 
 def placed(lettering, points, ranks, words=None):
-    """Return what is drawn of words at points, seen from +z, 180 pixels a unit."""
+    """Return the labels drawn for words at points, seen from +z, at 180 pixels per unit."""
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     count = len(points)
     colors = np.arange(3.0 * count).reshape(count, 3) / 100
@@ -79,7 +79,7 @@ def test_lines_lead_from_next_to_the_point_to_its_label(lettering):
     # A dark one beneath one in the word's own colour, in the plane of the point: z = 0.
     assert len(lines.widths) == 2 and lines.widths[0] > lines.widths[1]
     assert_allclose(lines.colors[1], [0.06, 0.07, 0.08, 1.0])
-    # 180 pixels a unit, the middle at (400, 360). The word is three gaps of 7 * 600 / 720 above.
+    # 180 pixels per unit, the centre at (400, 360). The word is three gaps of 7 * 600 / 720 above.
     assert_allclose(lines.starts[1], [0.0, 5.0 * 600 / 720 / 180, 0.0], atol=1e-12)
     end = [0.0, (360.0 - found.ends[2, 1]) / 180.0, 0.0]
     assert_allclose(lines.ends[1], end, atol=1e-12)

@@ -23,7 +23,7 @@ def offscreen():
 
 
 def boned() -> Scene:
-    """Return a square before bones from (-1, 0) to (1, 0) and on to (1, 1)."""
+    """Return a square in front of bones from (-1, 0) to (1, 0) to (1, 1)."""
     figure = grid_figure()
     joints = Figure("bones", skeleton=skeleton([-1, 0, 1], OFFSETS))
     return Scene([Actor(Figure("square", figure.mesh)), Actor(joints)])
@@ -73,7 +73,7 @@ def test_bones_are_not_drawn_in_bind_pose(offscreen):
 def test_axes_point_right_and_up(offscreen):
     scene = alone(Figure("bones", skeleton=skeleton([-1, 0], [[-1.5, 0, 0], [3.0, 0, 0]])))
     picture = front_view(offscreen, scene, joint_axes=True, show="skeleton")
-    # A twentieth of 3 units is 3 pixels; a dot of 5.6 lies over their beginning.
+    # A twentieth of 3 units is 3 pixels; a dot of 5.6 pixels covers their starts.
     plain = front_view(offscreen, scene, show="skeleton")
     column, row = 10, 40
     there = (picture[row - 6 : row + 6, column - 6 : column + 8].astype(int)

@@ -38,7 +38,7 @@ def chain() -> Actor:
 
 def test_marks_follow_pose_and_placement():
     actor = chain()
-    actor.pose.dofs[2] = np.pi / 2  # the root turns about z
+    actor.pose.dofs[2] = np.pi / 2  # the root rotates about z
     actor.pose.figure_translation[:] = 0.0, 0.0, 5.0
     actor.pose.figure_scale = 2.0
     actor.placement[0, 3] = 10.0
@@ -60,7 +60,7 @@ def test_bones_lead_from_parents_to_children_over_dark_ones():
     assert_allclose(bones.ends[3:], [[1, 0, 0], [1, 1, 0], [1, 1, 0]], atol=1e-12)
     assert_allclose(bones.starts[:3], bones.starts[3:])
     assert_allclose(bones.widths, [10.0] * 3 + [6.0] * 3)
-    assert_allclose(bones.colors[4], HIGHLIGHT)  # the bone that the selected joint turns
+    assert_allclose(bones.colors[4], HIGHLIGHT)  # the bone that the selected joint rotates
     assert (bones.colors[3] != bones.colors[4]).any()
 
 
@@ -102,7 +102,7 @@ def test_lone_joint_has_axes():
 
 
 def at(view, x, y, with_bones=True, actors=None):
-    """Return the actor and joint at a place of the plane z = 0."""
+    """Return the actor and joint at a point of the plane z = 0."""
     marks = marks_of([chain()] if actors is None else actors)
     found = joint_at(marks, view, SIZE, (400 + 200 * x, 400 - 200 * y), with_bones)
     return None if found is None else found[:2]
@@ -130,7 +130,7 @@ def test_nearer_actor_wins_where_two_coincide(view):
     near.placement[2, 3] = 0.5
     assert at(view, 1.0, 0.0, actors=[far, near]) == (1, 1)
     assert at(view, 1.0, 0.0, actors=[near, far]) == (0, 1)
-    # Its point is that of the joint.
+    # The returned point is the joint's.
     found = joint_at(marks_of([near]), view, SIZE, (600.0, 400.0), True)
     assert_allclose(found[2], [1.0, 0.0, 0.5], atol=1e-12)
 

@@ -26,7 +26,7 @@ def lettering():
 
 
 def placed(lettering, offsets, selected=(0, -1)):
-    """Return the names that are drawn of joints at these places, seen from +z."""
+    """Return the names drawn for joints at given positions, seen from +z."""
     joints = skeleton([-1] * len(offsets), offsets)
     marks = marks_of([Actor(Figure("figure", skeleton=joints))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
@@ -38,14 +38,14 @@ def test_well_separated_joints_are_all_named(lettering):
     names = placed(lettering, [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
     assert sorted(names.texts) == ["j0", "j1", "j2"]
     assert (names.n_seen, names.n_left_out) == ((3,), (0,))
-    # 180 pixels a unit: joint 0 is at (220, 360), its name right of it, at its height.
+    # 180 pixels per unit: joint 0 is at (220, 360), its name right of it, at the same height.
     left, top = names.corners[names.texts.index("j0")].tolist()
     assert 222 < left < 230 and 345 < top < 360
 
 
 def test_nearest_joints_are_named_if_not_all_fit(lettering):
     names = placed(lettering, [[0, 0, z] for z in (0.0, 1.0, -1.0, 0.5, -0.5)])
-    # Right and left of the place, above and below it.
+    # Right and left of the position, above and below it.
     assert names.texts == ("j1", "j3", "j0", "j4")
     assert (names.n_seen, names.n_left_out) == ((5,), (1,))
 

@@ -21,7 +21,7 @@ def test_label_in_the_middle_has_eight_positions_at_three_distances():
     places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert places.ranks.tolist() == list(range(24))
     assert places.has_line.tolist() == [False] * 8 + [True] * 16
-    # Right, left, above and below, and the same three gaps away.
+    # Right, left, above and below, and the same at three times the distance.
     rows = [0, 1, 6, 7, 8, 9, 14, 15]
     assert places.low[rows].tolist() == [
         [158, 95], [112, 95], [135, 82], [135, 108],
@@ -33,7 +33,7 @@ def test_label_in_the_middle_has_eight_positions_at_three_distances():
 def test_positions_outside_the_image_are_excluded():
     places = places_of(np.array([(4.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert (places.low[:, 0] >= 0).all() and 1 not in places.ranks
-    # Above it is room, as the label may be shifted along.
+    # There is room above it, as the label may be shifted sideways.
     assert places.low[places.ranks == 6].tolist() == [[0, 82]]
 
 
@@ -46,7 +46,7 @@ def test_leader_line_starts_half_a_margin_off_and_ends_a_pixel_before_the_label(
 
 @pytest.fixture(params=[60, 300, 1500], scope="module")
 def scene(request):
-    """Return points a quarter of a pixel apart or more, their labels' places, and their dots."""
+    """Return points at least a quarter of a pixel apart, label candidates, and dots."""
     rng = np.random.default_rng(2)
     points = np.unique(rng.integers(0, 4 * np.array(PICTURE), (request.param, 2)), axis=0) / 4.0
     sizes = rng.integers(2, 30, (len(points), 2)).astype(np.int32)
@@ -56,13 +56,13 @@ def scene(request):
 
 @pytest.fixture(scope="module")
 def room(scene):
-    """Return how far the scene's places and their lines are from other points."""
+    """Return the distances of the scene's candidates and their lines from other points."""
     points, places, _ = scene
     return by_hand(points, places)
 
 
 def by_hand(points, places):
-    """Return how far the places and their lines are from points that are not alike: (M,)."""
+    """Return the distances of candidates and their lines from distinct points: (M,)."""
     clear, beside = np.full((2, len(places.labels)), np.inf)
     for label in np.unique(places.labels):
         rows = np.flatnonzero(places.labels == label)

@@ -43,7 +43,7 @@ def test_ranges_are_concatenated():
 
 @pytest.fixture(params=[40, 6000], ids=["few", "instance"])
 def scene(request):
-    """Return dots on a grid of quarter pixels, so that none is another, and rectangles."""
+    """Return distinct dots on a grid of quarter pixels, and rectangles."""
     rng = np.random.default_rng(1)
     points = np.unique(rng.integers(-20, 420, (request.param, 2)), axis=0) / 4.0
     low = rng.uniform(-10, 100, (50, 2))
@@ -60,7 +60,7 @@ def test_counts_within_rectangles_are_bounded(scene):
     counts = within(points, low, high).sum(axis=1)
     fewest, most = dots.fewest_within(low, high), dots.most_within(low, high)
     assert (fewest <= counts).all() and (counts <= most).all()
-    # Two cells more on either side.
+    # Two more cells on either side.
     wider = within(points, low - 8.0, high + 8.0).sum(axis=1)
     is_inside = (low >= 8.0).all(axis=1) & (high <= (92.0, 82.0)).all(axis=1)
     assert is_inside.any() and (most <= wider)[is_inside].all()

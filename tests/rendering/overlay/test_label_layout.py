@@ -13,7 +13,7 @@ PICTURE = (100, 60)
 
 
 def placed(anchors, sizes, order=None, gap=4.0):
-    """Return what was placed: index to left upper corner."""
+    """Return the placed labels: index to upper left corner."""
     order = np.arange(len(anchors)) if order is None else np.array(order)
     layout = lay_out(np.array(anchors, float), order, np.array(sizes), PICTURE, gap)
     return dict(zip(layout.chosen.tolist(), map(tuple, layout.corners.tolist()), strict=True))
@@ -58,17 +58,17 @@ def test_label_does_not_lie_on_another_point():
 
 
 def test_free_position_is_preferred_to_one_near_another_point():
-    # The right place ends 7 before the other point: less than three gaps of 4.
+    # The right position ends 7 before the other point: less than three distances of 4.
     assert placed([(50.0, 30.0), (91.0, 30.0)], [(30, 10)] * 2)[0] == (16, 25)
     assert placed([(50.0, 30.0), (97.0, 30.0)], [(30, 10)] * 2)[0] == (54, 25)
-    # Left of the point is no room, and above it is more than to its right.
+    # There is no room left of the point, and more above it than to its right.
     assert placed([(20.0, 30.0), (61.0, 30.0)], [(30, 10)] * 2)[0] == (5, 16)
 
 
 def test_crowded_point_gets_a_leader_line():
     row = np.array([(38.0, 30.0), (50.0, 30.0), (62.0, 30.0)])
     layout = lay_out(row, np.array([1, 0, 2]), np.full((3, 2), [30, 10]), PICTURE, 4.0)
-    # All places 4 away are nearer than 6 to one of the others.
+    # All positions 4 away are closer than 6 to one of the others.
     assert layout.chosen[0] == 1 and layout.has_line[0]
     left, top = layout.corners[0]
     for x, y in row[[0, 2]]:
@@ -86,7 +86,7 @@ def instances(n_across, step):
 
 
 def drawn(anchors, size=(60, 14), gap=7.0):
-    """Return the indices of the labels that are drawn in a large picture."""
+    """Return the indices of the labels that are drawn in a large image."""
     order = np.arange(len(anchors), dtype=np.int32)
     return lay_out(anchors, order, np.tile(size, (len(anchors), 1)), WIDE, gap).chosen
 
@@ -103,7 +103,7 @@ def test_isolated_points_are_labelled_regardless_of_order(n_across, step):
 
 
 def test_labels_at_one_point_leave_room_for_a_neighbour():
-    # 2,000 labels at one place have room for four.
+    # Of 2,000 labels at one position, four fit.
     anchors = np.concatenate([np.full((2000, 2), 300.0), LONELY[:1]])
     found = drawn(anchors)
     assert len(found) == 5 and found[-1] == 2000
@@ -127,7 +127,7 @@ def test_label_wider_than_the_picture_is_left_out():
     )
 )
 def test_labels_do_not_overlap_and_are_unambiguous(rows):
-    # Those within a quarter of a pixel are one.
+    # Those within a quarter of a pixel count as one.
     anchors = np.array([row[:2] for row in rows], dtype=float).reshape(-1, 2) / 4.0
     sizes = np.array([row[2:] for row in rows], dtype=np.int32).reshape(-1, 2)
     layout = lay_out(anchors, np.arange(len(rows)), sizes, PICTURE, 3.0)

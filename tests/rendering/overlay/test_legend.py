@@ -21,7 +21,7 @@ from viewer.rig.skinning import Skinning
 
 
 def strip(influences=None, **parts) -> Figure:
-    """Return four triangles of areas 1, 2, 3 and 4 in a fan, each vertex but the first for one."""
+    """Return a fan of four triangles with areas 1, 2, 3 and 4."""
     points = [[0.0, 0, 0], [0, -1, 0], [2, 0, 0], [0, 2, 0], [-3, 0, 0], [0, -8 / 3, 0]]
     triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]]
     surface = Mesh(np.array(points), np.tile([0.0, 0, 1], (6, 1)), np.array(triangles))
@@ -31,7 +31,7 @@ def strip(influences=None, **parts) -> Figure:
 
 
 def legend(name, *numbers, figure=None, **options):
-    """Return the legend of figures that have these numbers at their vertices."""
+    """Return the legend of figures with given vertex values."""
     figure = figure or strip(unit="m")
     shown_options = DisplayOptions(scalar=name, **options)
     values = [np.array(each, dtype=float) for each in numbers]

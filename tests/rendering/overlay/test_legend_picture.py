@@ -27,7 +27,7 @@ def offscreen():
 
 
 def rows_with(pixels, color):
-    """Return the rows of a picture that contain a colour."""
+    """Return the rows of an image that contain a colour."""
     return np.flatnonzero((pixels[..., :3] == color).all(axis=2).any(axis=1))
 
 
@@ -38,7 +38,7 @@ def test_bar_runs_from_the_first_to_the_last_colour():
     row = pixels[bar[len(bar) // 2], :, :3].astype(int)
     places = [int(np.abs(row - color).sum(axis=1).argmin()) for color in colors[[2, 64, 128, 253]]]
     assert places == sorted(places) and places[-1] - places[0] > 100
-    # Evenly: a quarter of the colours is a quarter of the bar.
+    # Linearly: a quarter of the colours is a quarter of the bar.
     assert places[1] - places[0] == pytest.approx((places[-1] - places[0]) * 62 / 251, abs=2)
 
 
@@ -60,7 +60,7 @@ def test_swatches_are_below_each_other_in_their_order():
 
 
 def joints(count, size, name="joint {}"):
-    """Return the legend of so many joints, and where their swatches begin: columns, None if not."""
+    """Return the legend of n joints, and the first columns of their swatches, None if hidden."""
     entries = tuple(
         Entry((200, index % 256, 40 + index // 256), name.format(index)) for index in range(count)
     )
@@ -153,7 +153,7 @@ def test_legend_is_drawn_pixel_by_pixel_into_the_corner(offscreen, samples):
     assert (rows[-1] - top + 1, columns[-1] - left + 1) == pixels.shape[:2]
     assert top == left == 5
     found = picture[top : rows[-1] + 1, left : columns[-1] + 1]
-    # Nothing is behind it there: colours and opacity are its own, to rounding.
+    # There is nothing behind it: colours and opacity are exact, to rounding.
     np.testing.assert_allclose(found.astype(int), pixels, atol=2)
 
 

@@ -13,7 +13,7 @@ def test_text_sizes_match_the_pixels():
     for word, (width, height) in zip(words, letters.sizes(words).tolist(), strict=True):
         assert letters.pixels(word).shape == (height, width, 2)
     widths = letters.sizes(words)[:, 0]
-    assert widths[2] == 4 and widths[0] < widths[1]  # nothing has its rims, two pixels each
+    assert widths[2] == 4 and widths[0] < widths[1]  # empty text has only outlines, two pixels each
 
 
 def test_letters_are_white_within_a_dark_rim():
@@ -22,7 +22,7 @@ def test_letters_are_white_within_a_dark_rim():
     assert (grey <= opacity).all() and grey.max() == 255 and opacity.max() == 255
     inside, rim = grey > 200, (grey == 0) & (opacity > 200)
     assert inside.any() and rim.any()
-    # Left and right of any row with ink there is rim.
+    # Every row with ink has an outline left and right of it.
     for row in np.flatnonzero(inside.any(axis=1)):
         columns = np.flatnonzero(inside[row])
         assert rim[row, : columns[0]].any() and rim[row, columns[-1] + 1 :].any()

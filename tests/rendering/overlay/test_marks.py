@@ -38,7 +38,7 @@ def points(*places, radius=4.0) -> Marks:
 def test_a_point_is_a_bright_disc_with_a_dark_border(offscreen):
     picture = marked(offscreen, points((0.5, -1.0, 0.0)))
     assert pixel(picture, 0.5, -1.0) == [*COLOR, 255]
-    # A unit is 20 pixels: 4.5 pixels from the middle lies the border, 8 pixels nothing.
+    # A unit is 20 pixels: the border is 4.5 pixels from the centre, nothing is 8 pixels away.
     border = pixel(picture, 0.5 + 4.5 / 20, -1.0)
     assert max(border[:3]) < 60 and border[3] == 255
     assert pixel(picture, 0.5 + 8 / 20, -1.0)[3] == 0
@@ -75,7 +75,7 @@ def test_no_marks_draw_no_pixels(offscreen):
 
 
 def perspective(offscreen, marks):
-    """Return a picture from z = 2 towards the origin, a right angle wide."""
+    """Return an image from z = 2 towards the origin, with a 90 degree field of view."""
     offscreen.renderer.marks = marks
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0)
     options = DisplayOptions(background="transparent", grid=False, samples=1)
@@ -95,7 +95,7 @@ def test_marks_behind_the_eye_are_not_drawn(offscreen):
 
 
 def test_a_line_that_passes_the_eye_is_clipped(offscreen):
-    # From the picture's middle to behind the eye, to the right: only the right half shows it.
+    # From the image's centre to behind the eye, to the right: only the right half shows it.
     line = Marks(lines=np.array([[[0.0, 0.0, 0.0], [3.0, 0.0, 6.0]]]))
     mask = drawn(perspective(offscreen, line))
     assert mask[PIXELS // 2, PIXELS // 2 :].all()
@@ -109,7 +109,7 @@ def test_points_are_drawn_over_lines(offscreen):
     assert found.starts.tolist() == [[-1, 0, 0], [0, 0, 0]]
     assert found.ends.tolist() == [[1, 0, 0], [0, 0, 0]]
     assert found.widths.tolist() == [2, 12]
-    # The line's dark border would be seen 3 pixels from the middle if it lay over the point.
+    # The line's dark border would be visible 3 pixels from the centre if it were over the point.
     assert pixel(marked(offscreen, both), 0.0, 3 / 20) == [*COLOR, 255]
 
 

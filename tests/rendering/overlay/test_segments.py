@@ -1,4 +1,4 @@
-"""Segments and dots on the screen: width, roundness and depth."""
+"""Segments and dots on the screen: width, round ends and depth."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_hidden_opacity_is_configurable(picture):
 
 
 def test_lifted_segments_are_visible_on_a_surface(picture):
-    # The eye is 2 away: a lift of a quarter moves a dot at z = 0 to z = 0.5, and no other way.
+    # The eye is 2 away: a lift of a quarter moves a dot at z = 0 to z = 0.5 only.
     dot, other = (dots(np.array([[0.5, 0.5, z]]), np.array(RED), 20.0) for z in (0.0, 0.4))
     near = picture(dot)
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
@@ -140,7 +140,7 @@ def test_many_more_segments_than_before_are_drawn(picture):
 
 def test_segments_far_from_the_origin_do_not_jitter(picture):
     near = picture(line((-1.0, 0.3, 0.0), (1.0, 0.3, 0.0)))
-    # float32 counts in steps of 8 there.
+    # float32 has steps of 8 there.
     away = np.array([1e8, 0.0, 0.0])
     far = line(away + np.array([-1.0, 0.3, 0.0]), away + np.array([1.0, 0.3, 0.0]))
     assert_allclose(picture(far, target_point=away), near, atol=1e-3)

@@ -24,13 +24,13 @@ from viewer.rig.skinning import METHODS, Skinning
 
 HOW = [Skinning("lbs"), Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 assert {how.method for how in HOW} == set(METHODS)
-TOLERANCE = 1e-5  # of a unit normal
+TOLERANCE = 1e-5  # relative to a unit normal
 N_JOINTS = 4
 SCALES = [(1.0, 4.0, 0.5), (2.0, 2.0, 2.0), (-1.0, 1.0, 1.0), (1e-12, 3e-12, 2e-12)]
 
 
 def ball() -> Figure:
-    """Return a sphere of which each vertex is moved by two of four joints in its middle."""
+    """Return a sphere whose vertices each follow two of four joints at its centre."""
     shape = sphere(rings=8)
     rng = np.random.default_rng(0)
     pairs = [

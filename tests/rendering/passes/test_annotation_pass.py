@@ -1,4 +1,4 @@
-"""Rendered annotations: segments and labels of several, their order, and how many fit."""
+"""Rendered annotations: segments and labels of several annotations, order, and how many fit."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_labels_are_drawn_next_to_their_point(offscreen):
     named = drawn(picture(offscreen, dot((0, 0, 0), RED, words=["ab", "cd", "ef"])))
     more = named & ~alone
     half = PIXELS // 2
-    # One word on each side, and above them the third with a line that leads there.
+    # One word on each side, and above them the third with a leader line.
     assert more[half - 6 : half + 6, :half].any() and more[half - 6 : half + 6, half:].any()
     assert more[: half - 14].any() and not more[half + 12 :].any()
     assert more[half - 12 : half - 8, half - 1 : half + 1].all()

@@ -35,7 +35,7 @@ def scene_of(parents, offsets, *dofs, boxes=None):
 
 
 def draw(offscreen, scene, reach, bones="auto"):
-    """Return the unlit front view of -reach to reach in x and y, transparent where nothing is."""
+    """Return the unlit front view of -reach to reach in x and y, transparent where it is empty."""
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=reach, orthographic=True)
     flat = Lights(DARK, DARK, ambient=1.0, specular=0.0)
     options = DisplayOptions(background="transparent", grid=False, samples=1, lights=flat)
@@ -60,7 +60,7 @@ def columns_of(picture, strongest):
 @pytest.mark.parametrize("style", ["octahedra", "sticks"])
 def test_ridge_turns_with_the_roll(offscreen, style):
     chain = [-1, 0], [[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]]
-    # Red is the x axis, the first that lies across the bone.
+    # Red is the x axis, the first one across the bone.
     assert columns_of(draw(offscreen, scene_of(*chain), 0.5, style), 0) > 0.8
     turned = scene_of(*chain, (1, math.pi))
     assert columns_of(draw(offscreen, turned, 0.5, style), 0) < -0.8

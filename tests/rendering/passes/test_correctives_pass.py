@@ -17,15 +17,15 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import Skinning
 
-TOLERANCE = 1e-5  # of the figure's size
-NORMAL_TOLERANCE = 1e-4  # joints turned by up to a radian, four influences, float32
+TOLERANCE = 1e-5  # relative to the figure's size
+NORMAL_TOLERANCE = 1e-4  # joints rotated by up to a radian, four influences, float32
 PALETTE = 256 * 3 * 4 * 4  # bytes of one row of matrices: up to 256 joints
 WEIGHT_LIST = 1024 * 2 * 4  # bytes of one row of pairs: up to 1024 weights
 
 
 @pytest.fixture(scope="module")
 def family(tmp_path_factory):
-    """Return a function that makes figures of the family, a fresh one each time."""
+    """Return a function that creates a new figure of the family on each call."""
 
     def make(kind, **changes):
         return family_figure(kind, tmp_path_factory.mktemp(kind), **changes)
@@ -71,7 +71,7 @@ def shaped_pose(figure, seed, reach=1.0):
 
 
 def check(mesh, pose, how=None):
-    """Hold what the GPU wrote to the reference, the place of the figure aside."""
+    """Compare the GPU's output with the reference, without the figure's placement."""
     how = how or Skinning()
     mesh.update(pose, how)
     positions, normals = mesh.read()

@@ -18,7 +18,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning
 
-TOLERANCE = 1e-5  # of the figure's size, as for linear blending
+TOLERANCE = 1e-5  # relative to the figure's size, as for linear blending
 NORMAL_TOLERANCE = 5e-5  # quaternions of five influences may shorten to a fifth when added
 METHODS = [Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 METHOD_IDS = ["dqs", "mix"]
@@ -67,13 +67,13 @@ def dual(how: Skinning, **changes) -> Skinning:
 def test_gpu_matches_the_reference_for_any_number_of_joints(posed, how, n_joints):
     rng = np.random.default_rng(n_joints)
     figure = random_figure(rng, n_joints, n_vertices=max(300, n_joints))
-    # The mixture's normals shorten as linear ones do: two that nearly cancel have no digits left.
+    # The mixture shortens normals as linear blending does: nearly cancelling ones lose all digits.
     check(posed, figure, how, seed=1, n_poses=3, normals=how.method == "dqs")
 
 
 @pytest.mark.parametrize("n_joints", [129, 1_025])
 def test_every_joint_is_found(posed, n_joints):
-    """One vertex a joint: a wrong row of the texture would show."""
+    """One vertex per joint: a wrong row of the texture would be detected."""
     figure = random_figure(np.random.default_rng(0), n_joints, n_joints)
     ties = [[(joint, 1.0)] for joint in range(n_joints)]
     figure = replace(figure, skin=skin_from_lists(ties, figure.skin.inverse_bind))

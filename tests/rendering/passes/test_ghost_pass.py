@@ -47,7 +47,7 @@ def test_translucent_ghost_lets_the_scene_through(offscreen):
     bare = pixel(shown(offscreen, None, scene), 0.0, 0.0)
     thin = pixel(shown(offscreen, ghost("translucent"), scene), 0.0, 0.0)
     thick = pixel(shown(offscreen, ghost("solid"), scene), 0.0, 0.0)
-    assert thick[0] < thin[0] < bare[0]  # less and less red
+    assert thick[0] < thin[0] < bare[0]  # decreasing red
     mixed = np.add(np.multiply(0.6, bare[:3]), np.multiply(0.4, thick[:3]))
     assert np.abs(np.subtract(thin[:3], mixed)).max() < 12  # blended as sRGB numbers
 

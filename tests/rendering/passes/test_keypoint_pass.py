@@ -34,14 +34,14 @@ def marked(*vertices):
 
 
 def marks(offscreen, scene, **options):
-    """Return which pixels the markers change."""
+    """Return the pixels changed by the markers."""
     bare = front_view(offscreen, scene, **options)
     with_them = front_view(offscreen, scene, keypoints=True, **options)
     return np.abs(with_them.astype(int) - bare).max(axis=-1) > 8
 
 
 def middle(mask):
-    """Return the centre of some pixels, in units of the picture plane."""
+    """Return the centre of some pixels, in units of the image plane."""
     rows, columns = np.nonzero(mask)
     x = (columns.mean() + 0.5) * 4 / PIXELS - 2.0
     return x, 2.0 - (rows.mean() + 0.5) * 4 / PIXELS

@@ -30,7 +30,7 @@ def offscreen():
 
 
 def walker(*places, rows=None, rate=1.0) -> Actor:
-    """Return a point that visits places, a second each, drawn nowhere itself."""
+    """Return an invisible point that moves through positions, one per second."""
     points = np.ones((len(places), 1, 4))
     points[:, 0, :3] = places
     timing = Timing(rate, np.arange(len(places)) if rows is None else rows)
@@ -63,7 +63,7 @@ def test_missing_and_absent_frames_interrupt_the_path(offscreen):
     actor = walker(*ACROSS, rows=[0, 1, -1, 2])
     mask = drawn(front_view(offscreen, Scene([actor]), path_joints=PATH))
     assert mask[40, 20] and not mask[40, 55]
-    # A path outlasts the times at which nobody is there, but not being hidden.
+    # A path stays visible while its actor is absent, but not if it is hidden.
     actor.is_present = False
     assert drawn(front_view(offscreen, Scene([actor]), path_joints=PATH)).any()
     actor.visible = False
@@ -74,7 +74,8 @@ def test_paths_fade_into_past_and_future(offscreen):
     scene = Scene([walker(*ACROSS)], time=1.0)
     picture = front_view(offscreen, scene, path_joints=PATH, path_seconds=0.5)
     alpha = [pixel(picture, x, 0.01)[3] for x in (-1.2, -0.375, 0.0, 0.375, 1.2)]
-    # A second is 1.5 units: half of half a second away half is left; beyond, nothing.
+    # A second is 1.5 units: halfway through half a second half of the opacity is left; beyond,
+    # none.
     assert alpha == pytest.approx([0, 128, 255, 128, 0], abs=12)
     scene.actors[0].offset = -1.0  # its clip runs a second early: now it is at its end
     picture = front_view(offscreen, scene, path_joints=PATH, path_seconds=0.5)
@@ -107,14 +108,14 @@ def test_joint_paths_follow_placement(offscreen):
     actor.placement[1, 3] = -1.0
     scene = Scene([replace_mesh(actor)])
     picture = front_view(offscreen, scene, show="skeleton", path_joints=((0, 1),))
-    # Joint 1 swings from (1, -1) over (0, 0) to (-1, -1).
+    # Joint 1 swings from (1, -1) through (0, 0) to (-1, -1).
     for angle in (0.3, np.pi / 2, 2.0):
         x, y = np.cos(angle), np.sin(angle) - 1.0
         assert pixel(picture, x, y)[:3] == pytest.approx(255 * path_colors(1)[0], abs=3)
 
 
 def replace_mesh(actor: Actor) -> Actor:
-    """Return the same without boxes in the way: far smaller ones."""
+    """Return the actor with boxes too small to occlude anything."""
     skeleton = replace(actor.figure.skeleton, boxes=np.full((2, 2, 3), -50.0))
     actor.figure = replace(actor.figure, mesh=None, skin=None, skeleton=skeleton)
     return actor
@@ -164,7 +165,7 @@ def test_a_path_follows_dofs_without_channels(offscreen, monkeypatch):
 
 
 def test_lines_that_pass_the_camera_are_clipped(offscreen):
-    """From behind the eye to the middle of the picture; nothing may smear over the rest."""
+    """From behind the eye to the centre of the image; nothing may smear over the rest."""
     scene = Scene([walker((0.0, 0.5, 9.0), (0.0, 0.0, -3.0))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=60.0, distance=2.0)
     options = DisplayOptions(background="transparent", grid=False, samples=1, path_joints=PATH)

@@ -1,4 +1,4 @@
-"""Outlines: of constant width around actors, joints and points, and never inside of them."""
+"""Outlines: of constant width around actors, joints and points, and never inside them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def offscreen():
 
 
 def changed(offscreen, scene, *outlined, **options):
-    """Return which pixels outlines cover, and their picture with straight alpha."""
+    """Return the pixels covered by outlines, and the image with straight alpha."""
     front_view(offscreen, scene, **options)
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     shown = DisplayOptions(samples=1, **options)

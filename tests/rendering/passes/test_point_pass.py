@@ -14,7 +14,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
-RADIUS = 0.2  # of the balls that are drawn here, 4 pixels
+RADIUS = 0.2  # radius of the balls drawn here, 4 pixels
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def offscreen():
 
 
 def dots(*places, limbs=(), sides=None, confidence=None, radius=RADIUS) -> Actor:
-    """Return an actor of points; its clip says how large they are drawn."""
+    """Return an actor of points, whose size depends on its clip."""
     count = len(places)
     layout = PointLayout(
         "dots",
@@ -56,7 +56,7 @@ def test_points_are_drawn_as_balls_at_their_positions(offscreen):
     for half, row, column in ((left, 20, 20), (right, 60, 20)):
         rows, columns = np.nonzero(half)
         assert (rows.mean() + 0.5, columns.mean() + 0.5) == pytest.approx((row, column), abs=0.3)
-        # A disc of 4 pixels radius, cut by sides of the ball's polygon.
+        # A disc of 4 pixels radius, reduced by the polygonal outline of the ball.
         assert 0.8 * 50 < half.sum() < 1.1 * 50
 
 
@@ -78,7 +78,7 @@ def test_colours_distinguish_sides(offscreen):
     limbs = [(0, 1), (1, 2), (1, 3)]
     scene = Scene([dots(*places, limbs=limbs, sides=[-1, 0, 1, 0])])
     picture = front_view(offscreen, scene)
-    for x in (-1.5, -0.7):  # right is red, and so is a limb from the middle to it
+    for x in (-1.5, -0.7):  # right is red, and so is a limb from the centre line to it
         red, green, blue, _ = pixel(picture, x, 0.0)
         assert red > 2 * max(green, blue)
     for x in (0.7, 1.5):
@@ -151,7 +151,7 @@ def test_placement_is_applied_and_reflection_keeps_balls_outward(offscreen):
 
 
 def test_translucent_points_are_sorted_as_the_camera_orbits(offscreen):
-    """A red ball before a blue one, and the other way round: what is near covers more."""
+    """A red ball in front of a blue one, and vice versa: the nearer one covers more."""
     near, far = (0.0, 0.0, 0.5), (0.0, 0.0, -0.5)
     for places in ((near, far), (far, near)):
         actor = dots(*places, (1.9, 1.9, 0.0), sides=[-1, 1, 0], confidence=[0.6, 0.6, 1.0])
@@ -185,14 +185,14 @@ def frames(*places):
 
 
 def test_radii_follow_the_size_of_the_whole():
-    """0.012 of the diagonal 5 of a 3 x 4 rectangle; in other units as many times as much."""
+    """0.012 of the diagonal 5 of a 3 x 4 rectangle; scaled accordingly in other units."""
     corners = [(0, 0, 0), (3, 0, 0), (0, 4, 0), (3, 4, 0)]
     assert point_radii(frames(corners)) == pytest.approx([0.06] * 4)
     assert point_radii(1000.0 * frames(corners)) == pytest.approx([60.0] * 4)
 
 
 def test_radii_are_smaller_where_points_are_close():
-    """0.3 of the distance 0.1, and at least 0.0015 of the size 10 for points in one place."""
+    """0.3 of the distance 0.1, and at least 0.0015 of the size 10 for coincident points."""
     points = frames([(0, 0, 0), (10, 0, 0), (5, 0, 0), (5.1, 0, 0), (2, 0, 0), (2, 0, 0)])
     assert point_radii(points) == pytest.approx([0.12, 0.12, 0.03, 0.03, 0.12, 0.12])
     close = frames([(0, 0, 0), (10, 0, 0), (2, 0, 0), (2.001, 0, 0)])

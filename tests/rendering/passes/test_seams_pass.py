@@ -34,7 +34,7 @@ def posed(ctx):
 
 
 def ribbon() -> Figure:
-    """Return two squares that share an edge, in two places of the picture, and a lone vertex.
+    """Return two squares that share an edge, in two places of the texture, and a lone vertex.
 
     Vertices 1 and 2 lie on the seam and count twice: 4 + 4 split vertices and the lone one.
     """
@@ -89,7 +89,7 @@ def test_copies_of_one_vertex_are_posed_identically(posed, tmp_path):
         mesh.update(pose, how)
         rows = rows_of(mesh.posed, 6)
         assert len(rows) == mesh.mesh.n_vertices > figure.mesh.n_vertices
-        # The same numbers to the bit, so that no gap opens along a seam.
+        # Bit-identical values, so that no crack opens along a seam.
         assert np.array_equal(rows, rows[mesh.mesh.copies][mesh.mesh.sources])
 
 

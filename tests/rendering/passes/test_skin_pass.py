@@ -25,8 +25,8 @@ from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import has_influence, skin_from_lists
 from viewer.rig.skinning.lbs import blended_matrices
 
-POSITION_TOLERANCE = 1e-5  # of the figure's size, as issue 2 asks
-NORMAL_TOLERANCE = 1e-5  # of a unit normal, times how much blending shortened it
+POSITION_TOLERANCE = 1e-5  # relative to the figure's size, as required by issue 2
+NORMAL_TOLERANCE = 1e-5  # relative to a unit normal, times its shortening by blending
 
 
 def posed_mesh(ctx, figure: Figure) -> PosedMesh:
@@ -88,7 +88,7 @@ def test_gpu_matches_the_reference_for_any_number_of_joints(ctx, n_joints):
 
 
 def test_every_joint_of_5000_is_found(ctx):
-    """One vertex a joint: a wrong row of the palette's texture would show."""
+    """One vertex per joint: a wrong row of the palette's texture would be detected."""
     rng = np.random.default_rng(0)
     figure = random_figure(rng, 5_000, 5_000)
     skin = skin_from_lists([[(joint, 1.0)] for joint in range(5_000)], figure.skin.inverse_bind)
@@ -137,7 +137,7 @@ def test_vertices_without_influence_stay_where_they_were_bound(ctx):
     mesh.update(random_pose(figure.skeleton, np.random.default_rng(10)))
     still = np.diff(figure.skin.starts) == 0
     assert still.any()
-    # float32 of a figure of size 1: 6e-8 a rounding.
+    # float32 of a figure of size 1: 6e-8 per rounding.
     np.testing.assert_allclose(
         mesh.read()[0][still], figure.mesh.positions[still], rtol=0, atol=1e-6
     )
@@ -316,7 +316,7 @@ def test_bind_pose_is_skinned_once_and_left_again(drawing):
 
 @pytest.fixture
 def uploads(monkeypatch):
-    """What was sent to the GPU, in bytes, by kind."""
+    """Bytes uploaded to the GPU, by kind."""
     sent: list[tuple[str, int]] = []
 
     def count(owner, name, kind):
@@ -347,7 +347,7 @@ def test_a_changed_pose_sends_one_palette_and_no_vertex(drawing, uploads):
     uploads.clear()
     drawing.scene.actors[0].pose.dofs[4] = 0.5
     drawing.draw()
-    # One row of 256 matrices of three float32 texels of four: what a palette of 3 joints takes.
+    # One row of 256 matrices of three float32 texels of four: the size of a palette of 3 joints.
     assert uploads == [("texture", 256 * 3 * 4 * 4)]
 
 

@@ -77,7 +77,7 @@ def test_moved_vertex_is_reported_by_index() -> None:
 
 
 def test_weights_differ_by_the_l1_distance_of_rows_however_they_are_listed() -> None:
-    # Vertex 0: split in two entries, the same. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
+    # Vertex 0: the same weight split into two entries. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
     other = [[(0, 0.4), (0, 0.6)], [(1, 0.8), (0, 0.2)], [(1, 1.0)], [(1, 1.0)]]
     found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
     weights = measures(found)["weights"]

@@ -34,7 +34,7 @@ def test_point_follows_the_vertices():
 def test_distance_is_in_lengths_of_the_direction():
     slanted = np.array([0.2, 0.2, -0.4])
     hit = first_hit(POSITIONS, TRIANGLES, np.array([0.1, 0.1, 0.8]), slanted)
-    assert hit.distance == pytest.approx(2.0)  # 0.8 down in steps of 0.4
+    assert hit.distance == pytest.approx(2.0)  # 0.8 down, 0.4 per direction vector
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from viewer.rig.geometry.rotation import (
     rotation_vector_to_matrix,
 )
 
-ROUNDING = 4e-15  # a dozen units in the last place of numbers up to 1
+ROUNDING = 4e-15  # a dozen units in the last place of values up to 1
 ANGLES = [0.0, 1e-300, 1e-9, 9.9e-5, 1.01e-4, 0.5, np.pi - 1e-9, np.pi, 4.2, 2 * np.pi, 100.0]
 AXES = [
     (1, 0, 0),

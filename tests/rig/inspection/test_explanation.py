@@ -1,4 +1,4 @@
-"""Explanation of a vertex: an arm of two joints, with all numbers worked out by hand."""
+"""Explanation of a vertex: an arm of two joints, with all values calculated by hand."""
 
 from __future__ import annotations
 
@@ -266,4 +266,4 @@ def test_numbers_in_the_text_are_aligned():
     lines = explanation_text(explain(figure, pose, Skinning("mix"), 1))
     for opening in "([":
         widths = {len(line) - line.index(opening) for line in lines if opening in line}
-        assert len(widths) <= 2  # vectors have three numbers, matrix rows and quaternions four
+        assert len(widths) <= 2  # vectors have three components, matrix rows and quaternions four

@@ -1,4 +1,4 @@
-"""Properties of a vertex: figures of a few points, values worked out by hand."""
+"""Properties of a vertex: figures of a few points, values calculated by hand."""
 
 from __future__ import annotations
 

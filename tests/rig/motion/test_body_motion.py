@@ -17,7 +17,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import deform
 from viewer.rig.smpl_family import FAMILY
 
-ATOL = 1e-12  # metres; some hundred rounding errors of numbers near 1
+ATOL = 1e-12  # metres; some hundred rounding errors of values near 1
 TURN, MOVE = np.array([0.7, -1.9, 0.4]), np.array([0.5, 2.0, -1.0])
 
 

@@ -1,4 +1,4 @@
-"""Pose records: DOFs by name, the model's own numbers, smplx's parts, shape and placement."""
+"""Pose records: DOFs by name, the model's own pose vector, smplx's parts, shape and placement."""
 
 import numpy as np
 import pytest
@@ -108,7 +108,7 @@ def test_raw_pose_vector_rotates_every_joint(family, kind):
     assert notes == []
 
 
-# Joints beyond the 22 of the body that both models have: first in the vector, in the figure, count.
+# Joints beyond the 22 that both models share: first in the vector, first in the figure, count.
 @pytest.mark.parametrize(
     ("kind", "count", "shared", "left_out"),
     [

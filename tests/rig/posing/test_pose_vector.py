@@ -52,7 +52,7 @@ def test_pig_root_is_rotated_about_x_then_y_then_z():
     vector = np.arange(16) / 10.0
     pose = posed(PIG, vector)
     found = joint_rotations(BALLS, pose)
-    # The first number rotates about z: R = Rz(0.3) Ry(0.4) Rx(0.5).
+    # The first value rotates about z: R = Rz(0.3) Ry(0.4) Rx(0.5).
     assert_allclose(found[0], turn_z(0.3) @ turn_y(0.4) @ turn_x(0.5), atol=1e-15)
     for joint in (1, 2, 3):
         assert_allclose(found[joint], about(vector[3 + 3 * joint : 6 + 3 * joint]), atol=1e-13)

@@ -1,4 +1,4 @@
-"""Joint names of many programs, and plain names."""
+"""Joint names used by many programs, and plain names."""
 
 from __future__ import annotations
 

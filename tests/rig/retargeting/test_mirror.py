@@ -31,7 +31,7 @@ NAMES = (
 PARENTS = np.array([-1, 0, 1, 1, 2, 3, 4, 5, 0, 0])
 PARTNERS = [0, 1, 3, 2, 5, 4, 7, 6, 9, 8]
 LEFT, RIGHT = [2, 4, 6, 8], [3, 5, 7, 9]
-# Across, up and to the front; mirroring negates the first number.
+# Across, up and to the front; mirroring negates the first coordinate.
 PLACES = np.zeros((10, 3))
 PLACES[1] = 0.0, 1.0, 0.1
 PLACES[LEFT] = [[0.3, 1.2, 0.1], [0.8, 1.1, 0.0], [1.3, 1.1, 0.3], [0.2, -0.2, 0.0]]
@@ -39,7 +39,7 @@ PLACES[RIGHT] = PLACES[LEFT] * [-1, 1, 1]
 
 
 def symmetric_figure(axis=0, up="y", with_map=True) -> Figure:
-    """Return a cloud with a mirror partner for every vertex, bound alike on both sides."""
+    """Return a cloud with a mirror counterpart of every vertex, bound alike on both sides."""
     rng = np.random.default_rng(0)
     left = rng.normal(size=(20, 3))
     points = np.vstack([left, left * [-1, 1, 1], rng.normal(size=(4, 3)) * [0, 1, 1]])

@@ -1,4 +1,4 @@
-"""Transfer of poses between figures with other DOF orders, rest rotations, up axes and joints."""
+"""Transfer of poses between figures with unequal DOF orders, rest rotations, up axes and joints."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_missing_joints_are_named_in_one_line_and_others_stay() -> None:
 
 
 def test_joint_in_between_is_folded_in() -> None:
-    # The other's "b" is the child of an extra joint rotated by 0.3, for which b compensates.
+    # The other figure's "b" is the child of an extra joint rotated by 0.3, for which b compensates.
     one = figure(["a", "b"], ["xyz", "xyz"])
     other = figure(["a", "extra", "b"], ["xyz"] * 3, "other")
     start = posed(other, 0, 0, 0, 0, 0, 0.3, 0, 0, 0)
@@ -110,8 +110,8 @@ def test_joint_in_between_is_folded_in() -> None:
 
 
 def test_rest_rotations_may_differ() -> None:
-    # The other's joint has a rest rotation of 90 degrees about x: a rotation about the world's y is
-    # one about its own -z, as Rx(-90) y = -z.
+    # The other figure's joint has a rest rotation of 90 degrees about x: a rotation about the
+    # world's y is one about its own -z, as Rx(-90) y = -z.
     one = figure("a", ["xyz"])
     other = figure("a", ["xyz"], "other", rest=[[HALF, 0, 0, HALF]])
     pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))

@@ -1,4 +1,4 @@
-"""Retargeting of motions between skeletons with other rest poses, axes, units and names."""
+"""Retargeting of motions between skeletons with different rest poses, axes, units and names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Retargeting onto other hierarchies: which joints match, which rotations are taken over."""
+"""Retargeting onto other hierarchies: which joints match, which rotations are transferred."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two people of other names, poses and proportions, and the directions of their limbs."""
+"""Two people with different joint names, poses and proportions, and their limb directions."""
 
 from __future__ import annotations
 

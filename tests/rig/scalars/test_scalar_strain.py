@@ -1,4 +1,4 @@
-"""Scalar quantities of strain of a square whose corners slide, against closed forms."""
+"""Strain quantities of a square whose corners slide, against closed forms."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_area_change_is_that_of_all_triangles_around_a_vertex():
 
 
 def test_area_change_is_weighted_by_triangle_area():
-    # A second triangle of area 1.5 beside one of 0.5; only the small one doubles.
+    # A second triangle of area 1.5 next to one of 0.5; only the small one doubles.
     corners = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-3, 0, 0]]
     skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(0, 1.0)], [(0, 1.0)]],
                            np.tile(np.eye(4), (2, 1, 1)))  # fmt: skip

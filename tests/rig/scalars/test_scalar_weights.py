@@ -1,4 +1,4 @@
-"""Scalar quantities of weights: a few vertices, each number worked out by hand."""
+"""Weight quantities of a few vertices, each value calculated by hand."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_weight_of_a_joint_is_the_sum_of_its_entries():
 
 
 def test_weights_are_those_in_use():
-    # Two influences: 0.5 and 0.25 scaled to a sum of 1; of the tie the first stays.
+    # Two influences: 0.5 and 0.25 scaled to a sum of 1; of equal ones the first is kept.
     assert found("weight:j0", max_influences=2)[0] == pytest.approx(2 / 3)
     assert found("weight:j1", max_influences=2)[0] == pytest.approx(1 / 3)
     assert found("weight:j2", max_influences=2)[0] == 0.0

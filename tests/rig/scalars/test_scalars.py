@@ -1,4 +1,4 @@
-"""Scalar quantities of a few points, worked out by hand."""
+"""Scalar quantities of a few points, calculated by hand."""
 
 from dataclasses import replace
 from pathlib import Path

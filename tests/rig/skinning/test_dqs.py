@@ -18,7 +18,7 @@ RIGID = [matrix(turn_x(0.8), (1, 2, 3)), matrix(turn_z(-2.0), (-4, 0, 1)), np.ey
 
 
 def bound(pairs, n_joints=3, bind=None):
-    """Return a skin of one vertex a list; joints bound at the origin unless told otherwise."""
+    """Return a skin with one vertex per list; joints are bound at the origin by default."""
     bind = np.tile(np.eye(4), (n_joints, 1, 1)) if bind is None else np.asarray(bind)
     return skin_from_lists(pairs, np.linalg.inv(bind))
 

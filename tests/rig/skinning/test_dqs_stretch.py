@@ -96,7 +96,7 @@ def test_scale_and_twist_keep_the_scaled_radius():
 
 
 def test_stretch_of_a_rotated_joint_is_blended_before_the_rotation():
-    """Kavan 2008, 4.2: (sum w S) in binding space, then the blended rigid motion."""
+    """Kavan 2008, 4.2: (sum w S) in the bind pose, then the blended rigid motion."""
     stretches = [np.diag([2.0, 1.0, 1.0]), np.diag([1.0, 1.0, 3.0])]
     turns = [turn_y(0.4), turn_y(1.2)]
     palette = [matrix(t @ s) for t, s in zip(turns, stretches, strict=True)] + [np.eye(4)]
