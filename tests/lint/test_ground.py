@@ -19,7 +19,7 @@ _K = np.arange(FRAMES)
 
 
 def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]:
-    """Check legs whose root is raised above the floor by a given height in each frame."""
+    """Check legs whose root is offset from the floor by a given height in each frame."""
     figure = legs()
     clip, count = standing(figure), len(heights)
     places = np.zeros((count, figure.skeleton.n_joints, 3))

@@ -151,7 +151,7 @@ def test_turntable_is_a_seamless_loop(offscreen):
 
 
 def test_camera_follows_its_target(offscreen, scene):
-    """The arm moves along x at 2 units per second; only its elbow rotates."""
+    """The arm moves along x at 2 units per second, without rotating."""
     straight = moving_arm(turns=False)
     options = DisplayOptions(background="transparent", grid=False)
     recording = recording_of(Scene([straight]), options=options)

@@ -115,7 +115,7 @@ def test_joint_paths_follow_placement(offscreen):
 
 
 def replace_mesh(actor: Actor) -> Actor:
-    """Return the actor with boxes too small to occlude anything."""
+    """Return the actor without a mesh, its boxes far out of view."""
     skeleton = replace(actor.figure.skeleton, boxes=np.full((2, 2, 3), -50.0))
     actor.figure = replace(actor.figure, mesh=None, skin=None, skeleton=skeleton)
     return actor
