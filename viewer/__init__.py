@@ -3,7 +3,7 @@
 >>> import viewer
 >>> scene = viewer.load()                                  # the bundled figure
 >>> image = viewer.render(scene, size=(320, 240))
->>> picture.shape
+>>> image.shape
 (240, 320, 4)
 
 Importing this package is cheap: each name loads its own module on first use.
