@@ -220,7 +220,8 @@ for i in range(25):
         before = resident()
 print(resident() - before)
 """
-    assert float(run_alone(MEMORY + code)) < 20.0  # MB; a context is 7
+    # MB of ten threads: a context with its shadow map is 23, and the last may not be freed yet.
+    assert float(run_alone(MEMORY + code)) < 60.0
 
 
 def test_a_texture_above_the_limit_is_shrunk_with_a_note(ctx):
