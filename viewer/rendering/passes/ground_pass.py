@@ -77,7 +77,7 @@ class GroundPass:
         """Fill the image; "transparent" leaves it cleared."""
         if background == "transparent":
             return
-        program = self.programs.drawing("background")
+        program = self.programs.drawing("fullscreen", fragment="background")
         bottom, top = _NAMED.get(background) or (parse_color(background),) * 2
         program["u_bottom"], program["u_top"] = bottom, top
         if self._background is None:
