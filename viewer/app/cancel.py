@@ -59,4 +59,4 @@ def cancel(state: AppState) -> None:
         unpin(state)
         state.say_status("Vertex unpinned")
     else:
-        state.selected_joint, state.is_actor_selected = -1, False
+        state.deselect()

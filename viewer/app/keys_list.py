@@ -32,7 +32,7 @@ def draw_keys(state: AppState) -> None:
     """Draw the list if it is open; the wheel scrolls it in a small window."""
     if not state.of(Keyboard).is_listed:
         return
-    lines = [*((state.key_labels.get(key.label, key.label), key.text) for key in KEYS), *MOUSE]
+    lines = [*((state.key_label(key.label), key.text) for key in KEYS), *MOUSE]
     style, viewport = imgui.get_style(), imgui.get_main_viewport()
     letter = imgui.get_font_size()
     first = max(imgui.calc_text_size(label).x for label, _ in lines) + _GAP * letter

@@ -186,7 +186,7 @@ def _draw_background(state: AppState) -> None:
             actor.visible = True
     nothing = state.selected_joint < 0 and not state.is_actor_selected
     if menu_item(state, "Deselect", "Esc", why="nothing is selected" if nothing else ""):
-        state.selected_joint, state.is_actor_selected = -1, False
+        state.deselect()
     if menu_item(state, "Paste pose", "Ctrl+V", why=no_pose(state)):
         paste_pose(state)
     imgui.separator()

@@ -149,6 +149,14 @@ class AppState:
         self.choose_actor(index)
         self.is_actor_selected = True
 
+    def deselect(self) -> None:
+        """Deselect the joint and the actor; the actor remains the chosen one."""
+        self.selected_joint, self.is_actor_selected = -1, False
+
+    def key_label(self, usual: str) -> str:
+        """Return the current label of a key, given its default label."""
+        return self.key_labels.get(usual, usual)
+
     @property
     def aspect(self) -> float:
         """Width / height of the view."""

@@ -191,7 +191,7 @@ def menu_item(
     state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
 ) -> bool:
     """Draw a menu item and return whether it was chosen; disabled if there is a reason."""
-    shown = state.key_labels.get(key, key)
+    shown = state.key_label(key)
     chosen = imgui.menu_item(text, shown, checked, not why)[0]
     note_item(state, text)
     explain("", why)

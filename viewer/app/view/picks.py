@@ -95,7 +95,7 @@ def _take_click(
             return
     if pick is None:
         if not aims:
-            state.selected_joint, state.is_actor_selected = -1, False
+            state.deselect()
         return
     take_pick(state, pick, aims)
     mover = None if aims else _mover(state, pick)
