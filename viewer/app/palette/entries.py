@@ -13,7 +13,7 @@ from viewer.app.core.state import AppState
 from viewer.app.features import ACTIONS, KEYS, PANELS
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.shown_panels import is_open, set_open
-from viewer.app.view.display_actions import show, show_bones
+from viewer.app.view.display_actions import set_shading, show, show_bones
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN
@@ -63,7 +63,7 @@ def _actions(state: AppState) -> Iterator[Entry]:
                 key.text[0].upper() + key.text[1:],
                 "action",
                 key.run,
-                state.key_labels.get(key.label, key.label),
+                state.key_label(key.label),
             )
     for action in ACTIONS:
         yield Entry(action.text, "action", action.run, why=action.reason(state))
@@ -98,11 +98,7 @@ def _choices(state: AppState) -> Iterator[Entry]:
 
 
 def _shade(state: AppState, name: str) -> None:
-    from viewer.app.weights.actions import start_heat_map
-
-    state.options.shading = name
-    if name == "scalar":
-        start_heat_map(state)
+    set_shading(state, name)
     state.say_status(SHADING[name])
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from viewer.app.core.state import AppState
 from viewer.app.view.axis_gizmo import AxisGizmo
+from viewer.app.weights.actions import start_heat_map
 from viewer.rendering.options import BONES, SHOWN, Lights
 
 __all__ = [
     "reset_lights",
+    "set_shading",
     "show",
     "show_bones",
     "toggle_binding",
@@ -32,6 +34,13 @@ def show(state: AppState, what: str) -> None:
     """Choose the visible parts, a key of ``SHOWN``, and show a status message."""
     state.options.show = what
     state.say_status(SHOWN[what])
+
+
+def set_shading(state: AppState, name: str) -> None:
+    """Choose the shading, a key of ``SHADING_CHOICES``; scalar quantities get one to show."""
+    state.options.shading = name
+    if name == "scalar":
+        start_heat_map(state)
 
 
 def toggle_option(state: AppState, name: str, text: str) -> None:

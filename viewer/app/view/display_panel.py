@@ -16,9 +16,8 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     slider,
 )
-from viewer.app.view.display_actions import show
+from viewer.app.view.display_actions import set_shading, show
 from viewer.app.view.view_menu import JOINT_TOGGLES
-from viewer.app.weights.actions import start_heat_map
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import BONES, MATCAPS, OPACITIES, QUALITIES, SHOWN
@@ -58,10 +57,9 @@ def draw(state: AppState) -> None:
     if options.show == "both":
         _draw_opacity(state)
     imgui.separator()
-    before = options.shading
-    options.shading = choice(state, "Shading", before, SHADING_CHOICES)
-    if options.shading == "scalar" != before:
-        start_heat_map(state)
+    chosen = choice(state, "Shading", options.shading, SHADING_CHOICES)
+    if chosen != options.shading:
+        set_shading(state, chosen)
     _draw_surface(state)
     _draw_extras(state)
     why = no_mesh(state)
