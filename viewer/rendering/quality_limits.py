@@ -57,7 +57,7 @@ def limit_passes(
         options.quality = "normal"
         return [
             f"drawn with normal quality, as final needs {memory / 1e9:.1f} GB of graphics memory "
-            "beside the picture; --quality final draws it"
+            "in addition to the image; --quality final draws it"
         ]
     if not is_software(context):
         return []

@@ -7,7 +7,7 @@ from pathlib import Path
 from viewer.app.core.state import AppState
 from viewer.errors import ViewerError
 from viewer.models import known_models, save_model_folder
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 
 __all__ = ["set_model_folder"]
 
@@ -20,4 +20,4 @@ def set_model_folder(state: AppState, paths: list[Path]) -> None:
         state.error = str(problem)
         return
     count = len(known_models(folder))
-    state.say(f"{count} body models in {printable(folder, 200)}")
+    state.say(f"{counted(count, 'body model')} in {printable(folder, 200)}")

@@ -20,7 +20,7 @@ def start_with(state: AppState, preferences: Preferences) -> None:
     Parameters
     ----------
     state : AppState
-        Its angle unit, quality and samples are set.
+        Its preferences and angle unit are set.
     preferences : Preferences
         The stored preferences.
     """
