@@ -44,6 +44,12 @@ class Mesh:
         Index into ``materials``, -1 for none.
     second_uvs : (U, 2) or None
         A second texture coordinate for each row of ``uvs``, for textures that name this set.
+    colors : (V, 4) or None
+        Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
+    parts : tuple of P str
+        Names of the parts that can be hidden; may repeat or be empty.
+    triangle_parts : (T,) int32
+        Index into ``parts``, -1 for none.
     """
 
     positions: Floats
@@ -54,6 +60,9 @@ class Mesh:
     triangle_materials: Ints | None = None
     uv_triangles: Ints | None = None
     second_uvs: Floats | None = None
+    colors: Floats | None = None
+    parts: tuple[str, ...] = ()
+    triangle_parts: Ints | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -71,12 +80,12 @@ class Mesh:
         if self.uv_triangles is not None:
             shape = (self.n_triangles, 3)
             put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))
-        if self.triangle_materials is None:
-            put("triangle_materials", np.full(self.n_triangles, -1, dtype=np.int32))
-        put(
-            "triangle_materials",
-            frozen("triangle_materials", self.triangle_materials, (self.n_triangles,), np.int32),
-        )
+        if self.colors is not None:
+            put("colors", frozen("colors", self.colors, (self.n_vertices, 4)))
+        for name in ("triangle_materials", "triangle_parts"):
+            given = getattr(self, name)
+            values = np.full(self.n_triangles, -1, dtype=np.int32) if given is None else given
+            put(name, frozen(name, values, (self.n_triangles,), np.int32))
         self._check_indices()
 
     def _check_indices(self) -> None:
@@ -87,11 +96,14 @@ class Mesh:
             _check_range(
                 "uv_triangles", self.uv_triangles, 0 if self.uvs is None else len(self.uvs)
             )
-        if self.material_indices.min() < -1 or self.material_indices.max() >= len(self.materials):
-            raise RigError(
-                f"triangle_materials: expected -1 to {len(self.materials) - 1}, "
-                f"found {self.material_indices.min()} to {self.material_indices.max()}"
-            )
+        for name, indices, count in (
+            ("triangle_materials", self.material_indices, len(self.materials)),
+            ("triangle_parts", self.part_indices, len(self.parts)),
+        ):
+            if indices.min() < -1 or indices.max() >= count:
+                raise RigError(
+                    f"{name}: expected -1 to {count - 1}, found {indices.min()} to {indices.max()}"
+                )
 
     @property
     def n_vertices(self) -> int:
@@ -108,6 +120,12 @@ class Mesh:
         """``triangle_materials``, never None: (T,) int32."""
         assert self.triangle_materials is not None  # set by __post_init__
         return self.triangle_materials
+
+    @property
+    def part_indices(self) -> Ints:
+        """``triangle_parts``, never None: (T,) int32."""
+        assert self.triangle_parts is not None  # set by __post_init__
+        return self.triangle_parts
 
 
 def _check_range(name: str, indices: Ints, end: int) -> None:
