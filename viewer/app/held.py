@@ -20,7 +20,7 @@ def is_held(state: AppState) -> bool:
 
 
 def stops_time(state: AppState) -> bool:
-    """Return whether time must stand still: a handle is held but has not been dragged yet.
+    """Return whether time must stop: a handle is held but has not been dragged yet.
 
     A click must not pause playback, and a drag must start from an unchanged pose.
     """

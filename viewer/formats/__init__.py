@@ -309,7 +309,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     Raises
     ------
     UnsupportedFormatError
-        If no format has this suffix, or it cannot hold the content.
+        If no format has this suffix, or it cannot store the content.
     OutputError
         If the file cannot be written.
     """

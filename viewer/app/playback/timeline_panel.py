@@ -54,7 +54,7 @@ def _draw_transport(state: AppState) -> None:
         step(state, -1)
     explain("one frame back (Left)")
     imgui.same_line()
-    # Both labels get the same width, or the following buttons would move.
+    # Both labels have the same width, or the following buttons would move.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
@@ -86,7 +86,7 @@ def _draw_place(state: AppState) -> None:
 
 
 def _draw_rate(state: AppState) -> None:
-    """Draw the field of the frame rate, which Enter applies."""
+    """Draw the field of the frame rate, which is applied by Enter."""
     foreign = foreign_rate(state)
     with disabled(foreign):
         entered, typed = imgui.input_double(
@@ -101,7 +101,7 @@ def _draw_rate(state: AppState) -> None:
 def _draw_settings(state: AppState) -> None:
     clock = state.clock
     clock.mode = choice(state, "Mode", clock.mode, MODES, width=7.0)
-    explain("what happens at the end of the range")
+    explain("behaviour at the end of the range")
     if clock.mode != "run on":
         clock.time = min(max(clock.time, clock.whole[0]), clock.whole[1])
     same_line_if_room("M" * 12)
@@ -110,7 +110,7 @@ def _draw_settings(state: AppState) -> None:
     )
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.speed = 1.0
-    explain("seconds of motion per second; right-click resets it to 1")
+    explain("seconds of motion per second; right-click to reset to 1")
     same_line_if_room("M" * 14)
     _draw_range(state)
     same_line_if_room("Interpolate gaps")
@@ -131,12 +131,12 @@ def _draw_range(state: AppState) -> None:
         begin_field("Range", 9.0), first, last, 0.3, lowest, highest
     )
     note_item(state, "Range")
-    text = "frames to play; I and O set them to the current frame, right-click resets them to all"
+    text = "frames to play; I and O set them to the current frame, right-click to reset to all"
     explain(text)
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.set_range(*clock.whole)
     elif changed:
-        # An untouched end keeps its exact time.
+        # A field that is not edited keeps its exact time.
         start = clock.frame_time(low - clock.first_frame) if low != first else clock.start
         end = clock.frame_time(high - clock.first_frame) if high != last else clock.end
         clock.set_range(start, end)

@@ -34,14 +34,14 @@ def write(figure: Figure, path: str | Path) -> None:
     Parameters
     ----------
     figure : Figure
-        With a skeleton in depth-first order, with rotation DOFs and without rest rotations.
+        Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
     path : str or Path
         Replaced only when the whole text has been written.
 
     Raises
     ------
     UnsupportedFormatError
-        If the format cannot hold the skeleton.
+        If the format cannot store the skeleton.
     OutputError
         If the file cannot be written.
     """
