@@ -113,7 +113,13 @@ def _draw_chain(state: AppState) -> None:
     with disabled(why):
         imgui.set_next_item_width(_item_width(2))
         changed, length = slider_int(
-            "##chain", chain_length(state), 1, longest, "chain %d", imgui.SliderFlags_.always_clamp
+            state,
+            "##chain",
+            chain_length(state),
+            1,
+            longest,
+            "chain %d",
+            imgui.SliderFlags_.always_clamp,
         )
         note_item(state, "Chain")
         explain("number of joints above the dragged joint that may rotate", why)
