@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
+from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
 from viewer.rig.number_text import number_text
 
@@ -198,7 +199,7 @@ def menu_item(
     state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
 ) -> bool:
     """Draw a menu item and return whether it was chosen; disabled if there is a reason."""
-    shown = state.key_label(key)
+    shown = key_name(state, key)
     chosen = imgui.menu_item(text, shown, checked, not why)[0]
     note_item(state, text)
     explain("", why)

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.clock import FASTEST, MODES
 from viewer.app.core.fields import begin_field, drag_int, in_row
+from viewer.app.core.key_names import key_name, with_key
 from viewer.app.core.reasons import no_motion
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import number_field, whole_field
@@ -48,26 +49,26 @@ def _draw_transport(state: AppState) -> None:
     clock = state.clock
     if button(state, "|<"):
         go_to_end(state, last=False)
-    explain("first frame (Home)")
+    explain(with_key(state, "first frame of the range", "Home"))
     imgui.same_line()
     if button(state, "<"):
         step(state, -1)
-    explain("one frame back (Left)")
+    explain(with_key(state, "one frame back", "Left"))
     imgui.same_line()
     # Both labels get the same width, or the following buttons would move.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
     note_item(state, "Play")
-    explain("play or pause (Space)")
+    explain(with_key(state, "play or pause", "Space"))
     imgui.same_line()
     if button(state, ">"):
         step(state, 1)
-    explain("one frame forward (Right)")
+    explain(with_key(state, "one frame forward", "Right"))
     imgui.same_line()
     if button(state, ">|"):
         go_to_end(state, last=True)
-    explain("last frame (End)")
+    explain(with_key(state, "last frame of the range", "End"))
 
 
 def _draw_place(state: AppState) -> None:
@@ -136,8 +137,9 @@ def _draw_range(state: AppState) -> None:
 
     in_row(begin_field("Range", 9.0), (first, last), draw_end)
     note_item(state, "Range")
-    text = "frames to play; I and O set them to the current frame, right-click resets them to all"
-    explain(text)
+    first_key, last_key = key_name(state, "I"), key_name(state, "O")
+    text = f"frames to play; {first_key} and {last_key} set them to the current frame"
+    explain(f"{text}\nright-click resets them to all frames")
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.set_range(*clock.whole)
     elif moved:

@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
 from viewer.app.core.ink import ink
+from viewer.app.core.key_names import with_key
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
 from viewer.app.core.widgets import (
@@ -132,7 +133,7 @@ def _draw_head(state: AppState) -> None:
     tree = joint_tree(state)
     tree.filter = search_field("##filter", tree.filter, "Filter joints")
     note_item(state, "Filter")
-    if button(state, "Reset (R)"):
+    if button(state, with_key(state, "Reset", "R")):
         reset_pose(state)
     same_line_if_room("Pose…")
     if button(state, "Pose…"):
