@@ -158,9 +158,9 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
 
 
 def figure_pose(figure: Figure) -> Pose:
-    """Return a new pose of a figure with a skeleton: the file's own, all shape weights 0."""
+    """Return a new pose of a figure with a skeleton: the file's own, with its shape weights."""
     pose = rest_pose(figure.require_skeleton())
-    pose.shape_weights = np.zeros(figure.n_shapes)
+    pose.shape_weights = figure.rest_shape_weights.copy()
     return pose
 
 

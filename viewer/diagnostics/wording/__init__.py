@@ -23,6 +23,7 @@ from viewer.diagnostics.wording import (
     meshes,
     morph,
     motion,
+    nodes,
     obj,
     pictures,
     ply,
@@ -36,7 +37,7 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, nodes),
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
