@@ -46,8 +46,7 @@ def triangle(seed: int, n_joints: int = 0, n_influences: int = 3, **more: Any) -
     return Primitive(
         positions=random.normal(size=(3, 3)),
         triangles=np.array([[0, 1, 2]], dtype=np.int32),
-        normals=np.tile([0.0, 0.0, 1.0], (3, 1)),
-        **(skinned | more),
+        **({"normals": np.tile([0.0, 0.0, 1.0], (3, 1))} | skinned | more),
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeTree
-from viewer.rig.arrays import Ints
+from viewer.rig.arrays import Bools, Ints
 
 __all__ = ["Members", "group_nodes", "is_skinned", "scene_order"]
 
@@ -77,6 +77,8 @@ class _Grouping:
         self.file, self.tree = file, file.tree
         self.parents: list[int] = file.tree.parents.tolist()
         self.roots = _roots(file.tree)
+        self.is_identity = _identities(file.tree)
+        self.moved = set().union(*(animation.nodes for animation in file.animations))
         self.drawn = _drawn_meshes(file)
         self.order = self._order()
         self.place = {node: place for place, node in enumerate(self.order)}
@@ -171,10 +173,9 @@ class _Grouping:
         for key, wanted in self.wanted.items():
             for root in {int(self.roots[node]) for node in wanted}:
                 in_tree.setdefault(root, []).append(key)
-        moved = set().union(*(animation.nodes for animation in self.file.animations))
         skinned = {n for n in self.mesh_nodes if self._is_skinned(n)}
         is_alone = not self.figures
-        for node in sorted(moved & self.place.keys() - skinned, key=self.place.__getitem__):
+        for node in sorted(self.moved & self.place.keys() - skinned, key=self.place.__getitem__):
             key = self._key(node)
             if key not in self.figures and not is_alone:
                 keys = in_tree.get(int(self.roots[node]), [])
@@ -236,19 +237,12 @@ class _Grouping:
         first = 0
         while children[-1] == 1 and first + 1 < len(nodes):
             node = nodes[first]
-            if node in wanted or children.get(node) != 1 or not self._is_identity(node):
+            if node in wanted or node in self.moved or children.get(node) != 1:
+                break
+            if not self.is_identity[node]:
                 break
             first += 1
         return nodes[first:]
-
-    def _is_identity(self, node: int) -> bool:
-        tree = self.tree
-        return (
-            node not in tree.matrices
-            and not tree.translations[node].any()
-            and np.array_equal(np.abs(tree.rotations[node]), [0.0, 0.0, 0.0, 1.0])
-            and bool((tree.scales[node] == 1.0).all())
-        )
 
     def _name(self, figures: list[Members]) -> None:
         """Name each of several figures after its topmost node that no other figure has."""
@@ -272,6 +266,14 @@ def _roots(tree: NodeTree) -> Ints:
         if np.array_equal(next_above, above):
             return above
         above = next_above
+
+
+def _identities(tree: NodeTree) -> Bools:
+    """Return which nodes have the identity as their transform: (N,)."""
+    same: Bools = ~tree.translations.any(axis=1) & ~tree.rotations[:, :3].any(axis=1)
+    same &= (tree.scales == 1.0).all(axis=1)
+    same[list(tree.matrices)] = False
+    return same
 
 
 def _drawn_meshes(file: NodeFile) -> set[int]:
