@@ -14,7 +14,6 @@ from viewer.loading.assembly import assemble
 from viewer.loading.contents import Contents
 from viewer.rig.figure_group import FigureGroup
 
-
 EYE = (NodeCamera("eye", 0.8, 1.5),)
 
 

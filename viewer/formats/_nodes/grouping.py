@@ -270,8 +270,8 @@ def _roots(tree: NodeTree) -> Ints:
 
 def _identities(tree: NodeTree) -> Bools:
     """Return which nodes have the identity as their transform: (N,)."""
-    same: Bools = ~tree.translations.any(axis=1) & ~tree.rotations[:, :3].any(axis=1)
-    same &= (tree.scales == 1.0).all(axis=1)
+    moved = np.concatenate([tree.translations, tree.rotations[:, :3], tree.scales - 1.0], axis=1)
+    same = np.array(~moved.any(axis=1))
     same[list(tree.matrices)] = False
     return same
 
