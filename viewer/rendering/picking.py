@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import moderngl
 import numpy as np
@@ -29,7 +30,7 @@ from viewer.rendering.shown import (
     update_skeletons,
 )
 from viewer.rendering.view import View, in_front, set_model
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene
 
@@ -178,12 +179,14 @@ class PickPass:
         self, index: int, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> None:
         program = self.passes.programs.drawing("mesh", fragment="pick")
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        indices = mesh.index_set(options)
         set_model(program, view, placement, mesh.center)
-        order = indices.order
-        self._number(program, lambda _, t, point: Pick(index, -1, int(order[t]), -1, point))
         array = self.passes.meshes.array(mesh, program, indices)
-        array.render(moderngl.TRIANGLES, vertices=indices.n_indices)
+        for first, count in indices.spans:
+            # Triangles are numbered from 0 in each draw call.
+            order = indices.order[first // 3 :]
+            self._number(program, partial(_picked_triangle, index, order))
+            array.render(moderngl.TRIANGLES, vertices=count, first=first)
 
     def _draw_instances(
         self, numbers: list[int], instances: InstanceBuffers, view: View, options: DisplayOptions
@@ -199,7 +202,7 @@ class PickPass:
 
         self._number(program, found)
         array = instances.array(program, indices)
-        array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=instances.count)
+        array.render(moderngl.TRIANGLES, vertices=3 * len(order), instances=instances.count)
 
     def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self.passes.buffers.skeleton(actor)
@@ -259,6 +262,11 @@ class PickPass:
             for item in (self._framebuffer, self._depth, self._numbers):
                 item.release()
             self._numbers = None
+
+
+def _picked_triangle(actor: int, order: Ints, _: int, triangle: int, point: Floats) -> Pick:
+    """Return the pick of a triangle of one draw call, given the triangles in its order."""
+    return Pick(actor, -1, int(order[triangle]), -1, point)
 
 
 def _window(size: tuple[int, int], pixel: tuple[float, float]) -> Floats:

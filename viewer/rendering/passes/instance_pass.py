@@ -24,8 +24,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
     Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
-    translucent actors, and meshes that are drawn several times per frame, in the bind pose or
-    coloured by a scalar.
+    translucent actors, actors with hidden parts, and meshes that are drawn several times per
+    frame, in the bind pose or coloured by a scalar.
 
     Parameters
     ----------
@@ -45,7 +45,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         return []
     groups: dict[tuple[int, bytes], list[Actor]] = {}
     for actor in actors:
-        if actor.pose is not None and actor.figure.is_attached and actor.opacity == 1.0:
+        is_plain = actor.opacity == 1.0 and not actor.hidden_parts
+        if actor.pose is not None and actor.figure.is_attached and is_plain:
             key = id(actor.figure), actor.pose.shape_weights.tobytes()
             groups.setdefault(key, []).append(actor)
     return [group for group in groups.values() if len(group) >= FEWEST]
