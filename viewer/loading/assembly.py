@@ -27,7 +27,7 @@ __all__ = ["assemble", "begin"]
 
 
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
-    """Make actors of figures and motions, and read captures completely; see ``load``."""
+    """Create actors from figures and motions, and read captures completely; see ``load``."""
     scene, builders = begin(contents, settings)
     notes: list[Diagnostic] = []
     for builder in builders:
@@ -43,7 +43,7 @@ def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scen
 def begin(
     contents: Contents, settings: MotionSettings | None = None
 ) -> tuple[Scene, list[Builder]]:
-    """Make a scene that can be shown, and return the captures that are still to be read.
+    """Create a scene that can be shown, and return the captures that are still to be read.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
 
 
 def _give_morphs(contents: Contents, cast: Cast) -> None:
-    """Give blend shape targets to the first mesh with their vertex count, all to the same one."""
+    """Give all blend shape targets to the first mesh with their vertex count."""
     actors = cast.actors
     from viewer.rig.morph_target import on_one_joint, with_morphs
 

@@ -36,7 +36,7 @@ class Piece:
     sources : (V,) int32
         Vertex of the primitive that each vertex is a copy of: flat shading splits vertices.
     triangles : (T, 3) int32
-        Of the piece's vertices, counter-clockwise from outside in the rest pose.
+        Of the piece's vertices, counter-clockwise from outside in binding space.
     normals : (V, 3)
         Mesh space.
     shading : "file", "flat" or "smooth"
@@ -71,7 +71,6 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
     bindings : Bindings
         Of all their skins, and of the nodes themselves where a skin does not move their mesh.
     """
-    worlds, carrier = bindings.worlds, bindings.joints.carrier
     pieces = []
     for part, node in enumerate(nodes):
         skin = int(file.tree.skins[node])
@@ -79,25 +78,17 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
             if len(primitive.triangles) == 0:
                 continue
             if skin >= 0 and primitive.joints is not None:
-                baked, bound = bindings.baked[skin], file.skins[skin]
+                baked = bindings.baked[skin]
                 influences = divided(primitive, bindings.slots[skin])
-                placed = worlds[carrier[int(bound.joints[0])]] @ bound.inverse_bind[0]
             else:
                 joint, baked = bindings.rigid[node]
                 influences = on_joint(len(primitive.positions), joint)
-                placed = worlds[carrier[node]]
-            mirrored = bool(np.linalg.det(placed[:3, :3]) < 0.0)
-            pieces.append(_piece(node, part, primitive, baked, influences, mirrored))
+            pieces.append(_piece(node, part, primitive, baked, influences))
     return pieces
 
 
 def _piece(
-    node: int,
-    part: int,
-    primitive: Primitive,
-    baked: Floats,
-    influences: Influences,
-    is_mirrored: bool,
+    node: int, part: int, primitive: Primitive, baked: Floats, influences: Influences
 ) -> Piece:
     """Return one piece; triangles that a reflection reverses are turned over again."""
     sources = np.arange(len(primitive.positions), dtype=np.int32)
@@ -108,7 +99,7 @@ def _piece(
         if is_flat:
             split = of_rows(influences, sources)
             influences = _counted_as(split, influences)
-    if is_mirrored:
+    if np.linalg.det(baked[:3, :3]) < 0.0:
         triangles = triangles[:, ::-1]
     return Piece(node, part, primitive, baked, influences, sources, triangles, normals, shading)
 
