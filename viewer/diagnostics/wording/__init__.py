@@ -17,6 +17,7 @@ from viewer.diagnostics.wording import (
     comparison,
     easymocap,
     export,
+    fbx,
     joints,
     kinds,
     loading,
@@ -36,7 +37,7 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, fbx, anim, weights),
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
