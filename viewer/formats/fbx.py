@@ -10,14 +10,15 @@ inches, stay those of the file; others are converted to y up and metres.
 from __future__ import annotations
 
 from viewer.formats._fbx.contents import node_file
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._nodes.figures import figure_group
 from viewer.formats._source import Source
+from viewer.rig.figure_group import FigureGroup
 
-__all__ = ["read_nodes"]
+__all__ = ["read"]
 
 
-def read_nodes(source: Source) -> NodeFile:
-    """Read a file of nodes; the keys of its animations are read when they are first needed.
+def read(source: Source) -> FigureGroup:
+    """Read the figures of a file; the keys of its animations are read when they are first needed.
 
     Parameters
     ----------
@@ -26,12 +27,12 @@ def read_nodes(source: Source) -> NodeFile:
 
     Returns
     -------
-    NodeFile
-        In the file's unit and axes, see above.
+    FigureGroup
+        Figures in the file's unit and axes, see above.
 
     Raises
     ------
     FormatError
         If ufbx is not installed, cannot read the file, crashes, or takes too long.
     """
-    return node_file(source)
+    return figure_group(node_file(source), source)

@@ -12,16 +12,16 @@ from numpy.testing import assert_allclose
 
 from viewer.errors import FormatError
 from viewer.formats import Source
+from viewer.formats._fbx.contents import node_file
 from viewer.formats._fbx.message import packed, unpacked
 from viewer.formats._nodes.content import NodeFile
-from viewer.formats.fbx import read_nodes
 
 needs_ufbx = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")
 
 
 @pytest.fixture(scope="module")
 def strip(tmp_path_factory: pytest.TempPathFactory) -> NodeFile:
-    return read_nodes(Source.open(write_strip(tmp_path_factory.mktemp("fbx"))))
+    return node_file(Source.open(write_strip(tmp_path_factory.mktemp("fbx"))))
 
 
 @needs_ufbx
@@ -85,7 +85,7 @@ def test_keys_are_baked_at_the_frame_rate_of_the_file(strip: NodeFile) -> None:
 @needs_ufbx
 def test_up_axis_and_unit_stay_those_of_the_file(tmp_path: Path) -> None:
     source = Source.open(write_strip(tmp_path, up="z", unit=100.0))
-    content = read_nodes(source)
+    content = node_file(source)
     assert (content.up, content.unit) == ("z", "m")
     assert_allclose(content.tree.translations[3], [0.0, 1.0, 0.0])
     assert not source.warnings
@@ -94,7 +94,7 @@ def test_up_axis_and_unit_stay_those_of_the_file(tmp_path: Path) -> None:
 @needs_ufbx
 def test_unknown_units_become_metres(tmp_path: Path) -> None:
     source = Source.open(write_strip(tmp_path, unit=30.48))  # feet
-    content = read_nodes(source)
+    content = node_file(source)
     assert content.unit == "m"
     assert [found.key for found in source.diagnostics.warnings] == ["F007.fbx-converted"]
     tree = content.tree
@@ -107,7 +107,7 @@ def test_other_contents_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "wrong.fbx"
     path.write_text("no FBX at all\n")
     with pytest.raises(FormatError) as caught:
-        read_nodes(Source.open(path))
+        node_file(Source.open(path))
     assert caught.value.diagnostic is not None
     assert caught.value.diagnostic.key == "F002.fbx"
 
@@ -127,7 +127,7 @@ def test_a_child_that_fails_is_one_line(
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(FormatError) as caught:
-        read_nodes(Source.open(write_strip(tmp_path)))
+        node_file(Source.open(write_strip(tmp_path)))
     assert caught.value.diagnostic is not None
     assert caught.value.diagnostic.key == "F001.fbx-crash"
     assert ending in str(caught.value)
@@ -138,7 +138,7 @@ def test_without_the_library_the_message_names_it(
 ) -> None:
     monkeypatch.setattr("viewer.formats._fbx.child.find_spec", lambda name: None)
     with pytest.raises(FormatError) as caught:
-        read_nodes(Source.open(write_strip(tmp_path)))
+        node_file(Source.open(write_strip(tmp_path)))
     assert caught.value.diagnostic is not None
     assert caught.value.diagnostic.key == "F001.fbx-extra"
 
@@ -159,7 +159,7 @@ def test_a_file_of_blender_agrees_with_its_exported_frames(
     shared_data: Path, stack: int, time: float, reference: str
 ) -> None:
     folder = shared_data / "fbx"
-    content = read_nodes(Source.open(folder / "blender_279_sausage_7400_binary.fbx"))
+    content = node_file(Source.open(folder / "blender_279_sausage_7400_binary.fbx"))
     keys = {
         (channel.node, channel.path): np.array(
             [np.interp(time, channel.times, column) for column in channel.values.T]

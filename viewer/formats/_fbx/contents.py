@@ -31,7 +31,7 @@ _PERCENT = 100.0  # full weight of a blend channel
 
 
 def node_file(source: Source) -> NodeFile:
-    """Read a file in a child process; see ``viewer.formats.fbx.read_nodes``."""
+    """Read a file in a child process; see ``viewer.formats.fbx.read``."""
     arrays, told = run_worker(source)
     _say_unused(source, told)
     count = len(told["names"])
