@@ -28,7 +28,7 @@ def textured(material: Material) -> Actor:
         seamed_mesh(),
         materials=(material,),
         triangle_materials=np.zeros(3, np.int32),
-        second_uvs=UVS[::-1],
+        other_uvs=(UVS[::-1],),
     )
     actor.figure = replace(actor.figure, mesh=mesh)
     return actor

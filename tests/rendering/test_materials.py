@@ -228,7 +228,7 @@ def test_textures_are_placed_wrapped_and_taken_from_the_second_set(offscreen):
     def seen(**placing):
         made = texture(*corners, is_smooth=False, **placing)
         material = Material("", made, unlit=True, is_physical=True)
-        figure = painted(material, second_uvs=square().uvs[:, ::-1])
+        figure = painted(material, other_uvs=(square().uvs[:, ::-1],))
         shown = front_view(offscreen, alone(figure), lights=dark())
         return [tuple(pixel(shown, x, y)[:3]) for y in (0.5, -0.5) for x in (-0.5, 0.5)]
 

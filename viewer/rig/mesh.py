@@ -42,8 +42,8 @@ class Mesh:
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
-    second_uvs : (U, 2) or None
-        A second texture coordinate for each row of ``uvs``, for textures that name this set.
+    other_uvs : tuple of (U, 2)
+        Further texture coordinates for each row of ``uvs``, for textures that name these sets.
     colors : (V, 4) or None
         Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
     parts : tuple of P str
@@ -59,7 +59,7 @@ class Mesh:
     materials: tuple[Material, ...] = ()
     triangle_materials: Ints | None = None
     uv_triangles: Ints | None = None
-    second_uvs: Floats | None = None
+    other_uvs: tuple[Floats, ...] = ()
     colors: Floats | None = None
     parts: tuple[str, ...] = ()
     triangle_parts: Ints | None = None
@@ -74,9 +74,8 @@ class Mesh:
         if self.uvs is not None:
             rows = self.n_vertices if self.uv_triangles is None else None
             put("uvs", frozen("uvs", self.uvs, (rows, 2)))
-        if self.second_uvs is not None:
-            rows = 0 if self.uvs is None else len(self.uvs)
-            put("second_uvs", frozen("second_uvs", self.second_uvs, (rows, 2)))
+        rows = 0 if self.uvs is None else len(self.uvs)
+        put("other_uvs", tuple(frozen("other_uvs", uvs, (rows, 2)) for uvs in self.other_uvs))
         if self.uv_triangles is not None:
             shape = (self.n_triangles, 3)
             put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))

@@ -169,7 +169,8 @@ class MeshPass:
                 found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
             for values, layout, name in (
                 (mesh.mesh.uvs, "2f4", "in_uv"),
-                (mesh.mesh.second_uvs, "2f4", "in_second_uv"),
+                (mesh.mesh.other_uvs, "4f4", "in_other_uvs"),
+                (mesh.mesh.tints, "4f4", "in_tint"),
                 (mesh.mesh.colors, "3f4", "in_color"),
                 (mesh.scalars.values, "f4", "in_scalar"),
             ):
@@ -208,6 +209,7 @@ def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOp
         "u_opacity": surface_opacity(options),
         "u_has_uv": mesh.uvs is not None,
         "u_has_colors": options.shading == "parts" and mesh.colors is not None,
+        "u_has_tint": options.vertex_colors and mesh.tints is not None,
         **SAMPLERS,
         **STUDIO_SAMPLERS,
     }
