@@ -18,6 +18,7 @@ from viewer.diagnostics.wording import (
     easymocap,
     export,
     gltf,
+    gltf_materials,
     joints,
     kinds,
     loading,
@@ -38,7 +39,7 @@ from viewer.diagnostics.wording import (
 
 TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf),
-    *(archives, body_models, easymocap, poses, pictures),
+    *(gltf_materials, archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
 _CODED = (
