@@ -70,6 +70,13 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME|N",
         help="look through a calibrated camera of a capture, by name or number from 1",
     )
+    group.add_argument(
+        "--image-brightness",
+        type=number,
+        default=0.6,
+        metavar="0..1",
+        help="with --view, of the camera's image behind the scene; 0 hides it (default: 0.6)",
+    )
 
 
 def add_display_arguments(parser: argparse.ArgumentParser) -> None:
@@ -211,9 +218,10 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
-    for name in ("metallic", "roughness"):
-        if not 0.0 <= getattr(arguments, name) <= 1.0:
-            raise ViewerError(f"--{name}: expected 0 to 1, found {getattr(arguments, name):g}")
+    for name in ("metallic", "roughness", "image-brightness"):
+        value = getattr(arguments, name.replace("-", "_"))
+        if not 0.0 <= value <= 1.0:
+            raise ViewerError(f"--{name}: expected 0 to 1, found {value:g}")
     options = DisplayOptions(
         show=arguments.show,
         shading=arguments.shading,
@@ -237,6 +245,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         joint_names=arguments.joint_names,
         joint_axes=arguments.joint_axes,
         cameras=arguments.cameras,
+        image_brightness=arguments.image_brightness,
     )
     set_scalar(arguments, options)
     return options

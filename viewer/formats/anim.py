@@ -301,7 +301,7 @@ class _Parser:
         return tangent
 
 
-def write(clip: Clip | Figure, path: str | Path) -> None:
+def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     """Write a clip.
 
     Parameters
@@ -310,6 +310,11 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
         Clip with one channel per DOF, in the order of the DOF table.
     path : str or Path
         Replaced only when the whole text has been written.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the format holds all of a clip.
 
     Raises
     ------
@@ -325,6 +330,7 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
     head = f"animation {{\n\trange {clip.start!r} {clip.end!r}\n"
     head += f"\tnumchannels {len(clip.channels)}\n"
     save_text(path, head + "".join(map(_channel_text, clip.channels)) + "}\n")
+    return []
 
 
 def _channel_text(channel: Channel) -> str:

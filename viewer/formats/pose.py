@@ -286,7 +286,7 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     )
 
 
-def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
     """Write one pose in the format of the suffix.
 
     Parameters
@@ -295,6 +295,11 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
         Pose to write; other content is refused.
     path : str or Path
         ``.json``, ``.npz``, or ``.txt`` for the model's own pose vector alone.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the formats hold all that they are given for.
 
     Raises
     ------
@@ -319,3 +324,4 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
         arrays["dof_names"] = np.array(list(dofs), dtype=np.str_)
         arrays["dofs"] = np.array(list(dofs.values()))
         save_arrays(path, arrays)
+    return []

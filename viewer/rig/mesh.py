@@ -18,6 +18,7 @@ __all__ = [
     "triangle_areas",
     "vertex_normals",
     "volume",
+    "without_seams",
 ]
 
 _ROW = 64  # points per row of a reduction, see bounding_box
@@ -243,6 +244,34 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     sources = np.concatenate([unique // len(mesh.uvs), unused]).astype(np.int32)
     uv_indices = np.concatenate([unique % len(mesh.uvs), np.zeros_like(unused)]).astype(np.int32)
     return sources, uv_indices, inverse.reshape(-1, 3).astype(np.int32)
+
+
+def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
+    """Return a mesh with one texture coordinate per vertex, for formats without others.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        V vertices.
+
+    Returns
+    -------
+    mesh : Mesh
+        R vertices, split along texture seams.
+    sources : (R,) int32
+        Vertex that each of them is a copy of.
+    """
+    sources, uv_indices, triangles = split_seams(mesh)
+    second = mesh.second_uvs
+    return Mesh(
+        positions=mesh.positions[sources],
+        normals=mesh.normals[sources],
+        triangles=triangles,
+        uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
+        materials=mesh.materials,
+        triangle_materials=mesh.triangle_materials,
+        second_uvs=None if second is None else second[uv_indices],
+    ), sources
 
 
 def vertex_normals(positions: Floats, triangles: Ints) -> Floats:

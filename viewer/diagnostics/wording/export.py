@@ -168,6 +168,7 @@ PHRASES = {
     "part-reduced": "the reduced mesh",
     "part-regressor": "the joint regressor",
     "part-limits": "limits of joints",
+    "part-all-materials": "materials and textures",
     "part-materials": "material properties except one texture each",
     "part-occlusion": "occlusion maps",
     "part-alpha-cutoff": "alpha cutoffs",
