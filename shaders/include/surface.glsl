@@ -63,8 +63,9 @@ void cut_out(float alpha) {
 }
 
 // A normal perturbed by the normal map. The tangents are those of the screen's derivatives
-// (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
-vec3 mapped_normal(vec3 position, vec3 normal) {
+// (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none, and mirrored
+// texture coordinates need no sign. On the back of a surface, side -1, bumps are dents.
+vec3 mapped_normal(vec3 position, vec3 normal, float side) {
     if (u_normal_scale == 0.0)
         return normal;
     vec2 uv = place(NORMAL_MAP);
@@ -76,7 +77,7 @@ vec3 mapped_normal(vec3 position, vec3 normal) {
     float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
     if (longest == 0.0)
         return normal;
-    mapped.xy *= u_normal_scale * inversesqrt(longest);
+    mapped.xy *= side * u_normal_scale * inversesqrt(longest);
     return normalize(tangent * mapped.x + bitangent * mapped.y + normal * max(mapped.z, 1e-3));
 }
 #endif

@@ -84,6 +84,9 @@ class Mesh:
             put("colors", frozen("colors", self.colors, (self.n_vertices, 4)))
         for name in ("triangle_materials", "triangle_parts"):
             given = getattr(self, name)
+            if name == "triangle_parts" and not self.parts and np.all(np.asarray(given) == -1):
+                # It may be that of a mesh with other triangles, copied by ``dataclasses.replace``.
+                given = None
             values = np.full(self.n_triangles, -1, dtype=np.int32) if given is None else given
             put(name, frozen(name, values, (self.n_triangles,), np.int32))
         self._check_indices()
@@ -262,7 +265,6 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
         Vertex that each of them is a copy of.
     """
     sources, uv_indices, triangles = split_seams(mesh)
-    second = mesh.second_uvs
     return Mesh(
         positions=mesh.positions[sources],
         normals=mesh.normals[sources],
@@ -270,7 +272,10 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
         uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
         materials=mesh.materials,
         triangle_materials=mesh.triangle_materials,
-        second_uvs=None if second is None else second[uv_indices],
+        other_uvs=tuple(uvs[uv_indices] for uvs in mesh.other_uvs),
+        colors=None if mesh.colors is None else mesh.colors[sources],
+        parts=mesh.parts,
+        triangle_parts=mesh.triangle_parts,
     ), sources
 
 

@@ -55,6 +55,11 @@ class IndexSet:
         """Number of indices of all runs together."""
         return 3 * len(self.order)
 
+    @property
+    def is_blended(self) -> bool:
+        """Whether some triangles are blended."""
+        return any(run.surface.is_blended and run.count for run in self.runs)
+
 
 def index_set(
     context: moderngl.Context,
