@@ -314,7 +314,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     Raises
     ------
     UnsupportedFormatError
-        If no format has this suffix, or it cannot hold the content.
+        If no format has this suffix, or it cannot store the content.
     OutputError
         If the file cannot be written.
     """

@@ -234,7 +234,7 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
         raise UnsupportedFormatError(f"figure {name} has no triangles to write as .skin")
     arrays = [mesh.positions, mesh.normals, mesh.uvs, None if skin is None else skin.weights]
     if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
-        raise UnsupportedFormatError(f".skin cannot hold numbers beyond {LARGEST:.3g}")
+        raise UnsupportedFormatError(f".skin cannot store numbers beyond {LARGEST:.3g}")
 
 
 def _table(name: str, rows: Floats | Ints) -> str:
@@ -273,7 +273,7 @@ def _material_text(material: Material) -> str:
     name, texture = as_words(material.name), _as_rest_of_line(material.texture)
     if name is None or not KEYWORDS.isdisjoint(name) or texture != material.texture:
         raise UnsupportedFormatError(
-            f'.skin cannot hold the material "{printable(material.name)}" '
+            f'.skin cannot store the material "{printable(material.name)}" '
             f'with the texture "{printable(material.texture)}"'
         )
     head = " ".join(filter(None, ["material", material.name, "{\n"]))

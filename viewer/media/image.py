@@ -37,7 +37,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins like this is an image in a supported format."""
+    """Return whether a file that begins with these bytes is an image in a supported format."""
     return head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*")) or (
         head[:4] == b"RIFF" and head[8:12] == b"WEBP"
     )
@@ -136,7 +136,7 @@ def _decoded(opened: tuple[Path, Image.Image] | FormatError) -> Bytes | FormatEr
             pixels = np.asarray(picture.convert("RGBA"))
     except (*_REFUSALS, Image.DecompressionBombError) as problem:
         return _unreadable(path, str(problem))
-    pixels.flags.writeable = False  # materials may share it
+    pixels.flags.writeable = False  # materials may share the array
     return pixels
 
 

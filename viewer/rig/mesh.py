@@ -33,18 +33,18 @@ class Mesh:
     positions, normals : (V, 3)
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, never relied upon.
+        Vertex indices; counter-clockwise from outside in most files, which is not relied upon.
     uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None
-        Indices into ``uvs`` where they differ from ``triangles``: along a seam one vertex has
-        several texture coordinates. None if every vertex has one, and U = V.
+        Indices into ``uvs`` if they differ from ``triangles``: along a seam, one vertex has several
+        texture coordinates. None if every vertex has exactly one; then U = V.
     materials : tuple of Material
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
     other_uvs : tuple of (U, 2)
-        Further texture coordinates for each row of ``uvs``, for textures that name these sets.
+        Further texture coordinates for each row of ``uvs``, for textures that refer to these sets.
     colors : (V, 4) or None
         Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
     parts : tuple of P str
@@ -146,7 +146,7 @@ def bounding_box(points: Floats) -> Floats:
     Parameters
     ----------
     points : (N, 3)
-        Any points; an empty array gives a box of size 0 at the origin.
+        Points; an empty array gives a box of size 0 at the origin.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def bounding_box(points: Floats) -> Floats:
 
 
 def box_size(box: Floats) -> float:
-    """Return the length of a box's diagonal, the "size" that tolerances refer to.
+    """Return the length of a box's diagonal, the "size" to which tolerances refer.
 
     >>> box_size(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.0]]))
     3.0
@@ -292,7 +292,7 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     Returns
     -------
     (V, 3)
-        Unit normals; +y for a vertex without triangles or with degenerate ones only.
+        Unit normals; +y for a vertex that has no triangles or only degenerate ones.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from viewer.formats._gltf.buffers import Buffers, View
 from viewer.formats._gltf.elements import Element, Table
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Accessors"]
 
@@ -103,8 +103,15 @@ class Accessors:
         """Return the number of elements that an accessor declares."""
         return self._table[index].whole("count")
 
-    def raw(self, index: int, kinds: Sequence[str], user: str) -> NDArray[Any]:
-        """Return an accessor's components as stored, column by column: (N, C), read-only.
+    def floats(
+        self,
+        index: int,
+        kinds: Sequence[str],
+        user: str,
+        rows: Ints | None = None,
+        decoded: NDArray[Any] | None = None,
+    ) -> Floats:
+        """Return an accessor as numbers; normalised integers become fractions.
 
         Parameters
         ----------
@@ -114,44 +121,66 @@ class Accessors:
             Element types that are expected, such as ``"VEC3"``.
         user : str
             JSON pointer to what refers to the accessor.
+        rows : (M,) int32, optional
+            Elements to return; all if omitted.
+        decoded : (N, C), optional
+            Components that were decoded elsewhere, in place of those in the buffer view.
+
+        Returns
+        -------
+        (N, C) or (M, C)
+            May be infinite or NaN. The components of a matrix are column by column.
 
         Raises
         ------
         FormatError
             If it is invalid, of another type, or its data are missing.
         """
-        return self._values(self._layout(index, kinds, user))
-
-    def floats(self, index: int, kinds: Sequence[str], user: str) -> Floats:
-        """Return an accessor as numbers, (N, C) float64; normalised integers become fractions.
-
-        Raises
-        ------
-        FormatError
-            As ``raw`` does.
-        """
         layout = self._layout(index, kinds, user)
-        values = self._values(layout)
+        values = self._picked(layout, rows, decoded)
         if layout.is_normalized and values.dtype.kind != "f":
-            most = np.iinfo(values.dtype).max
             # Signed integers have one more negative value, which is -1 too (glTF 2.0, 3.6.2.2).
-            return np.maximum(values / most, -1.0)
+            return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
         return values.astype(np.float64)
 
-    def integers(self, index: int, kinds: Sequence[str], user: str) -> NDArray[np.int64]:
-        """Return an accessor as whole numbers, (N, C) int64.
+    def fractions(
+        self,
+        index: int,
+        kinds: Sequence[str],
+        user: str,
+        rows: Ints | None = None,
+        decoded: NDArray[Any] | None = None,
+    ) -> Floats:
+        """Return an accessor whose integers must be normalised, as colours and weights are.
 
-        Raises
-        ------
-        FormatError
-            As ``raw`` does, and if the components are fractions.
+        Parameters, shape and errors are those of ``floats``. A missing flag is warned of.
+        """
+        values = self.floats(index, kinds, user, rows, decoded)
+        layout = self._layout(index, kinds, user)
+        if layout.is_normalized or layout.dtype.kind == "f":
+            return values
+        layout.element.warn("G002.normalized")
+        return np.maximum(values / np.iinfo(layout.dtype).max, -1.0)
+
+    def integers(
+        self,
+        index: int,
+        kinds: Sequence[str],
+        user: str,
+        rows: Ints | None = None,
+        decoded: NDArray[Any] | None = None,
+    ) -> NDArray[np.int64]:
+        """Return an accessor as whole numbers: (N, C) or (M, C) int64.
+
+        Parameters and errors are those of ``floats``; components that are floating-point numbers
+        are an error too.
         """
         layout = self._layout(index, kinds, user)
         if layout.dtype.kind == "f" or layout.is_normalized:
-            found = "normalised integers" if layout.is_normalized else "floats"
+            found = "normalised integers" if layout.is_normalized else "floating-point numbers"
             source = layout.element.source
             raise source.fault("F002.gltf-whole", user, found=found, accessor=index)
-        return self._values(layout).astype(np.int64)
+        return self._picked(layout, rows, decoded).astype(np.int64)
 
     def matrices(self, index: int, user: str) -> Floats:
         """Return an accessor of MAT4 as matrices with the translation in the last column.
@@ -163,10 +192,20 @@ class Accessors:
         Raises
         ------
         FormatError
-            As ``raw`` does.
+            As ``floats`` does.
         """
         columns = self.floats(index, ("MAT4",), user).reshape(-1, 4, 4)
         return np.ascontiguousarray(columns.transpose(0, 2, 1))
+
+    def _picked(
+        self, layout: _Layout, rows: Ints | None, decoded: NDArray[Any] | None
+    ) -> NDArray[Any]:
+        values = self._values(layout) if decoded is None else decoded
+        if rows is not None:
+            values = values[rows]
+        # Computations use double precision.
+        self._spend(values.size * 8, layout.element.pointer)
+        return values
 
     def _layout(self, index: int, kinds: Sequence[str], user: str) -> _Layout:
         element = self._table[index]
@@ -182,15 +221,12 @@ class Accessors:
     def _values(self, layout: _Layout) -> NDArray[Any]:
         element = layout.element
         place = element.index("bufferView", self._buffers.n_views, "bufferViews")
-        # Computations use double precision.
-        size = layout.count * layout.width * 8
         if place < 0:
-            self._spend(size, element.pointer)
+            self._spend(layout.count * layout.width * layout.dtype.itemsize, element.pointer)
             values = np.zeros((layout.count, layout.width), layout.dtype)
         else:
             view = self._buffers.view(place)
             values = _elements(view, layout, element, element.whole("byteOffset", 0))
-            self._spend(size, element.pointer)
         sparse = element.part("sparse")
         return values if sparse is None else self._replaced(values, layout, sparse)
 

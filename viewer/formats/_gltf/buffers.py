@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.meshopt import meshopt_of
 from viewer.formats._gltf.uris import is_data_uri, media_type, uri_bytes, uri_path
 from viewer.rig.arrays import Bytes
 
@@ -77,7 +76,6 @@ class Buffers:
         self._images = root.table("images")
         self._source, self._binary, self._spend = root.source, binary, spend
         self._data: dict[int, Bytes] = {}
-        self._decoded: dict[int, View] = {}
         self.n_bytes_read = len(root.source.data)
         """Size of the document and of the files that it has needed so far."""
 
@@ -104,16 +102,14 @@ class Buffers:
         return self._data[index]
 
     def view(self, index: int) -> View:
-        """Return a buffer view, decompressed if it is compressed.
+        """Return a buffer view.
 
         Raises
         ------
         FormatError
             If it is invalid, or its data cannot be read or end before it.
         """
-        view = self._views[index]
-        compressed = meshopt_of(view)
-        return self._part(view if compressed is None else compressed)
+        return self._part(self._views[index])
 
     def image(self, index: int) -> EncodedImage:
         """Return an image, still encoded.

@@ -95,18 +95,15 @@ def data_uri_bytes(element: Element, most: int | None = None) -> bytes:
     if not uri[:comma].rstrip().lower().endswith(";base64"):
         data = unquote_to_bytes(uri[comma + 1 :])
         return data if most is None else data[:most]
-    end = len(uri) if most is None else min(len(uri), comma + 1 + (most + 2) // 3 * 4)
-    if end < len(uri) and "%" in uri[comma:end]:
-        end = len(uri)
-    return _decoded(element, uri[comma + 1 : end])
+    end = len(uri) if most is None else comma + 1 + (most + 2) // 3 * 4
+    try:
+        return binascii.a2b_base64(uri[comma + 1 : end], strict_mode=True)
+    except ValueError:
+        return _decoded(element, uri[comma + 1 :])
 
 
 def _decoded(element: Element, text: str) -> bytes:
-    """Return base64 text decoded; white space, missing padding and the URL alphabet are valid."""
-    try:
-        return binascii.a2b_base64(text, strict_mode=True)
-    except ValueError:
-        pass  # not exactly in the standard form
+    """Return base64 decoded that has white space, no padding, or the alphabet of URLs."""
     plain = unquote(text).translate(str.maketrans("-_", "+/", " \t\r\n="))
     try:
         return binascii.a2b_base64(plain + "=" * (-len(plain) % 4), strict_mode=True)

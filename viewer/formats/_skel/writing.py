@@ -34,7 +34,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     Parameters
     ----------
     figure : Figure
-        With a skeleton in depth-first order, with rotation DOFs and without rest rotations.
+        Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
     path : str or Path
         Replaced only when the whole text has been written.
 
@@ -46,7 +46,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     Raises
     ------
     UnsupportedFormatError
-        If the format cannot hold the skeleton.
+        If the format cannot store the skeleton.
     OutputError
         If the file cannot be written.
     """

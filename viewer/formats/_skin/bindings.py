@@ -38,7 +38,7 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
         end = source.end if word is None else word.start()
         then = word and word.group()
         found = len(matrices)
-        # The error is the wrong count or, if the text is truncated, its end.
+        # The error is located at the count or, if the file is truncated, at its end.
         if not is_whole:
             line = source.line(stated)
             raise source.fault(
