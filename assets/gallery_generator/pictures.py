@@ -195,26 +195,26 @@ PICTURES: dict[str, Picture] = {
     ),
     "knee": Picture(
         "The weights of a joint",
-        "How much the left knee moves each vertex, with lines at every tenth.",
+        "Influence of the left knee on each vertex, with isolines at every tenth.",
         draw=_draw_knee,
         has_data=True,
     ),
     "finding": Picture(
         "A finding of lint",
-        "Vertices of the forearm without weights stay where the skin was bound. Lint names them; "
+        "Vertices of the forearm without weights stay in the bind pose. Lint lists them; "
         "the Lint panel marks them in the view.",
         draw=_draw_finding,
         has_data=True,
     ),
     "scan": Picture(
         "A mesh without a rig",
-        "A person of another shape, as a scanner leaves it.",
+        "A person of another shape, as scanned.",
         ("viewer render scan.obj",),
         size=(420, 560),
     ),
     "rigged": Picture(
         "The same mesh, rigged",
-        "With the skeleton and the weights of the bundled body, in a pose of its own.",
+        "With the skeleton and the weights of the bundled body, in a different pose.",
         (
             "viewer rig scan.obj --from body -o scan.npz",
             "viewer render scan.npz --show both --dof left_hip.x=-40deg --dof left_knee.x=65deg "

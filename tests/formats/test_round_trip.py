@@ -203,8 +203,8 @@ def test_skeleton_with_fewer_dofs_is_refused(tmp_path):
             {"triangles": np.zeros((0, 3), np.int32)},
             "figure a has no triangles to write as .skin",
         ),
-        ({"positions": np.full((3, 3), 1e39)}, ".skin cannot hold numbers beyond 3.4e+38"),
-        ({"uvs": np.full((3, 2), -1e39)}, ".skin cannot hold numbers beyond 3.4e+38"),
+        ({"positions": np.full((3, 3), 1e39)}, ".skin cannot store numbers beyond 3.4e+38"),
+        ({"uvs": np.full((3, 2), -1e39)}, ".skin cannot store numbers beyond 3.4e+38"),
         (
             {
                 "materials": (Material("x"), Material("y")),
@@ -223,31 +223,31 @@ def test_skeleton_with_fewer_dofs_is_refused(tmp_path):
         ),
         (
             {"materials": (Material("a{", Texture("b.png")),)},
-            '.skin cannot hold the material "a{" with the texture "b.png"',
+            '.skin cannot store the material "a{" with the texture "b.png"',
         ),
         (
             {"materials": (Material("my normals", Texture("b.png")),)},
-            '.skin cannot hold the material "my normals" with the texture "b.png"',
+            '.skin cannot store the material "my normals" with the texture "b.png"',
         ),
         (
             {"materials": (Material("a", Texture("b}.png")),)},
-            '.skin cannot hold the material "a" with the texture "b}.png"',
+            '.skin cannot store the material "a" with the texture "b}.png"',
         ),
         (
             {"materials": (Material("a", Texture(" b.png")),)},
-            '.skin cannot hold the material "a" with the texture " b.png"',
+            '.skin cannot store the material "a" with the texture " b.png"',
         ),
         (
             {"materials": (Material("a", Texture("b\nc.png")),)},
-            '.skin cannot hold the material "a" with the texture "b\\nc.png"',
+            '.skin cannot store the material "a" with the texture "b\\nc.png"',
         ),
         (
             {"materials": (Material("a", Texture("")),)},
-            '.skin cannot hold the material "a" with the texture ""',
+            '.skin cannot store the material "a" with the texture ""',
         ),
         (
             {"materials": (Material("\ud800", Texture("\ud800")),)},
-            '.skin cannot hold the material "\\ud800" with the texture "\\ud800"',
+            '.skin cannot store the material "\\ud800" with the texture "\\ud800"',
         ),
     ],
 )
@@ -262,7 +262,7 @@ def test_weights_beyond_float32_are_refused(tmp_path):
     heavy = skin_from_lists([[(0, 1e39)], [], []], np.eye(4)[None])
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", mesh(), skin=heavy), tmp_path / "a.skin")
-    assert str(caught.value) == ".skin cannot hold numbers beyond 3.4e+38"
+    assert str(caught.value) == ".skin cannot store numbers beyond 3.4e+38"
 
 
 def test_parts_that_a_figure_lacks_cannot_be_written(tmp_path):

@@ -56,7 +56,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
-    """Return all written files, including images under the names that the mesh gives them."""
+    """Return all written files, including images under the names used by the mesh."""
     if rig.mesh is None:
         return [skel]
     pictures = [material.texture for material in rig.mesh.materials if material.image is not None]
@@ -97,7 +97,7 @@ def scaled(figure: Figure, factor: float) -> Figure:
 
 
 def _lost(figure: Figure) -> list[Diagnostic]:
-    """Return a note that lists the data that the formats cannot hold."""
+    """Return a note that lists the data that the formats cannot store."""
     lost = []
     if figure.blend_shapes is not None:
         lost.append(Phrase("part-current-shape", n=figure.n_shapes))

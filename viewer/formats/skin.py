@@ -26,7 +26,6 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._neutral import neutral_positions
-from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
     check_mesh,
@@ -39,6 +38,7 @@ from viewer.formats._skin.checks import (
 )
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.formats._texture import load_image
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text
@@ -230,7 +230,7 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
         raise UnsupportedFormatError(f"figure {name} has no triangles to write as .skin")
     arrays = [mesh.positions, mesh.normals, mesh.uvs, None if skin is None else skin.weights]
     if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
-        raise UnsupportedFormatError(f".skin cannot hold numbers beyond {LARGEST:.3g}")
+        raise UnsupportedFormatError(f".skin cannot store numbers beyond {LARGEST:.3g}")
 
 
 def _table(name: str, rows: Floats | Ints) -> str:
@@ -269,7 +269,7 @@ def _material_text(material: Material) -> str:
     name, texture = as_words(material.name), _as_rest_of_line(material.texture)
     if name is None or not KEYWORDS.isdisjoint(name) or texture != material.texture:
         raise UnsupportedFormatError(
-            f'.skin cannot hold the material "{printable(material.name)}" '
+            f'.skin cannot store the material "{printable(material.name)}" '
             f'with the texture "{printable(material.texture)}"'
         )
     head = " ".join(filter(None, ["material", material.name, "{\n"]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
-from viewer.formats._numbers import LARGEST
+from viewer.formats._text.numbers import LARGEST
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -34,7 +34,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     Parameters
     ----------
     figure : Figure
-        With a skeleton in depth-first order, with rotation DOFs and without rest rotations.
+        Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
     path : str or Path
         Replaced only when the whole text has been written.
 
@@ -46,7 +46,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     Raises
     ------
     UnsupportedFormatError
-        If the format cannot hold the skeleton.
+        If the format cannot store the skeleton.
     OutputError
         If the file cannot be written.
     """
