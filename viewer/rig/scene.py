@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.sampled_clip import SampledClip
+    from viewer.rig.motion.transform_clip import TransformClip
 
-Motion: TypeAlias = "Clip | SampledClip | PointClip"
+Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
 
 # The camera frames the box of the other 99.9 % of the points ...

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.evaluation import JointMotion
 
 __all__ = [
     "no_job_room",
@@ -56,7 +55,7 @@ def no_new_clip(state: AppState) -> str:
 
 def nothing_to_export(state: AppState) -> str:
     """Return why no motion can be written."""
-    if any(isinstance(actor.clip, Clip | SampledClip) for actor in state.scene.actors):
+    if any(isinstance(actor.clip, JointMotion) for actor in state.scene.actors):
         return ""
     if state.clock.has_motion:
         return "only captured points move; there are no joints to export"
