@@ -16,7 +16,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.transform_rate import key_rate
 from viewer.rig.number_text import number_text
-from viewer.rig.scene import Motion
+from viewer.rig.scene import Actor, Motion
 
 _SHOWN_GAPS = 6
 
@@ -84,6 +84,32 @@ def gaps_of(timing: Timing) -> list[list[int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[True], timing.present, [True]])))
     pairs = edges.reshape(-1, 2) + np.array([timing.first_frame, timing.first_frame - 1])
     return [[int(first), int(last)] for first, last in pairs]
+
+
+def describe_animations(actor: Actor) -> list[dict[str, Any]]:
+    """Return the names and ranges of a figure's animations as JSON data, without their keys."""
+    return [
+        {
+            "number": index + 1,
+            "name": animation.name,
+            "range": [animation.start, animation.end],
+            "plays": index == actor.animation,
+        }
+        for index, animation in enumerate(actor.figure.animations)
+    ]
+
+
+def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
+    """Return the list of animations as lines of text; an asterisk marks the one that plays."""
+    width = len(str(len(animations)))
+    lines = []
+    for row, each in enumerate(animations):
+        head = "animations" if row == 0 else ""
+        start, end = map(number_text, each["range"])
+        mark = "*" if each["plays"] else " "
+        name = printable(each["name"]) or "(no name)"
+        lines.append(f"  {head:10} {each['number']:{width}}{mark} {name}: {start} to {end} s")
+    return lines
 
 
 def clip_lines(clip: dict[str, Any]) -> list[str]:

@@ -35,6 +35,9 @@ class MotionSettings:
         Whether a BVH drives a figure opened with it, instead of being shown beside it.
     images : Path or None
         Folder of the image folders of a capture's cameras; None for ``images`` beside it.
+    animation : str
+        The animation that figures play, by name or by number from 1; ``"none"`` for their rest
+        pose, empty for the first.
     """
 
     model: Path | None = None
@@ -46,3 +49,4 @@ class MotionSettings:
     legacy_expression: bool = False
     drives: bool = True
     images: Path | None = None
+    animation: str = ""

@@ -77,6 +77,10 @@ class Actor:
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
         Whether its clip covers the current time.
+    animation : int
+        Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none.
+    origin : Path or None
+        File of its figure; figures of one file play their animations together.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
     """
@@ -93,6 +97,8 @@ class Actor:
     points: Floats | None = None
     is_present: bool = True
     called: str = ""
+    animation: int = -1
+    origin: Path | None = None
 
     @property
     def title(self) -> str:

@@ -34,6 +34,7 @@ class Look:
     visible: bool
     color: tuple[float, float, float] | None
     placement: bytes
+    animation: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ def restored_pose(key: PoseKey | None) -> Pose | None:
 def look_of(actor: Actor) -> Look:
     """Return an actor's motion and display settings."""
     placement = actor.placement.tobytes()
-    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement)
+    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement, actor.animation)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
@@ -91,6 +92,7 @@ def _looks(actor: Actor, look: Look) -> bool:
         and actor.visible == look.visible
         and actor.offset == look.offset
         and actor.color == look.color
+        and actor.animation == look.animation
         and actor.placement.tobytes() == look.placement
     )
 
@@ -130,7 +132,7 @@ def restore_motion(snapshot: Snapshot, scene: Scene) -> None:
     scene.actors[:] = snapshot.actors
     for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
         actor.pose = restored_pose(pose)
-        actor.clip, actor.offset = look.clip, look.offset
+        actor.clip, actor.offset, actor.animation = look.clip, look.offset, look.animation
 
 
 def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:
