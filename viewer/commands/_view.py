@@ -30,7 +30,7 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
 _SWITCHES = (
-    ("no-shadows", "leave out shadows"),
+    ("no-shadows", "omit shadows"),
     ("flat", "use one normal per triangle"),
     ("wireframe", "draw triangle edges"),
     ("normals", "draw vertex normals"),
@@ -38,7 +38,7 @@ _SWITCHES = (
     ("no-grid", "omit the ground grid"),
     ("keypoints", "draw a model's keypoints"),
     ("reduced", "draw the coarser mesh, if there is one"),
-    ("xray", "draw bones visible through the skin"),
+    ("xray", "draw bones that are visible through the skin"),
     ("joint-names", "label joints, where labels do not overlap"),
     ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
     ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
@@ -54,7 +54,7 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", *FRONTS),
         default="auto",
         metavar="AXIS",
-        help="the axis that the figures face, as in --front=-z, from which the first view looks "
+        help="the axis that the figures face, as in --front=-z; the initial view looks from there "
         "(default: auto, estimated from the figures)",
     )
     group.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
@@ -62,13 +62,20 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         "--distance",
         type=number,
         metavar="D",
-        help="from the target, in scene units (default: frames the scene)",
+        help="distance from the target, in scene units (default: the whole scene is visible)",
     )
     group.add_argument("--orthographic", action="store_true", help="parallel projection")
     group.add_argument(
         "--view",
         metavar="NAME|N",
         help="look through a calibrated camera of a capture, by name or number from 1",
+    )
+    group.add_argument(
+        "--image-brightness",
+        type=number,
+        default=0.6,
+        metavar="0..1",
+        help="with --view, of the camera's image behind the scene; 0 hides it (default: 0.6)",
     )
 
 
@@ -94,7 +101,7 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
-        help="gradient, white, environment (the studio, out of focus), transparent or a colour "
+        help="gradient, white, environment (the studio, out of focus), transparent, or a colour "
         "(default: gradient)",
     )
     group.add_argument(
@@ -133,7 +140,7 @@ def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
             type=number,
             default=default,
             metavar="0..1",
-            help=f"with --shading pbr, of materials that do not state it (default: {default:g})",
+            help=f"for materials that do not specify it, with --shading pbr (default: {default:g})",
         )
     group.add_argument(
         "--matcap",
@@ -211,9 +218,10 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
-    for name in ("metallic", "roughness"):
-        if not 0.0 <= getattr(arguments, name) <= 1.0:
-            raise ViewerError(f"--{name}: expected 0 to 1, found {getattr(arguments, name):g}")
+    for name in ("metallic", "roughness", "image-brightness"):
+        value = getattr(arguments, name.replace("-", "_"))
+        if not 0.0 <= value <= 1.0:
+            raise ViewerError(f"--{name}: expected 0 to 1, found {value:g}")
     options = DisplayOptions(
         show=arguments.show,
         shading=arguments.shading,
@@ -237,6 +245,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         joint_names=arguments.joint_names,
         joint_axes=arguments.joint_axes,
         cameras=arguments.cameras,
+        image_brightness=arguments.image_brightness,
     )
     set_scalar(arguments, options)
     return options

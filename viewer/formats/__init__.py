@@ -294,7 +294,7 @@ def read(source: Source) -> Content:
     return import_module(f"{__name__}.{detect(source)}").read(source)
 
 
-def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
     """Write a clip, a pose, or the part of a figure that the format of the suffix holds.
 
     An existing file is replaced.
@@ -306,10 +306,15 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     path : str or Path
         Its suffix determines the format.
 
+    Returns
+    -------
+    list of Diagnostic
+        Notes about data of this part that the format cannot hold, or holds in another form.
+
     Raises
     ------
     UnsupportedFormatError
-        If no format has this suffix, or it cannot hold the content.
+        If no format has this suffix, or it cannot store the content.
     OutputError
         If the file cannot be written.
     """
@@ -317,8 +322,8 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     writers = {key: kind for key, kind in FORMATS.items() if kind.writes}
     for key, kind in writers.items():
         if suffix in kind.suffixes:
-            import_module(f"{__name__}.{key}").write(content, path)
-            return
+            notes: list[Diagnostic] = import_module(f"{__name__}.{key}").write(content, path)
+            return notes
     known = list(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
     values = {"suffix": suffix, "known": known}
     raise UnsupportedFormatError(Diagnostic("F002.no-writer", values=values))

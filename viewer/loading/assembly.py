@@ -31,7 +31,7 @@ _GAP = 0.25  # between actors side by side, in widths of the wider one
 
 
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
-    """Make actors of figures and motions, and read captures completely; see ``load``."""
+    """Create actors from figures and motions, and read captures completely; see ``load``."""
     scene, builders = begin(contents, settings)
     notes: list[Diagnostic] = []
     for builder in builders:
@@ -47,7 +47,7 @@ def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scen
 def begin(
     contents: Contents, settings: MotionSettings | None = None
 ) -> tuple[Scene, list[Builder]]:
-    """Make a scene that can be shown, and return the captures that are still to be read.
+    """Create a scene that can be shown, and return the captures that are still to be read.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
 
 
 def _give_morphs(contents: Contents, cast: Cast) -> None:
-    """Give blend shape targets to the first mesh with their vertex count, all to the same one."""
+    """Give all blend shape targets to the first mesh with their vertex count."""
     actors = cast.actors
     from viewer.rig.morph_target import on_one_joint, with_morphs
 
@@ -225,7 +225,7 @@ def _stand_up(cast: Cast, world_up: str) -> None:
 
 
 def _place_side_by_side(cast: Cast) -> None:
-    """Move actors without a position from their files to the right of those before them."""
+    """Move each actor whose file gives no position to the right of the previous actors."""
     loose = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if not placed]
     placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
     if len(cast.actors) < 2 or not loose:

@@ -24,7 +24,7 @@ class Cast:
     Attributes
     ----------
     actors : list of Actor
-        Those of opened figures first.
+        Actors of opened figures come first.
     ups : list of "y" or "z"
         The up axis of each actor.
     placed : list of bool
@@ -34,7 +34,7 @@ class Cast:
     views : list of CameraView
         Calibrated cameras, in scene space.
     images : CameraImages or None
-        Their images: those of the first capture that has some.
+        Images of the cameras: those of the first capture that has any.
     diagnostics : list of Diagnostic
         Messages from assembling the scene.
     """
@@ -48,7 +48,7 @@ class Cast:
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
-        """Record a message about a file, or about none; ``values`` are those of its wording."""
+        """Record a message, with the values of its template, about a file if ``path`` is given."""
         self.diagnostics.append(Diagnostic(key, path, values=values))
 
     def free_title(self, title: str) -> str:

@@ -47,7 +47,7 @@ class Contents:
     Attributes
     ----------
     called : dict
-        Figure names by resolved file, where another file specifies one.
+        Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic
         Messages from the readers.
     files : tuple of Path
@@ -102,9 +102,9 @@ def read_files(
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
     known = {source.path.resolve() for source in sources}
-    for source in sources:  # grows during iteration: a .rig names files
+    for source in sources:  # grows during iteration: a .rig refers to files
         for path in read_source(source, contents, settings or MotionSettings()):
-            if path.resolve() not in known:  # a .rig may name another, or itself
+            if path.resolve() not in known:  # a .rig may refer to another, or to itself
                 known.add(path.resolve())
                 called = contents.called.get(source.path.resolve(), source.path.stem)
                 contents.called[path.resolve()] = called
@@ -118,7 +118,7 @@ def read_files(
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read one file and add its contents, without its warnings; see the formats for errors.
+    """Read one file and add its contents, except its warnings; see the formats for errors.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def read_source(source: Source, contents: Contents, settings: MotionSettings) ->
     Returns
     -------
     tuple of Path
-        Further files that it names.
+        Other files that it refers to.
     """
     if _is_picture(source):
         contents.pictures.append((source.path, read_picture(source)))
@@ -149,11 +149,11 @@ _LISTS = {
     "MorphTarget": "morphs",
     "Figure": "figures",
 }
-"""The field for each class, by name: only readers that create a class import its module."""
+"""Field for each class name: only readers that create a class import its module."""
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read a file and add its contents by type; return files that it names."""
+    """Read a file and add its contents by type; return the files that it refers to."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind == "NamedFiles":

@@ -47,16 +47,16 @@ class Figure:
     mesh : Mesh or None
         In bind pose.
     skeleton : Skeleton or None
-        Without one the mesh stays in the bind pose.
+        Without a skeleton, the mesh stays in the bind pose.
     skin : Skin or None
-        Without one the mesh does not follow the skeleton.
+        Without a skin, the mesh does not follow the skeleton.
     up : "y" or "z"
         Up axis of the file, which the camera follows.
     unit : str
-        Unit of length, a key of ``viewer.rig.units.METRES``, stated by the file or guessed;
-        empty if unknown.
+        Unit of length, a key of ``viewer.rig.units.METRES``, given by the file or estimated; empty
+        if unknown.
     blend_shapes : BlendShapes or None
-        Weighted offsets of the rest mesh; the joints follow.
+        Weighted offsets of the rest mesh, which the joints follow.
     correctives : Correctives or None
         Offsets that depend on the pose.
     joint_regressor : JointRegressor or None
@@ -66,7 +66,7 @@ class Figure:
     pose_layout : PoseLayout or None
         Order of the values in the model's own pose vectors; None if those are the DOFs.
     body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
-        Further annotations of the mesh.
+        Other annotations of the mesh.
     symmetry : (V,) int32 or None
         Mirror counterpart of each vertex.
     points : PointLayout or None
@@ -213,7 +213,7 @@ def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        With or without boxes.
+        Skeleton with or without boxes.
     pose : Pose
         DOFs in lengths and radians.
 

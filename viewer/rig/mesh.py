@@ -18,6 +18,7 @@ __all__ = [
     "triangle_areas",
     "vertex_normals",
     "volume",
+    "without_seams",
 ]
 
 _ROW = 64  # points per row of a reduction, see bounding_box
@@ -32,18 +33,18 @@ class Mesh:
     positions, normals : (V, 3)
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, never relied upon.
+        Vertex indices; counter-clockwise from outside in most files, which is not relied upon.
     uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None
-        Indices into ``uvs`` where they differ from ``triangles``: along a seam one vertex has
-        several texture coordinates. None if every vertex has one, and U = V.
+        Indices into ``uvs`` if they differ from ``triangles``: along a seam, one vertex has several
+        texture coordinates. None if every vertex has exactly one; then U = V.
     materials : tuple of Material
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
     second_uvs : (U, 2) or None
-        A second texture coordinate for each row of ``uvs``, for textures that name this set.
+        A second texture coordinate for each row of ``uvs``, for textures that refer to this set.
     colors : (V, 4) or None
         Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
     parts : tuple of P str
@@ -143,7 +144,7 @@ def bounding_box(points: Floats) -> Floats:
     Parameters
     ----------
     points : (N, 3)
-        Any points; an empty array gives a box of size 0 at the origin.
+        Points; an empty array gives a box of size 0 at the origin.
 
     Returns
     -------
@@ -166,7 +167,7 @@ def bounding_box(points: Floats) -> Floats:
 
 
 def box_size(box: Floats) -> float:
-    """Return the length of a box's diagonal, the "size" that tolerances refer to.
+    """Return the length of a box's diagonal, the "size" to which tolerances refer.
 
     >>> box_size(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.0]]))
     3.0
@@ -246,6 +247,34 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     return sources, uv_indices, inverse.reshape(-1, 3).astype(np.int32)
 
 
+def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
+    """Return a mesh with one texture coordinate per vertex, for formats without others.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        V vertices.
+
+    Returns
+    -------
+    mesh : Mesh
+        R vertices, split along texture seams.
+    sources : (R,) int32
+        Vertex that each of them is a copy of.
+    """
+    sources, uv_indices, triangles = split_seams(mesh)
+    second = mesh.second_uvs
+    return Mesh(
+        positions=mesh.positions[sources],
+        normals=mesh.normals[sources],
+        triangles=triangles,
+        uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
+        materials=mesh.materials,
+        triangle_materials=mesh.triangle_materials,
+        second_uvs=None if second is None else second[uv_indices],
+    ), sources
+
+
 def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     """Return unit normals averaged over each vertex's triangles, weighted by area.
 
@@ -259,7 +288,7 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     Returns
     -------
     (V, 3)
-        Unit normals; +y for a vertex without triangles or with degenerate ones only.
+        Unit normals; +y for a vertex that has no triangles or only degenerate ones.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()

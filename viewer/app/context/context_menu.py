@@ -63,9 +63,9 @@ def answer_right_click(
     Parameters
     ----------
     state : AppState
-        The state, with the position of the click.
+        State with the position of the click.
     renderer : Renderer
-        The renderer that drew the scene.
+        Renderer that drew the scene.
     size : (int, int)
         Width and height of the view, pixels.
     scale : float

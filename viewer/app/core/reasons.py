@@ -1,4 +1,4 @@
-"""Reasons why controls are disabled, for their tooltips; empty where they are enabled."""
+"""Reasons why controls are disabled, for their tooltips; empty if they are enabled."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def nothing_to_export(state: AppState) -> str:
 
 
 def no_job_room(state: AppState) -> str:
-    """Return why no other job can be started."""
+    """Return why no job can be started."""
     return "" if state.job is None else f"wait for: {state.job.title}"
 
 

@@ -56,7 +56,7 @@ class Snapshot:
     time : float
         Time of the scene's clock, seconds.
     kept : object or None
-        A feature's value that is undone with the scene; compared by identity.
+        Value of a feature that undo restores with the scene; compared by identity.
     """
 
     actors: tuple[Actor, ...]
@@ -85,7 +85,7 @@ def look_of(actor: Actor) -> Look:
 
 
 def _looks(actor: Actor, look: Look) -> bool:
-    """Return whether ``look_of`` would return the same, without creating an object per frame."""
+    """Return whether ``look_of`` would return an equal look, without creating objects."""
     # Clips are compared by identity: they are replaced and never mutated.
     return (
         actor.clip is look.clip

@@ -196,7 +196,7 @@ def vertex_at(
     Parameters
     ----------
     state : AppState
-        Holds the scene.
+        State with the scene.
     renderer : Renderer
         Renderer that has drawn it.
     size : (int, int)

@@ -82,7 +82,7 @@ class PosedMesh:
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
-        self._is_affine = False
+        self._is_affine = self._is_mirrored = False
         self.n_updates = 0
 
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
@@ -100,7 +100,7 @@ class PosedMesh:
         key = (*skinning_options_key(how), pose.skinning_key) if attached and pose else ("binding",)
         if key == self._key:
             return
-        self.center = self.mesh.center
+        self.center, self._is_mirrored = self.mesh.center, False
         if attached and pose is not None:
             self.upload(pose, how)
         self._run(self.mesh.skin(how), how, bool(attached))
@@ -145,6 +145,9 @@ class PosedMesh:
         assert skeleton is not None and skin is not None  # checked by the caller
         palette = posed_skeleton(skeleton, pose).palette(skin).copy()
         self._is_affine = not is_rigid(palette)
+        if self._is_affine:
+            signs = np.sign(np.linalg.det(palette[:, :3, :3]))
+            self._is_mirrored = bool(buffers.joint_fractions @ signs < 0.0)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
         if buffers.joint_fractions.any():
             self.center = buffers.joint_fractions @ palette[:, :3, 3]
@@ -166,6 +169,13 @@ class PosedMesh:
         return self._arrays.get(
             program, lambda: self._rest.attributes(program, skin, attached), key=key
         )
+
+    def is_mirrored_by(self, placement: Floats) -> bool:
+        """Return whether a placement, (4, 4), or most of the skinning reflects the mesh.
+
+        Its triangles are then clockwise seen from their front.
+        """
+        return self._is_mirrored != bool(np.linalg.det(placement[:3, :3]) < 0.0)
 
     def read(self) -> tuple[Floats, Floats]:
         """Return the current posed positions in figure space and normals, (V, 3) each.
