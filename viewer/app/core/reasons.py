@@ -23,7 +23,11 @@ __all__ = [
 
 def no_motion(state: AppState) -> str:
     """Return why the time cannot be changed."""
-    return "" if state.clock.has_motion else "no motion: open a clip, a capture or a BVH"
+    if state.clock.has_motion:
+        return ""
+    if any(actor.figure.animations for actor in state.scene.actors):
+        return "no animation plays: choose one in the Timeline"
+    return "no motion: open a clip, a capture or a BVH"
 
 
 def no_panel(state: AppState, needs: str) -> str:
@@ -36,6 +40,8 @@ def no_panel(state: AppState, needs: str) -> str:
     needs : str
         Entry of the table of panels.
     """
+    if needs == "motion" and any(actor.figure.animations for actor in state.scene.actors):
+        return ""
     if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
         return no_motion(state)
     if needs in ("", "actors") or getattr(state.actor.figure, needs) not in (None, ()):
