@@ -23,7 +23,7 @@ Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-_ANY_END = (b"ply\n", b"ply\r")  # binary data follows, which may end with any byte
+_ANY_END = (b"ply\n", b"ply\r", b"glTF")  # binary data follows, which may end with any byte
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (

@@ -34,6 +34,7 @@ class Look:
     visible: bool
     color: tuple[float, float, float] | None
     placement: bytes
+    hidden_parts: frozenset[int]
     animation: int
 
 
@@ -81,7 +82,9 @@ def restored_pose(key: PoseKey | None) -> Pose | None:
 def look_of(actor: Actor) -> Look:
     """Return an actor's motion and display settings."""
     placement = actor.placement.tobytes()
-    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement, actor.animation)
+    hidden, number = actor.hidden_parts, actor.animation
+    look = actor.clip, actor.offset, actor.visible, actor.color, placement, hidden, number
+    return Look(*look)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
@@ -92,6 +95,7 @@ def _looks(actor: Actor, look: Look) -> bool:
         and actor.visible == look.visible
         and actor.offset == look.offset
         and actor.color == look.color
+        and actor.hidden_parts == look.hidden_parts
         and actor.animation == look.animation
         and actor.placement.tobytes() == look.placement
     )
@@ -139,6 +143,7 @@ def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:
     """Restore the display settings and placements of a snapshot's actors and scene."""
     for actor, look in zip(snapshot.actors, snapshot.looks, strict=True):
         actor.visible, actor.color = look.visible, look.color
+        actor.hidden_parts = look.hidden_parts
         actor.placement = np.frombuffer(look.placement).reshape(4, 4).copy()
     kept = copy.deepcopy(snapshot.options)
     for name in DisplayOptions.__slots__:

@@ -47,8 +47,8 @@ class NodeTree:
         Index of each node's mesh, skin and camera, -1 for none.
     shape_weights : dict of (S,)
         Morph target weights of the nodes that override those of their mesh.
-    extras : dict
-        Application data by node, as parsed from JSON.
+    extras, extensions : dict
+        Application data and extensions by node, as parsed from JSON.
     """
 
     names: tuple[str, ...]
@@ -62,6 +62,7 @@ class NodeTree:
     matrices: Mapping[int, Floats] = field(default_factory=dict)
     shape_weights: Mapping[int, Floats] = field(default_factory=dict)
     extras: Mapping[int, Any] = field(default_factory=dict)
+    extensions: Mapping[int, Any] = field(default_factory=dict)
 
     @property
     def n_nodes(self) -> int:
