@@ -15,6 +15,7 @@ pytestmark = pytest.mark.slow
 
 _QUICK = ("--quality", "draft", "--force")
 
+
 @pytest.fixture
 def recording(tmp_path):
     return write_filmed(tmp_path / "take")
