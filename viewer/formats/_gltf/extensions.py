@@ -11,6 +11,8 @@ __all__ = ["GEOMETRY", "KNOWN", "check_extensions"]
 GEOMETRY = (
     "KHR_animation_pointer",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "EXT_meshopt_compression",
 )
 """Extensions of geometry and animation."""
 
