@@ -17,6 +17,7 @@ from viewer.diagnostics.wording import (
     comparison,
     easymocap,
     export,
+    fbx,
     gltf,
     joints,
     kinds,
@@ -24,6 +25,7 @@ from viewer.diagnostics.wording import (
     meshes,
     morph,
     motion,
+    nodes,
     obj,
     pictures,
     ply,
@@ -37,7 +39,7 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )

@@ -94,7 +94,7 @@ class MeshPass:
         if look is not None:
             set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        indices = mesh.index_set(options)
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
         draw_runs(array, indices, options, blended=blended, is_mirrored=is_mirrored)
@@ -112,7 +112,7 @@ class MeshPass:
         materials = uses_materials(mesh, options)
         program = self.programs.drawing("mesh", fragment=fragment, materials=materials)
         set_model(program, view, placement, mesh.center)
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        indices = mesh.index_set(options)
         array, is_mirrored = self.array(mesh, program, indices), mesh.is_mirrored_by(placement)
         draw_shapes(array, indices, options, fragment, prepare, is_mirrored=is_mirrored)
 
@@ -147,8 +147,10 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_EDGE_COLOR, opacity)
         self.context.wireframe = True
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
-        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
+        indices = mesh.index_set(options, as_listed=True)
+        array = self.array(mesh, program, indices)
+        for first, count in indices.spans:
+            array.render(moderngl.TRIANGLES, vertices=count, first=first)
         self.context.wireframe = False
 
     def draw_normals(
@@ -159,7 +161,11 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)
         program["u_length"] = _NORMAL_LENGTH * size
-        content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
+        shown = mesh.mesh.lines_shown(mesh.hidden_parts)
+        content = [
+            (mesh.posed, "3f4 3f4/i", "in_position", "in_normal"),
+            (shown, "f4/i", "in_shown"),
+        ]
         array = self._arrays_of(mesh).get(program, lambda: content)
         array.render(moderngl.LINES, vertices=2, instances=mesh.mesh.n_vertices)
 
@@ -182,7 +188,8 @@ class MeshPass:
                     found.append((values, layout, name))
             return found
 
-        return self._arrays_of(mesh).get(program, content, indices.indices, (id(indices),))
+        buffer = indices.indices
+        return self._arrays_of(mesh).get(program, content, buffer, (id(buffer),))
 
     def _arrays_of(self, mesh: PosedMesh) -> VertexArrays:
         return self._arrays.get(mesh, lambda: VertexArrays(self.context))
