@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.meshopt_attributes import decoded_attributes
-from viewer.formats._gltf.meshopt_filters import FILTERS, filtered
-from viewer.formats._gltf.meshopt_indices import decoded_indices, decoded_triangles
+from viewer.formats._meshopt.attributes import decoded_attributes
+from viewer.formats._meshopt.filters import FILTERS, filtered
+from viewer.formats._meshopt.indices import decoded_indices, decoded_triangles
 from viewer.rig.arrays import Bytes
 
 __all__ = ["decoded_view", "meshopt_of"]
