@@ -17,6 +17,7 @@ from viewer.diagnostics.wording import (
     comparison,
     easymocap,
     export,
+    fbx,
     gltf,
     joints,
     kinds,
@@ -38,7 +39,7 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, nodes),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
