@@ -45,7 +45,7 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.number_text import angle_text, number_text
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints, shown_parents
 
 __all__ = ["draw", "rows"]
 
@@ -205,7 +205,9 @@ def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool
     listed: list[tuple[int, int, int]] = []
     depths, visible = [0] * skeleton.n_joints, [True] * skeleton.n_joints
     labels = _labels(skeleton)
-    for joint, parent in enumerate(skeleton.parents.tolist()):
+    parents = shown_parents(skeleton).tolist()
+    for joint in shown_joints(skeleton).tolist():
+        parent = parents[joint]
         if wanted:
             visible[joint] = wanted.lower() in labels[joint].lower()
         elif parent >= 0:
