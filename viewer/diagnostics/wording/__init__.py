@@ -17,7 +17,9 @@ from viewer.diagnostics.wording import (
     comparison,
     easymocap,
     export,
+    fbx,
     gltf,
+    gltf_materials,
     joints,
     kinds,
     loading,
@@ -38,8 +40,8 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, nodes),
-    *(archives, body_models, easymocap, poses, pictures),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
+    *(gltf_materials, archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
 _CODED = (
