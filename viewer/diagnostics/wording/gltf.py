@@ -8,9 +8,16 @@ CODES = {
     "G003": Code("warning", "inconsistent glTF nodes", "correct the nodes or export again"),
     "G004": Code("warning", "inconsistent glTF skin", "bind the mesh again or export again"),
     "G005": Code("warning", "invalid glTF animation", "export the animation again"),
+    "G006": Code("warning", "invalid VRM data", "export the character again"),
 }
 
 MESSAGES = {
+    # VRM
+    "G006.bone": "unknown human bone {bone:quoted}: ignored",
+    "G006.bone-node": "human bone {bone:quoted}: expected the index of a node, found {found}: "
+    "ignored",
+    "G006.bind": "expected a morph target and its weight, found target {found}: ignored",
+    "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
     "F002.gltf-version": "expected glTF 2.0, found version {found}",

@@ -13,7 +13,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
-from viewer.rig.retargeting.joint_names import canonical_names
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 
 __all__ = ["frame_rate", "guess_unit", "guess_up"]
@@ -112,7 +112,7 @@ def guess_up(
     """
     skeleton = figure.skeleton
     assert skeleton is not None  # created by the reader
-    names = canonical_names(skeleton.names, skeleton.parents)
+    names = joint_meanings(skeleton)
     upper, lower = (
         [names.index(name) for name in part if name in names] for part in (_UPPER, _LOWER)
     )

@@ -20,6 +20,7 @@ __all__ = [
     "NodeAnimation",
     "NodeCamera",
     "NodeChannel",
+    "NodeExpression",
     "NodeFile",
     "NodeMesh",
     "NodeSkin",
@@ -230,6 +231,31 @@ class NodeCamera:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class NodeExpression:
+    """A facial expression: a weighted sum of morph targets; see ``viewer.rig.expressions``.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    binds : tuple of (int, int, float)
+        Node, morph target of its mesh, and the weight of that target at weight 1.
+    is_binary : bool
+        Whether it is either fully on or off.
+    kind : str
+        Key of ``PROCEDURAL``; empty for others.
+    overrides : dict of str
+        Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
+    """
+
+    name: str
+    binds: tuple[tuple[int, int, float], ...]
+    is_binary: bool = False
+    kind: str = ""
+    overrides: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class NodeFile:
     """Everything in a file of nodes.
 
@@ -253,6 +279,12 @@ class NodeFile:
         Application data of the root, as parsed from JSON; None without.
     asset : dict
         Generator, copyright and the like.
+    humanoid : dict of int
+        Node of each human bone, by its name in VRM 1.0; empty if the file states none.
+    expressions : tuple of NodeExpression
+        Facial expressions.
+    facts : tuple of (str, str)
+        Further properties for ``viewer info``, each a heading and a text.
     """
 
     name: str
@@ -268,3 +300,6 @@ class NodeFile:
     extensions: Mapping[str, Any] = field(default_factory=dict)
     extras: Any = None
     asset: Mapping[str, Any] = field(default_factory=dict)
+    humanoid: Mapping[str, int] = field(default_factory=dict)
+    expressions: tuple[NodeExpression, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()

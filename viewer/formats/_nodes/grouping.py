@@ -78,7 +78,8 @@ class _Grouping:
         self.parents: list[int] = file.tree.parents.tolist()
         self.roots = _roots(file.tree)
         self.is_identity = _identities(file.tree)
-        self.moved = set().union(*(animation.nodes for animation in file.animations))
+        self.moved = set(file.humanoid.values())
+        self.moved.update(*(animation.nodes for animation in file.animations))
         self.drawn = _drawn_meshes(file)
         self.order = self._order()
         self.place = {node: place for place, node in enumerate(self.order)}
