@@ -275,6 +275,9 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
         materials=mesh.materials,
         triangle_materials=mesh.triangle_materials,
         second_uvs=None if second is None else second[uv_indices],
+        colors=None if mesh.colors is None else mesh.colors[sources],
+        parts=mesh.parts,
+        triangle_parts=mesh.triangle_parts,
     ), sources
 
 
