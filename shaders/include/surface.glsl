@@ -1,5 +1,5 @@
-// The surface of the material that is drawn: its colour, opacity and normal. Files without more
-// than an image per material are drawn without MATERIALS, which costs them nothing.
+// The surface of the material that is drawn: its colour, opacity and normal. Files with at most one
+// image per material are drawn without MATERIALS, at no extra cost.
 
 in vec2 v_uv;
 in vec3 v_color;                // linear
@@ -19,7 +19,7 @@ const int NORMAL_MAP = 3, OCCLUSION_MAP = 4, EMISSIVE_MAP = 5;
 in vec2 v_second_uv;
 
 uniform vec4 u_base_factor;     // linear
-uniform bool u_has_base_factor; // else untextured surfaces have v_color
+uniform bool u_has_base_factor; // otherwise untextured surfaces have v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
 uniform mat3 u_places[6];       // texture coordinates to those of each texture's image
@@ -51,7 +51,7 @@ float surface_alpha() {
     return 1.0;
 }
 
-// A normal perturbed by the normal map. The tangents are those of the screen's derivatives
+// A normal perturbed by the normal map. Tangents are computed from screen-space derivatives
 // (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
 vec3 mapped_normal(vec3 position, vec3 normal) {
     if (u_normal_scale == 0.0)

@@ -22,7 +22,7 @@ uniform vec3 u_emissive;        // linear
 
 const float PI = 3.14159265358979;
 const float LIGHTS = 0.30;      // strength of the two lights relative to the studio's
-const float BOX = 0.5;          // share of the studio's light on a surface that faces its key light
+const float BOX = 0.5;          // fraction of the studio's light on a surface facing its key light
 const float SMOOTHEST = 0.045;  // lowest roughness with visible highlights of point lights
 
 struct Surface {

@@ -13,7 +13,7 @@ from viewer.rig.scene import Scene
 __all__ = ["limit_passes", "seconds_per_pass"]
 
 _PATIENCE = 2.0  # seconds for a still image
-_FEWEST = 3  # passes; fewer look no better than normal quality
+_FEWEST = 3  # minimum number of passes; fewer look no better than normal quality
 _BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9  # of the sum of passes, and occlusion at half resolution
 _PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # seconds on two cores, measured
 
@@ -30,7 +30,7 @@ def seconds_per_pass(size: tuple[int, int], n_triangles: int) -> float:
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower a quality that would take over two seconds in software, or over 1 GB of memory.
+    """Lower a quality that would take more than two seconds in software, or 1 GB of memory.
 
     The time is estimated, not measured, so that the image does not depend on the machine's load.
 
@@ -43,7 +43,7 @@ def limit_passes(
     size : (int, int)
         Width and height in pixels.
     context : moderngl.Context
-        Tells whether rendering is done in software.
+        Context, which tells whether rendering is done in software.
 
     Returns
     -------

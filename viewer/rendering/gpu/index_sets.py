@@ -1,8 +1,8 @@
 """Index buffers of the drawn triangles, in an order that keeps neighbours together.
 
-GPUs cache the results of recent vertices, at most a few hundred. Files often list triangles
-in an order that misses this cache, so that every vertex is shaded three to five times; in the
-order of a space-filling curve it is shaded once or twice (``tests/bench/bench_instances.py``).
+GPUs cache the results of recent vertices, at most a few hundred. Files often list triangles in an
+order that does not benefit from this cache, so that every vertex is shaded three to five times; in
+the order of a space-filling curve, it is shaded once or twice (``tests/bench/bench_instances.py``).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class IndexSet:
 
     @property
     def n_indices(self) -> int:
-        """Number of indices of all runs together."""
+        """Total number of indices of all runs."""
         return 3 * len(self.order)
 
 
@@ -76,7 +76,7 @@ def index_set(
     surfaces : list of Surface
         Surface of each material.
     positions : (R, 3), optional
-        Rest positions of the split vertices; without them triangles keep their order.
+        Rest positions of the split vertices; if omitted, triangles keep their order.
     """
     edges = np.flatnonzero(np.diff(materials)) + 1
     runs = []

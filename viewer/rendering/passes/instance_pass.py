@@ -23,9 +23,9 @@ FEWEST = 8
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
-    Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
-    translucent actors, and meshes that are drawn several times per frame, in the bind pose or
-    coloured by a scalar.
+    Posed buffers are used instead for small groups, so that camera moves need no skinning, for
+    translucent actors, and for meshes that are drawn several times per frame, in the bind pose or
+    coloured by a scalar quantity.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def draw_instances(
     instances : InstanceBuffers
         Updated buffers.
     actors : sequence of Actor
-        The actors that the buffers were updated with, in that order.
+        The actors with which the buffers were updated, in that order.
     view : View
         The camera's matrices.
     options : DisplayOptions
