@@ -19,7 +19,7 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
     source : Source
         File that references the image.
     name : str
-        Name of the image, which must lie below that file's folder, see ``referenced_path``.
+        Name of the image, which must be below that file's folder; see ``referenced_path``.
     offset : int
         Offset of the name in the file.
 
@@ -46,6 +46,6 @@ def read_picture(source: Source) -> Bytes:
     Raises
     ------
     FormatError
-        If it is not a readable image.
+        If the file is not a readable image.
     """
     return decode_picture(source.path, source.data)

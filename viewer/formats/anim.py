@@ -60,7 +60,7 @@ def read(source: Source) -> Clip:
     Returns
     -------
     Clip
-        Channel i moves DOF i.
+        Clip whose channel i moves DOF i.
 
     Raises
     ------
@@ -138,7 +138,7 @@ class _Parser:
         self.channel = index
         self.starts.append(self.word.start() if self.word else 0)
         self._advance()
-        # Some files label channels with numbers; only their order matters.
+        # Some files label channels with numbers, but only the order matters.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
             self._advance()
         self._expect(b"{")
@@ -199,7 +199,7 @@ class _Parser:
             time, value = self._number("time", of_key=True), self._number("value", of_key=True)
             row = time, value, self._tangent(), self._tangent(), start
             if math.isnan(time + value):
-                lost += 1  # already recorded; the curve passes through the other keys
+                lost += 1  # already recorded; the curve is defined by the other keys
             else:
                 rows.append(row)
         self.key = None
@@ -221,7 +221,7 @@ class _Parser:
         return Phrase("anim-key", channel=self.channel, index=self.key)
 
     def _begins(self) -> Phrase | None:
-        """Return the location of the last channel if the file ends inside it, else None."""
+        """Return the location of the last channel if the file ends inside it, or None."""
         if self.word is not None:
             return None
         if self.channel is None:

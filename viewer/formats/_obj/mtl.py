@@ -4,7 +4,7 @@
 
     mtl   = line*
     line  = "newmtl" name | color r (g b)? | number x | map option* file | anything else
-    color = "Kd" | "Ke"                     linear; one number stands for three
+    color = "Kd" | "Ke"                     linear; one number is used for all three
     number = "Pr" | "Pm" | "d" | "Tr"       roughness, metallic, opacity, 1 - opacity
     map   = "map_Kd" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d" | "norm" | "map_Kn"
 
@@ -53,7 +53,7 @@ _NOT_DRAWN = (
 
 @dataclass(slots=True)
 class _Statements:
-    """What one ``newmtl`` states: values, and maps with their location in the library."""
+    """Statements of one ``newmtl``: values, and maps with their location in the library."""
 
     library: Source
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class _Statements:
 def read_libraries(
     source: Source, libraries: list[tuple[bytes, int]], names: list[str]
 ) -> tuple[Material, ...]:
-    """Return materials by name, with their images where these can be read.
+    """Return materials by name, with their images if these can be read.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def read_libraries(
 
 
 def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
-    """Return the libraries of one ``mtllib``: one whose name may contain spaces, or several."""
+    """Return the libraries of one ``mtllib``: a file whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     names = [whole]
     path = referenced_path(source.path.parent, whole)
@@ -116,7 +116,7 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
 
 
 def _read(library: Source, known: dict[str, _Statements]) -> None:
-    """Record the statements of each material; of several with one name, the first is used."""
+    """Record the statements of each material; of several with the same name, the first is used."""
     now: _Statements | None = None
     ignored: dict[str, int] = {}
     position = 0
@@ -209,14 +209,14 @@ def _base_color(
 
 
 def _emissive(color: tuple[float, ...] | None, has_texture: bool) -> tuple[float, float, float]:
-    """Return Ke; white for a map without it."""
+    """Return Ke; white if there is only a map."""
     if color is None or (has_texture and max(color) == 0.0):
         color = (1.0, 1.0, 1.0) if has_texture else (0.0, 0.0, 0.0)
     return color[0], color[1], color[2]
 
 
 def _opacity(numbers: dict[str, tuple[float, ...]]) -> float:
-    """Return d, or 1 - Tr without it."""
+    """Return d, or 1 - Tr if there is no d."""
     if "opacity" in numbers:
         return numbers["opacity"][0]
     # Some exporters write d as Tr: Tr 1 then means an opaque surface.
