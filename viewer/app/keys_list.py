@@ -8,6 +8,7 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 
 from viewer.app.core.ink import ink
+from viewer.app.core.key_names import KeyNames
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import overlay_rect
 from viewer.app.features import KEYS, MOUSE
@@ -32,7 +33,8 @@ def draw_keys(state: AppState) -> None:
     """Draw the list if it is open; the wheel scrolls it in a small window."""
     if not state.of(Keyboard).is_listed:
         return
-    lines = [*((state.key_label(key.label), key.text) for key in KEYS), *MOUSE]
+    changed = state.of(KeyNames).changed
+    lines = [*((changed.get(key.label, key.label), key.text) for key in KEYS), *MOUSE]
     style, viewport = imgui.get_style(), imgui.get_main_viewport()
     letter = imgui.get_font_size()
     first = max(imgui.calc_text_size(label).x for label, _ in lines) + _GAP * letter

@@ -76,7 +76,7 @@ def draw_menus(state: AppState) -> list[Path]:
             reset_layout(state)
         imgui.end_menu()
     if begin_menu(state, "Help"):
-        if menu_item(state, "Keys", "H", keyboard.is_listed):
+        if menu_item(state, "Keys", "H or ?", keyboard.is_listed):
             keyboard.is_listed = not keyboard.is_listed
         draw_manual_menu(state)
         imgui.end_menu()

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 
 from viewer.app.cancel import cancel
+from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, begin_overlay, button, overlay_rect
 from viewer.app.files.state import Files
@@ -48,8 +49,9 @@ def draw_hints(state: AppState) -> None:
     Like the image of the scene, they are drawn behind the panels, so they must be drawn after it.
     """
     x, y, width, height = state.view_rect
-    grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
-    text = f"{grid}H keys"
+    step = grid_step(state.box)
+    grid = f"grid {step:g} unit{'s' * (step != 1.0)}   " if state.options.grid else ""
+    text = f"{grid}{key_name(state, 'H or ?')} keys"
     size = imgui.calc_text_size(text)
     place = (x + width - size.x - 10, y + height - size.y - 8)
     draw_list = imgui.get_background_draw_list()

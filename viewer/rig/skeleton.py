@@ -49,6 +49,9 @@ class Skeleton:
         Smallest and largest value; -inf and inf if unlimited.
     boxes : (J, 2, 3) or None
         Lowest and highest corner of the box drawn for each joint, in joint space.
+    auxiliary : (J,) bool or None
+        Joints that the file does not have: a reader added them to express a transform or a second
+        binding exactly. They have no DOFs, and are not shown as joints. None if there are none.
     """
 
     names: tuple[str, ...]
@@ -61,6 +64,7 @@ class Skeleton:
     rest_dofs: Floats
     dof_limits: Floats
     boxes: Floats | None = None
+    auxiliary: Bools | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -76,6 +80,8 @@ class Skeleton:
         put("rest_dofs", (self.n_dofs,))
         if self.boxes is not None:
             put("boxes", (joints, 2, 3))
+        if self.auxiliary is not None:
+            put("auxiliary", (joints,), np.bool_)
         limits = np.array(self.dof_limits, dtype=np.float64)
         if limits.shape != (self.n_dofs, 2) or np.isnan(limits).any():
             raise RigError(f"dof_limits: expected shape {self.n_dofs} x 2 without NaN")

@@ -61,7 +61,7 @@ def test_missing_egl_device_names_the_remedies(tmp_path):
     check_refusal(
         *result,
         code=4,
-        message="EGL found 0 devices: start containers start it with "
+        message="EGL found 0 devices: start containers with "
         "NVIDIA_DRIVER_CAPABILITIES=all, or install Mesa for software rendering " + INSTALL,
     )
 

@@ -61,8 +61,6 @@ class AppState:
         Whether rotations are shown in degrees instead of radians.
     panels_visible : bool
         Whether panels and menus are drawn.
-    key_labels : dict
-        Keys changed by the user: maps default labels to current labels.
     view_rect : (x, y, width, height)
         The part of the window that panels leave free, in window coordinates.
     item_rects : dict
@@ -98,7 +96,6 @@ class AppState:
     selected_joint: int = -1
     in_degrees: bool = True
     panels_visible: bool = True
-    key_labels: dict[str, str] = field(default_factory=dict)
     view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     wants: set[str] = field(default_factory=set)
@@ -152,10 +149,6 @@ class AppState:
     def deselect(self) -> None:
         """Deselect the joint and the actor; the actor remains the chosen one."""
         self.selected_joint, self.is_actor_selected = -1, False
-
-    def key_label(self, usual: str) -> str:
-        """Return the current label of a key, given its default label."""
-        return self.key_labels.get(usual, usual)
 
     @property
     def aspect(self) -> float:

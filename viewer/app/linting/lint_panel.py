@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import search_field
 from viewer.app.core.widgets import button, choice, explain, note_item, same_line_if_room, slider
 from viewer.app.linting.actions import (
     choose_finding,
@@ -174,7 +175,7 @@ def _draw_filters(state: AppState, known: Checked) -> None:
         if changed:
             view.severities ^= {severity}
     imgui.set_next_item_width(-1.0)
-    view.text = imgui.input_text_with_hint("##lint filter", "Filter findings", view.text)[1]
+    view.text = search_field("##lint filter", view.text, "Filter findings")
     note_item(state, "Filter findings")
 
 

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import note_item, plain_zero
+from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
 from viewer.app.posing.state import HeldVector, Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -43,6 +43,7 @@ def draw_vector_component(
     text = "%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad"
     reach = math.pi * factor
     changed, moved = slider_float(
+        state,
         f"##vector{joint}.{axis}",
         plain_zero(float(vector[axis]) * factor, text),
         -reach,
@@ -52,7 +53,7 @@ def draw_vector_component(
     note_item(state, f"{label}.r{'xyz'[axis]}")
     is_reset = False
     if imgui.is_item_hovered():
-        imgui.set_tooltip(
+        show_tooltip(
             f"{label}: component of the rotation vector\n"
             "Ctrl+click to type a value, double-click to set it to 0"
         )
@@ -91,6 +92,4 @@ def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) ->
     note_item(state, f"own {joint}")
     if imgui.is_item_hovered():
         start = int(layout.starts[joint])
-        imgui.set_tooltip(
-            f"numbers {start} to {start + 2} of the file's pose vector: {kind}, radians"
-        )
+        show_tooltip(f"numbers {start} to {start + 2} of the file's pose vector: {kind}, radians")

@@ -17,7 +17,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.view.display_actions import reset_lights
 from viewer.rendering.options import Color, Light
-from viewer.rendering.srgb import decode_color, encode_color
+from viewer.rig.srgb import decode_color, encode_color
 
 __all__ = ["draw"]
 
@@ -54,7 +54,7 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
         ("inclination", "Elevation", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
     ):
         shown = plain_zero(getattr(light, attribute), unit)
-        changed, value = slider_float(begin_field(text), shown, low, high, unit, _CLAMP)
+        changed, value = slider_float(state, begin_field(text), shown, low, high, unit, _CLAMP)
         note_item(state, f"{name} {text}")
         if changed:
             setattr(light, attribute, value)
