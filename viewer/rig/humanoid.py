@@ -10,7 +10,7 @@ __all__ = ["Humanoid"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Humanoid:
-    """Joints of a figure by the standard name of the human bone that they are.
+    """Joints of a figure by the standard names of human bones.
 
     Attributes
     ----------

@@ -66,7 +66,7 @@ def _defaults(file: NodeFile, node: int) -> Floats:
 def blend_shapes_of(
     file: NodeFile, columns: dict[int, Ints], pieces: list[Piece]
 ) -> BlendShapes | None:
-    """Return the blend shapes of a figure; offsets are put together when first used.
+    """Return the blend shapes of a figure; offsets are assembled on first use.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def blend_shapes_of(
         names=tuple(t.name if counts[t.name] == 1 else t.full_name for t in targets),
         offsets=Deferred(shape, np.float64, lambda: _offsets(columns, pieces, shape, False)),
         groups=("morph",) * len(targets),
-        # glTF keeps normals that a target does not move; flat ones follow the surface.
+        # In glTF, a target without normals keeps them; flat normals follow the surface.
         normal_offsets=Deferred(shape, np.float64, lambda: _offsets(columns, pieces, shape, True))
         if has_normals
         else None,

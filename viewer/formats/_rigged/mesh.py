@@ -28,7 +28,7 @@ __all__ = ["mesh_arrays", "read_mesh"]
 
 
 def mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    """Return the arrays that hold a mesh with its materials; normals are not stored."""
+    """Return the arrays of a mesh with its materials; normals are not stored."""
     arrays: dict[str, NDArray[Any] | None] = {
         "positions": mesh.positions,
         "triangles": mesh.triangles,
@@ -90,5 +90,5 @@ def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Par
 
 
 def _optional(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any] | None:
-    """Return an array, None if the archive does not have it."""
+    """Return an array; None if the archive does not have it."""
     return archive.array(key, shape).values() if archive.has(key) else None
