@@ -65,7 +65,7 @@ def read(source: Source) -> Clip:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     return _Parser(source).clip()
 
@@ -314,7 +314,7 @@ def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     Returns
     -------
     list of Diagnostic
-        Empty: the format holds all of a clip.
+        Empty: the format stores all of a clip.
 
     Raises
     ------

@@ -64,7 +64,7 @@ def read(source: Source) -> SkeletonMotion:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     hierarchy = read_hierarchy(source)
     table = _table(source, hierarchy.joints)

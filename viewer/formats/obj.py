@@ -53,7 +53,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     parts = read_parts(source)
     if len(parts.positions) == 0:

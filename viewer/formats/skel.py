@@ -71,7 +71,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     joints = _Parser(source).joints()
     if not joints:

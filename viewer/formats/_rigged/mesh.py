@@ -3,7 +3,7 @@
 ::
 
     positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
-    second_uvs (U, 2)   uvs_2 (U, 2) …                           further texture coordinates
+    second_uvs (U, 2)   uvs_2 (U, 2) …                           other texture coordinates
     colors (V, 4)   part_names (P,)   triangle_parts (T,)
     triangle_materials (T,)   and the materials, see ``materials.py``
 """
