@@ -45,7 +45,7 @@ HUMAN_BONES: dict[str, str] = _human_bones()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Humanoid:
-    """Joints by the standard name of the human bone that they are.
+    """Joints of a figure by the standard names of human bones.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""Contents of a file of nodes, as its reader returns them, before figures are made of them.
+"""Contents of a file of nodes as returned by its reader, before figures are created.
 
 Nothing is converted: names, transforms, weights and keys are those of the file, in its unit and
-axes. Indices are valid, numbers are finite, and the parents form a forest: readers see to it.
+axes. Readers guarantee that indices are valid, numbers are finite, and the parents form a forest.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class NodeTree:
     translations, rotations, scales : (N, 3), (N, 4), (N, 3)
         Local transform T R S; unit quaternions (x, y, z, w).
     matrices : dict of (4, 4)
-        Local matrices of the nodes that no T R S expresses, as they shear. Their rows in the
-        three arrays above are those of the identity.
+        Local matrices of nodes that shear and therefore cannot be expressed as T R S. Their rows in
+        the three arrays above are those of the identity.
     meshes, skins, cameras : (N,) int32
         Index of each node's mesh, skin and camera, -1 for none.
     shape_weights : dict of (S,)
@@ -73,7 +73,7 @@ class NodeTree:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
-    """Triangles with one material; the vertices are used by no other primitive.
+    """Triangles with one material; no other primitive uses the vertices.
 
     Attributes
     ----------
@@ -119,13 +119,13 @@ class NodeMesh:
     name : str
         As in the file.
     primitives : tuple of Primitive
-        In file order; empty if the file has points or lines only.
+        In file order; empty if the file has only points or lines.
     target_names : tuple of S str
         Names of the morph targets; empty strings without a name.
     shape_weights : (S,)
         Default weights of the morph targets.
     extras : Any
-        Application data, as parsed from JSON; None without.
+        Application data, as parsed from JSON; None if there is none.
     """
 
     name: str
@@ -148,7 +148,7 @@ class NodeSkin:
     inverse_bind : (M, 4, 4)
         Mesh-to-joint matrices at bind time; identities if the file has none.
     method : "lbs", "dqs" or "mix"
-        How the file wants its meshes to be deformed.
+        Skinning method requested by the file.
     """
 
     name: str
@@ -219,7 +219,7 @@ class NodeCamera:
     vertical_angle : float or None
         Vertical field of view in radians; None for an orthographic camera.
     aspect : float or None
-        Width divided by height, if the file says so.
+        Width divided by height, if the file specifies it.
     height : float
         Height of an orthographic camera's view, file units.
     """
@@ -276,7 +276,7 @@ class NodeFile:
     extensions : dict
         Parsed JSON of the root's extensions, such as ``VRMC_vrm``.
     extras : Any
-        Application data of the root, as parsed from JSON; None without.
+        Application data of the root, as parsed from JSON; None if there is none.
     asset : dict
         Generator, copyright and the like.
     humanoid : dict of int

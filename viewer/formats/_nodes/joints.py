@@ -1,4 +1,4 @@
-"""Joints made of nodes, with auxiliary joints where a node shears or has a second binding."""
+"""Joints made from nodes, with auxiliary joints for nodes that shear or have a second binding."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
 
 @dataclass(slots=True, eq=False)
 class Joints:
-    """The joints of a figure while its skeleton is made.
+    """The joints of a figure whose skeleton is under construction.
 
     Attributes
     ----------

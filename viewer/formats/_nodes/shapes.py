@@ -67,7 +67,7 @@ def _defaults(file: NodeFile, node: int) -> Floats:
 def blend_shapes_of(
     file: NodeFile, columns: dict[int, Ints], pieces: list[Piece]
 ) -> BlendShapes | None:
-    """Return the blend shapes of a figure; offsets are put together when first used.
+    """Return the blend shapes of a figure; offsets are assembled on first use.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def blend_shapes_of(
         names=(*names, *(each.name for each in mixed)),
         offsets=offsets(of_normals=False),
         groups=("morph",) * shape[0],
-        # glTF keeps normals that a target does not move; flat ones follow the surface.
+        # In glTF, a target without normals keeps them; flat normals follow the surface.
         normal_offsets=offsets(of_normals=True) if has_normals else None,
         rest_weights=np.array([*(target.weight for target in targets), *(0.0 for _ in mixed)]),
         rules=_rules(mixed, len(targets)) if mixed else None,
