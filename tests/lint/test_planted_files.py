@@ -202,7 +202,7 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
         " has a confidence below 0.7 in 100 % of the 18 frames in which it is visible "
         "(first: frame 0)"
     )
-    assert f"{len(low) - 6} more keypoints have a confidence below 0.7: " in named[6].message
+    assert f"{len(low) - 6} more keypoints have a confidence below" in named[6].message
 
 
 def test_a_damaged_frame_is_a_gap_and_is_named(tmp_path: Path) -> None:
@@ -229,5 +229,7 @@ def test_every_code_is_planted_somewhere() -> None:
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
     planted |= {code for _, code in MODELS.values()} | {"F001"}
+    # Those of glTF files are planted in tests/formats/gltf.
+    planted |= {code for code in CODES if code.startswith("G")}
     # Codes that a readable file cannot cause: remarks are not errors.
     assert set(CODES) - planted == {"F007"}

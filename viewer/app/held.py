@@ -31,7 +31,7 @@ def _is_widget_held() -> bool:
 
 
 def stops_time(state: AppState) -> bool:
-    """Return whether time must stand still: a handle is held but has not been dragged yet.
+    """Return whether time must stop: a handle is held but has not been dragged yet.
 
     A click must not pause playback, and a drag must start from an unchanged pose.
     """

@@ -1,4 +1,4 @@
-"""List of keys over the window, in columns or with a scroll bar if the window is small."""
+"""List of keys over the window, in columns, or with a scroll bar if the window is small."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def draw_keys(state: AppState) -> None:
 
 
 def _flags(fits: bool) -> int:
-    """Return the flags of a window that takes input only if it scrolls."""
+    """Return the flags of a window that accepts input only if it scrolls."""
     flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
     flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.always_auto_resize
     flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
@@ -67,7 +67,7 @@ def _flags(fits: bool) -> int:
 
 
 def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
-    """Return the smallest number of columns that fit the height, limited by the width.
+    """Return the smallest number of columns that fit into the height, limited by the width.
 
     >>> _columns(50, (1000, 600), (400, 20)), _columns(50, (1000, 400), (400, 20))
     (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))

@@ -158,7 +158,7 @@ def ask_for_pose(state: AppState) -> None:
 
 
 def ask_for_export(state: AppState) -> None:
-    """Ask where to export the chosen actor as it is posed."""
+    """Ask where to export the chosen actor in its current pose."""
     suffixes = tuple(pose_formats())
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths),

@@ -1,4 +1,4 @@
-"""Parts of figures that formats cannot hold."""
+"""Parts of figures that formats cannot store."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:
-    """Return the data of a figure other than mesh, skeleton, skin and shapes."""
+    """Return the parts of a figure other than mesh, skeleton, skin and shapes."""
     extras = {
         "part-body-parts": figure.body_parts,
         "part-keypoints": figure.keypoints,
@@ -20,6 +21,19 @@ def extra_parts(figure: Figure) -> list[Phrase]:
     return [Phrase(name) for name, part in extras.items() if part is not None]
 
 
+def surface_parts(mesh: Mesh, has_colors: bool = False) -> list[Phrase]:
+    """Return the data of a mesh that formats with one set of texture coordinates cannot hold.
+
+    ``has_colors`` tells whether the format holds vertex colours.
+    """
+    extras = {
+        "part-second-uvs": bool(mesh.other_uvs),
+        "part-vertex-colors": mesh.colors is not None and not has_colors,
+        "part-mesh-parts": bool(mesh.parts),
+    }
+    return [Phrase(name) for name, is_lost in extras.items() if is_lost]
+
+
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:
-    """Return a note that lists the parts that a format cannot hold, if there are any."""
+    """Return a note that lists the parts that a format cannot store, if there are any."""
     return [Diagnostic("X003.parts", values={"format": kind, "parts": parts})] if parts else []

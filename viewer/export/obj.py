@@ -13,7 +13,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
-from viewer.export._left_out import not_held_note
+from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._motion_paths import numbered_paths
 from viewer.export._obj_materials import PLAIN, library_losses, material_library
 from viewer.formats import all_or_none, save_bytes, save_text
@@ -45,7 +45,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         parts.append(_rows("vt", mesh.uvs))
     parts.append(_rows("vn", normals))
     parts += _faces(mesh, bool(beside))
-    # The other files exist with the same content.
+    # Files that are not missing already have the same content.
     missing = [file for file in beside if not os.path.lexists(file)]
     with all_or_none(missing):
         for file in missing:
@@ -53,8 +53,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         save_text(path, "".join(parts))
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
     textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
-    lost = not_held_note(".mtl", library_losses(mesh))
-    return [Diagnostic("X001.mesh", path, values=counts), *textures, *lost]
+    lost = library_losses(mesh)
+    lost += [part for part in surface_parts(mesh) if part not in lost]
+    notes = not_held_note(".obj and .mtl", lost)
+    return [Diagnostic("X001.mesh", path, values=counts), *textures, *notes]
 
 
 def export_animation(
@@ -62,7 +64,7 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write one numbered file per frame; see ``viewer.export.export_animation``.
 
-    ``{frame}`` in the name stands for the frame's number, as in ``walk_{frame:05}.obj``. Missing
+    ``{frame}`` in the name is replaced by the frame number, as in ``walk_{frame:05}.obj``. Missing
     frames have no file unless ``options.gaps`` requests holding or interpolation.
     """
     poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)

@@ -9,13 +9,19 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes, Floats, frozen
 
-__all__ = ["ALPHA_MODES", "TEXTURES", "WRAPS", "Material", "Texture"]
+__all__ = ["ALPHA_MODES", "MINIFICATIONS", "TEXTURES", "WRAPS", "Material", "Texture"]
 
 ALPHA_MODES = ("opaque", "mask", "blend")
 """Alpha ignored; cut out below the cutoff; blended with the background."""
 
 WRAPS = ("clamp", "repeat", "mirror")
 """Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
+
+MINIFICATIONS = (
+    *("nearest", "linear", "nearest_mipmap_nearest"),
+    *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
+)
+"""Filters of images that are drawn smaller than they are, as OpenGL and glTF name them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,18 +33,22 @@ class Texture:
     name : str
         File name of the image, relative to the figure's folder.
     image : (H, W, 4) uint8 or None
-        Pixels with alpha, first row at v = 1; sRGB in textures of colours, linear in others;
+        Pixels with alpha, first row at v = 1; sRGB in colour textures, linear in others;
         None if it could not be read.
     channel : int
-        Column of ``image`` that single-channel textures are read from.
+        Channel of ``image`` from which single-channel textures are read.
     uv_set : int
-        0 for ``Mesh.uvs``, 1 for ``Mesh.second_uvs``.
+        0 for ``Mesh.uvs``, n for ``Mesh.other_uvs[n - 1]``.
     transform : (2, 3)
-        From texture coordinates to those of the image, v = 0 at its bottom row.
+        Maps texture coordinates to image coordinates, whose v is 0 at the bottom row.
     wrap : (str, str)
-        Entry of ``WRAPS`` along u and v.
+        Entries of ``WRAPS`` along u and v.
     is_smooth : bool
         Whether pixels are interpolated.
+    minification : str
+        Entry of ``MINIFICATIONS``; empty for mipmaps, interpolated if ``is_smooth``.
+    encoded : bytes or None
+        The PNG or JPEG file that ``image`` was decoded from, if it was part of another file.
     """
 
     name: str
@@ -48,6 +58,8 @@ class Texture:
     transform: Floats | None = None
     wrap: tuple[str, str] = ("clamp", "clamp")
     is_smooth: bool = True
+    minification: str = ""
+    encoded: bytes | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -58,7 +70,9 @@ class Texture:
         placed = np.eye(2, 3) if self.transform is None else self.transform
         put("transform", frozen("transform", placed, (2, 3)))
         _check_choice("channel", self.channel, range(4))
-        _check_choice("uv_set", self.uv_set, range(2))
+        _check_choice("minification", self.minification, ("", *MINIFICATIONS))
+        if self.uv_set < 0:
+            raise RigError(f"uv_set: expected at least 0, found {self.uv_set}")
         for side in self.wrap:
             _check_choice("wrap", side, WRAPS)
 
@@ -83,22 +97,22 @@ class Material:
     Attributes
     ----------
     name : str
-        As in the file; triangles refer to materials by index.
+        Name in the file; triangles refer to materials by index.
     base_texture : Texture or None
         Colour and opacity, sRGB.
     base_color : (r, g, b, a) or None
-        Linear, 0 to 1; None for a material without a colour of its own: white under a texture,
-        else the figure's.
+        Linear, 0 to 1; None for a material without a colour of its own, which is white under a
+        texture and otherwise has the figure's colour.
     metallic, roughness : float
         0 to 1; roughness is perceptual, the square root of the GGX width.
     metallic_texture, roughness_texture : Texture or None
-        One channel each, often two channels of one image.
+        One channel each, often of the same image.
     normal_texture : Texture or None
         Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1.
     normal_scale : float
         Multiplier for the red and green components of the normals.
     occlusion_texture : Texture or None
-        Fraction of the ambient light that arrives: one channel.
+        Fraction of the ambient light that arrives; one channel.
     occlusion_strength : float
         0 to 1.
     emissive : (r, g, b)
@@ -114,7 +128,7 @@ class Material:
     unlit : bool
         Whether the base colour is shown without lighting.
     is_physical : bool
-        Whether the file describes the surface by metallic and roughness, or as unlit.
+        Whether the file describes the surface by metalness and roughness, or as unlit.
     """
 
     name: str = ""
@@ -181,7 +195,7 @@ TEXTURES = (
     *("base_texture", "metallic_texture", "roughness_texture"),
     *("normal_texture", "occlusion_texture", "emissive_texture"),
 )
-"""Fields of a material that hold textures."""
+"""Fields of a material that contain textures."""
 
 
 def _check_choice(name: str, value: object, choices: range | tuple[str, ...]) -> None:

@@ -70,7 +70,7 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
     elif changed:
         actor.color = (color[0], color[1], color[2])
     if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("colour; right-click restores the default")
+        imgui.set_tooltip("colour; right-click to restore the default")
     imgui.same_line()
     absent = "" if actor.is_present else "  (absent)"
     text = f"{printable(actor.name, 60)}{absent}"
@@ -137,7 +137,7 @@ def _draw_motion_paths(state: AppState, actor: Actor) -> None:
             state, begin_field("Time window"), options.path_seconds, 0.02, "%.2f s", low=0.0
         )
         note_item(state, "Time window")
-        explain("seconds of the path before and after the current time; 0 shows all of the motion")
+        explain("seconds of the path before and after the current time; 0 shows the whole motion")
         if changed:
             options.path_seconds = min(value, _LONGEST_WINDOW)
 

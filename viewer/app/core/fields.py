@@ -43,12 +43,12 @@ def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: floa
     Parameters
     ----------
     label : str
-        Text, and an ID after ``##`` or ``###`` to distinguish equal labels, as in ImGui.
+        Text, and optionally an ID after ``##`` or ``###`` to distinguish equal labels, as in ImGui.
     width : float
-        Width of the widget in font sizes; it then follows its label directly. 0 aligns it with
-        the widgets above and below and lets it fill the line.
+        Width of the widget in font sizes; the widget then directly follows its label. 0 aligns it
+        with the widgets above and below and lets it fill the line.
     column : float
-        Width for the label in window coordinates, for rows of one line. By default it depends on
+        Width of the label in window coordinates, for rows of one line. By default, it depends on
         the panel's width, and a longer label is placed above its widget.
     needs : float
         Minimum width of the widget in window coordinates; the label shrinks to allow for it.
@@ -79,7 +79,7 @@ def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: floa
 
 
 def field_width(label: str, width: float) -> float:
-    """Return the width of a label with a widget of some font sizes, in window coordinates."""
+    """Return the width of a label and its widget, given in font sizes, in window coordinates."""
     text = label.partition("##")[0]
     gap = imgui.get_style().item_inner_spacing.x
     return imgui.calc_text_size(text).x + gap + width * imgui.get_font_size()
@@ -103,7 +103,7 @@ def slider_float(
     label : str
         Hidden label, as from ``begin_field``.
     value, low, high : float
-        Number shown, and the ends of the track.
+        Value, and the ends of the track.
     text : str
         Format of the number.
     flags : int
@@ -232,7 +232,7 @@ class _Track:
         imgui.pop_style_color(2)
 
     def draw(self, value: float, low: float, high: float) -> None:
-        """Draw the track of the slider drawn last: filled from 0, or else from its left end."""
+        """Draw the track of the last slider, filled from 0 if possible, or else from the left."""
         if imgui.internal.temp_input_is_active(imgui.get_item_id()) or low == high:
             return
         start, end = imgui.get_item_rect_min(), imgui.get_item_rect_max()

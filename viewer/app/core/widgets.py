@@ -43,7 +43,7 @@ Rect = tuple[float, float, float, float]
 
 
 def note_item(state: AppState, label: str) -> None:
-    """Record the rectangle of the last widget under a label that tests can aim at.
+    """Record the rectangle of the last widget under a label, for tests.
 
     In a disabled block, its tooltip is the reason.
     """
@@ -75,7 +75,7 @@ def disabled(state: AppState, why: str) -> Iterator[None]:
 
 
 def explain(text: str, why: str = "") -> None:
-    """Give the last widget a tooltip: its effect, or why it is disabled.
+    """Give the last widget a tooltip with its effect, or the reason why it is disabled.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 
 
 def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
-    """Begin a separate window, which opens in the centre; ``imgui.end`` ends it.
+    """Begin a separate window, which opens in the centre; ``imgui.end`` must follow.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def menu_item(
 
 
 def same_line_if_room(text: str) -> None:
-    """Place the next check box or button with this text next to the last widget if it fits."""
+    """Place the next check box or button, with this text, next to the last widget if it fits."""
     style = imgui.get_style()
     width = imgui.calc_text_size(text).x + imgui.get_frame_height() + style.item_inner_spacing.x
     end = imgui.get_item_rect_max().x + style.item_spacing.x + width

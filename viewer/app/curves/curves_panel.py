@@ -59,7 +59,8 @@ def draw(state: AppState) -> None:
         _draw_list(state, curves)
     imgui.end_child()
     imgui.same_line()
-    # Next to the plot, not above it: widgets that appear must not move a key away from the mouse.
+    # The fields are next to the plot, not above it: widgets that appear must not move a key away
+    # from the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
     if clip_of(state) is not None:
         side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.35 * room)
@@ -127,7 +128,7 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
-    """Return the rows of listed curves, with each joint's number as text before its curves."""
+    """Return the rows of listed curves; each joint's number, as text, precedes its curves."""
     listed: list[int | str] = []
     last: int | None = None
     for row, curve in enumerate(curves):

@@ -33,13 +33,13 @@ class FileDialog:
     suffixes : tuple of str
         Suffixes of the listed files; if empty, those of all formats that can be opened.
     name : str
-        Suggested name of the file to write; its suffix is added to names without one.
+        Suggested name of the file to write; its suffix is added to names without a suffix.
     more : callable, optional
-        Draws further options, given the state and the dialog.
+        Draws additional options, given the state and the dialog.
     more_rows : float
         Height of these options in lines of text.
     written : callable, optional
-        Returns all files that are written for a name; only that file if omitted.
+        Returns all files that are written for a name; if omitted, only the named file is written.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ def opened_suffixes() -> set[str]:
 
 
 def folder_of(paths: Sequence[Path]) -> Path:
-    """Return a dialog's initial folder: that of the first file, the current one, or home."""
+    """Return a dialog's initial folder: that of the first file, the current folder, or home."""
     try:
         return paths[0].resolve().parent if paths else Path.cwd()
     except (OSError, RuntimeError):  # the current folder no longer exists

@@ -49,7 +49,7 @@ _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 
 
 def draw(state: AppState) -> None:
-    """Draw the panel; the first time it is shown it starts a check."""
+    """Draw the panel; when it is first shown, it starts a check."""
     view = state.of(Linting)
     take_findings(state)
     if not view.was_shown:
@@ -209,7 +209,7 @@ def _searched_text(finding: Finding) -> str:
 
 
 def _place(finding: Finding) -> str:
-    """Return the file's name and the line, empty if there is none."""
+    """Return the file's name and the line; empty if there is none."""
     if finding.file is None or finding.file == Path():
         return ""
     line = "" if finding.line is None else f":{finding.line}"
@@ -264,7 +264,7 @@ def _draw_tooltip(state: AppState, finding: Finding) -> None:
 
 
 def _click_text(state: AppState, finding: Finding) -> str:
-    """Return the tooltip about a click on a finding."""
+    """Return the tooltip about the effect of a click on a finding."""
     if is_known_there(state, finding):
         return "click to show it in the view; click again or press Esc to stop"
     if is_in_scene(state, finding):

@@ -36,13 +36,13 @@ class Entry:
     text : str
         Name of the entry.
     kind : str
-        Category, in one word.
+        Category in one word.
     run : callable
         Called with the state.
     key : str
         Keyboard shortcut; empty for none.
     why : str
-        Why the entry cannot be run now; empty if it can.
+        Reason why the entry cannot be run now; empty if it can.
     """
 
     text: str

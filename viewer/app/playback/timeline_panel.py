@@ -56,7 +56,7 @@ def _draw_transport(state: AppState) -> None:
         step(state, -1)
     explain(with_key(state, "one frame back", "Left"))
     imgui.same_line()
-    # Both labels get the same width, or the following buttons would move.
+    # Both labels have the same width, or the following buttons would move.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
@@ -101,7 +101,7 @@ def _draw_rate(state: AppState) -> None:
 def _draw_settings(state: AppState) -> None:
     clock = state.clock
     clock.mode = choice(state, "Mode", clock.mode, MODES, width=7.0)
-    explain("what happens at the end of the range")
+    explain("behaviour at the end of the range")
     if clock.mode != "run on":
         clock.time = min(max(clock.time, clock.whole[0]), clock.whole[1])
     same_line_if_room("M" * 12)
@@ -110,7 +110,7 @@ def _draw_settings(state: AppState) -> None:
     )
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.speed = 1.0
-    explain("seconds of motion per second; right-click resets it to 1")
+    explain("seconds of motion per second; right-click to reset to 1")
     same_line_if_room("M" * 14)
     _draw_range(state)
     same_line_if_room("Interpolate gaps")

@@ -20,7 +20,7 @@ from viewer.rig.posing.pose_vector import own_numbers, rotation_rows, set_joint_
 
 __all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
 
-_SAME = 1e-9  # tolerance within which rotations are equal
+_SAME = 1e-9  # tolerance within which rotations are considered equal
 
 
 def is_ball(figure: Figure, joint: int) -> bool:
@@ -67,7 +67,7 @@ def draw_vector_component(
 
 
 def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Floats:
-    """Return a joint's rotation vector: the edited one as long as it matches the rotation."""
+    """Return a joint's rotation vector: the edited vector as long as it matches the rotation."""
     posing = state.of(Posing)
     assert figure.skeleton is not None  # checked by the caller
     rotation = joint_rotations(figure.skeleton, pose)[joint]
@@ -80,7 +80,7 @@ def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Fl
 
 
 def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) -> None:
-    """Draw the three values that the body model's pose vector holds for a joint."""
+    """Draw the three values of a joint in the body model's pose vector."""
     layout, skeleton = figure.pose_layout, figure.skeleton
     if layout is None or skeleton is None:
         return

@@ -52,7 +52,7 @@ __all__ = ["draw", "rows"]
 Rows: TypeAlias = tuple[tuple[int, int, int], ...]
 
 OWN_NUMBERS = -2
-"""Value in place of a DOF for the row with the raw pose values of the body model."""
+"""Value used instead of a DOF for the row with the raw pose values of the body model."""
 
 _FIRST_ROTATION = 3
 _LABEL_WIDTH = 1.6  # in font sizes

@@ -131,8 +131,11 @@ def _draw_joint_toggles(state: AppState) -> None:
 
 
 def _draw_extras(state: AppState) -> None:
-    """Draw settings that only some figures have: keypoints, a reduced mesh, body parts."""
+    """Draw settings that only some figures have: colours, keypoints, a reduced mesh, body parts."""
     options, figure = state.options, state.actor.figure
+    if any(one.figure.mesh and one.figure.mesh.colors is not None for one in state.scene.actors):
+        options.vertex_colors = checkbox(state, "Vertex colours", options.vertex_colors)
+        explain("Of the file; they multiply the colours of materials")
     if figure.keypoints is not None:
         options.keypoints = checkbox(state, "Keypoints", options.keypoints)
         if figure.reduced is not None:
