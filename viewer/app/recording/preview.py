@@ -16,7 +16,7 @@ _WIDEST, _HIGHEST = 320, 200  # pixels
 
 
 class Preview:
-    """Draws the preview into a texture whenever something about it changes.
+    """Draws the preview into a texture whenever the preview changes.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Preview:
         Parameters
         ----------
         state : AppState
-            The state, with the settings; receives the texture.
+            State with the settings; receives the texture.
         key : object
             Identifies the image of the view.
         """
