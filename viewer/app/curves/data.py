@@ -19,7 +19,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.transform_rows import rows_of
 from viewer.rig.scene import Actor
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints
 
 __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 
@@ -119,7 +119,8 @@ def _dof_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
 
 def _joint_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
     groups = [(_PLACE, -1, False)]
-    groups += [(printable(label, 60), j, True) for j, label in enumerate(joint_labels(skeleton))]
+    labels = joint_labels(skeleton)
+    groups += [(printable(labels[j], 60), j, True) for j in shown_joints(skeleton).tolist()]
     return tuple(
         Curve(group, number, _AXES[axis], axis, is_angle)
         for group, number, is_angle in groups

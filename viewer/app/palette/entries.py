@@ -20,7 +20,7 @@ from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN
 from viewer.rig.motion.animation_choice import animation_labels
-from viewer.rig.skeleton import joint_labels
+from viewer.rig.skeleton import joint_labels, shown_joints
 from viewer.rig.skinning import METHODS
 
 __all__ = ["Entry", "entries"]
@@ -124,8 +124,11 @@ def _animations(state: AppState) -> Iterator[Entry]:
 def _joints(state: AppState) -> Iterator[Entry]:
     """Yield the joints of the chosen actor."""
     skeleton = state.actor.figure.skeleton
-    for joint, label in enumerate(joint_labels(skeleton) if skeleton is not None else ()):
-        yield Entry(printable(label, _LONGEST), "joint", partial(select_joint, joint=joint))
+    if skeleton is None:
+        return
+    labels = joint_labels(skeleton)
+    for joint in shown_joints(skeleton).tolist():
+        yield Entry(printable(labels[joint], _LONGEST), "joint", partial(select_joint, joint=joint))
 
 
 def _figures(state: AppState) -> Iterator[Entry]:

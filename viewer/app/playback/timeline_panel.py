@@ -17,6 +17,7 @@ from viewer.app.core.widgets import (
     disabled,
     explain,
     note_item,
+    offer_files,
     same_line_if_room,
     slider,
 )
@@ -38,7 +39,7 @@ def draw(state: AppState) -> None:
     if state.actor.figure.animations:
         _draw_animation(state)
     if not state.clock.has_motion:
-        imgui.text_disabled(no_motion(state))
+        offer_files(state, f"There is {no_motion(state)}.")
         return
     if state.actor.figure.animations:
         same_line_if_room("M" * 12)
@@ -104,7 +105,7 @@ def _draw_place(state: AppState) -> None:
 def _draw_rate(state: AppState) -> None:
     """Draw the field of the frame rate."""
     foreign = foreign_rate(state)
-    with disabled(foreign):
+    with disabled(state, foreign):
         typed = number_field(state, begin_field("Frames per second##rate", 4.0), rate_of(state))
         note_item(state, "Frame rate")
         explain("play the same frames faster or slower", foreign)
