@@ -17,9 +17,9 @@ from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.transform_rows import rows_of
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints
+from viewer.rig.transforms.rows import rows_of
 
 __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 

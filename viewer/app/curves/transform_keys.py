@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from viewer.app.curves.state import KeyPlace
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
-from viewer.rig.motion.transform_edit import (
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.edit import (
     add_transform_key,
     delete_transform_keys,
     move_transform_keys,
@@ -17,10 +19,8 @@ from viewer.rig.motion.transform_edit import (
     set_transform_key,
     set_transform_slope,
 )
-from viewer.rig.motion.transform_keying import joint_values, key_transform_pose
-from viewer.rig.motion.transform_rows import TransformRow, key_values, row_values, rows_of
-from viewer.rig.scene import Actor
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.keying import joint_values, key_transform_pose
+from viewer.rig.transforms.rows import TransformRow, key_values, row_values, rows_of
 
 __all__ = ["TransformKeys"]
 

@@ -17,14 +17,14 @@ from viewer.rig.arrays import Floats
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.motion.clip import Channel
 from viewer.rig.motion.clip_edit import move_keys, set_key
-from viewer.rig.motion.transform_channel_edit import (
+from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.channel_edit import (
     added_key,
     with_interpolation,
     without_keys,
 )
-from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
-from viewer.rig.motion.transform_rows import TransformRow, angles_of, from_angles, rows_of
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.rows import TransformRow, angles_of, from_angles, rows_of
 
 __all__ = [
     "add_transform_key",

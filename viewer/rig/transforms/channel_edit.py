@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
-from viewer.rig.motion.transform_sampling import sample_transforms
+from viewer.rig.transforms.sampling import sample_transforms
 
 __all__ = ["added_key", "key_at", "value_at", "with_interpolation", "without_keys"]
 

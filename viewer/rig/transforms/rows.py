@@ -20,8 +20,8 @@ from viewer.rig.geometry.rotation import (
 )
 from viewer.rig.memo import Memo
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, TransformPath
-from viewer.rig.motion.transform_sampling import TransformSamples, sample_transforms
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.sampling import TransformSamples, sample_transforms
 
 __all__ = ["TransformRow", "angles_of", "from_angles", "key_values", "row_values", "rows_of"]
 

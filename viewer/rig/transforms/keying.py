@@ -9,11 +9,11 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion
-from viewer.rig.motion.transform_channel_edit import added_key, value_at
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, TransformPath
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import figure_pose
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.channel_edit import added_key, value_at
 
 __all__ = ["joint_values", "key_transform_pose"]
 
