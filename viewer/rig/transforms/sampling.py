@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.motion.transform_clip import TransformClip, TransformPath
-from viewer.rig.motion.transform_table import (
+from viewer.rig.transforms.table import (
     Arcs,
     Curves,
     Timelines,
