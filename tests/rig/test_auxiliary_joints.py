@@ -52,5 +52,3 @@ def test_their_influences_are_those_of_their_ancestors(figure):
     assert facts.weights.tolist() == [1.0]
     assert weight(Asked(figure, None, Skinning(), joint=0)).tolist() == [1.0]
     assert idle_joints(figure.skin, figure.skeleton).tolist() == [2]
-
-

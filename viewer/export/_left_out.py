@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:
@@ -18,6 +19,19 @@ def extra_parts(figure: Figure) -> list[Phrase]:
         "part-regressor": figure.joint_regressor,
     }
     return [Phrase(name) for name, part in extras.items() if part is not None]
+
+
+def surface_parts(mesh: Mesh, has_colors: bool = False) -> list[Phrase]:
+    """Return the data of a mesh that formats with one set of texture coordinates cannot hold.
+
+    ``has_colors`` tells whether the format holds vertex colours.
+    """
+    extras = {
+        "part-second-uvs": bool(mesh.other_uvs),
+        "part-vertex-colors": mesh.colors is not None and not has_colors,
+        "part-mesh-parts": bool(mesh.parts),
+    }
+    return [Phrase(name) for name, is_lost in extras.items() if is_lost]
 
 
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:

@@ -8,10 +8,12 @@ from pathlib import Path
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
+from viewer.app.files.export_formats import FOLDER
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
+    Exporter,
     MotionOptions,
     animation_for,
     export_animation,
@@ -24,14 +26,19 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
+from viewer.rig.smpl_family import member_of
 
 _MANY = (".obj",)  # one file per frame: only exported by the command line
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
-__all__ = ["FOLDER", "motion_files", "motion_suffixes", "moving_actors", "save_motion"]
-
-FOLDER = "/"
-"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
+__all__ = [
+    "motion_files",
+    "motion_formats",
+    "motion_suffixes",
+    "moving_actors",
+    "save_motion",
+    "unsuited_formats",
+]
 
 
 def moving_actors(state: AppState) -> list[Actor]:
@@ -45,6 +52,22 @@ def motion_suffixes() -> tuple[str, ...]:
     found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
     others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
     return (".bvh", *(suffix for suffix in others if suffix != ".bvh"))
+
+
+def motion_formats(actor: Actor) -> dict[str, Exporter]:
+    """Return the exporters of motions by suffix; of several the one that suits the actor."""
+    found = {
+        suffix: EXPORTERS[suited_exporter(f"motion{suffix}", actor.figure)]
+        for suffix in motion_suffixes()
+    }
+    return {**found, FOLDER: EXPORTERS["easymocap"]}
+
+
+def unsuited_formats(actor: Actor) -> dict[str, str]:
+    """Return why formats cannot hold the motion of an actor, by suffix."""
+    skeleton = actor.figure.skeleton
+    is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
+    return {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:

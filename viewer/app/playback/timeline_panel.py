@@ -17,6 +17,7 @@ from viewer.app.core.widgets import (
     disabled,
     explain,
     note_item,
+    offer_files,
     same_line_if_room,
     slider,
 )
@@ -34,7 +35,7 @@ _CLAMP = imgui.SliderFlags_.always_clamp
 def draw(state: AppState) -> None:
     """Draw the panel."""
     if not state.clock.has_motion:
-        imgui.text_disabled(no_motion(state))
+        offer_files(state, f"There is {no_motion(state)}.")
         return
     _draw_transport(state)
     same_line_if_room("000000")
@@ -89,7 +90,7 @@ def _draw_place(state: AppState) -> None:
 def _draw_rate(state: AppState) -> None:
     """Draw the field of the frame rate."""
     foreign = foreign_rate(state)
-    with disabled(foreign):
+    with disabled(state, foreign):
         typed = number_field(state, begin_field("Frames per second##rate", 4.0), rate_of(state))
         note_item(state, "Frame rate")
         explain("play the same frames faster or slower", foreign)

@@ -13,9 +13,9 @@ from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
 from viewer.phrases import printable
-from viewer.rendering.srgb import encode_color
 from viewer.rig.motion.clip import Clip
 from viewer.rig.scene import Actor, Motion
+from viewer.rig.srgb import encode_color
 
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 

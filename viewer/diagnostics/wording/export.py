@@ -175,6 +175,8 @@ PHRASES = {
     "part-unlit": "unlit surfaces",
     "part-single-sided": "single-sided surfaces",
     "part-second-uvs": "second texture coordinates",
+    "part-vertex-colors": "vertex colours",
+    "part-mesh-parts": "names of its parts",
     "part-texture-rotation": "rotated or mirrored textures",
     "part-unfiltered": "unfiltered textures",
 }

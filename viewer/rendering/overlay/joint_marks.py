@@ -10,7 +10,6 @@ import numpy as np
 from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
 from viewer.rendering.projection import picture_scale, project, project_segments
-from viewer.rendering.srgb import encode_srgb
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
@@ -20,6 +19,7 @@ from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
+from viewer.rig.srgb import encode_srgb
 
 __all__ = [
     "HIGHLIGHT",
