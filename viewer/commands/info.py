@@ -9,7 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from viewer.commands._clip_info import clip_lines, describe_clip
+from viewer.commands._clip_info import (
+    animation_lines,
+    clip_lines,
+    describe_animations,
+    describe_clip,
+)
 from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
@@ -96,6 +101,8 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
         parts["morphs"] = _describe_morphs(figure.blend_shapes)
     if actor.clip is not None:
         parts["clip"] = describe_clip(actor.clip)
+    if figure.animations:
+        parts["animations"] = describe_animations(actor)
     return parts
 
 
@@ -219,6 +226,8 @@ def _lines(actor: dict[str, Any]) -> list[str]:
     ]
     if "clip" in actor:
         lines += clip_lines(actor["clip"])
+    if "animations" in actor:
+        lines += animation_lines(actor["animations"])
     return lines
 
 

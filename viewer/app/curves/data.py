@@ -14,6 +14,7 @@ from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints
 
@@ -72,7 +73,7 @@ def curves_of(actor: Actor) -> tuple[Curve, ...]:
     skeleton, points = actor.figure.skeleton, actor.figure.points
     if isinstance(actor.clip, PointClip) and points is not None:
         return _point_curves(points)
-    if skeleton is None or isinstance(actor.clip, PointClip):
+    if skeleton is None or isinstance(actor.clip, PointClip | TransformClip):
         return ()
     if isinstance(actor.clip, SampledClip):
         return _of_skeleton.get(skeleton, "frames", lambda: _joint_curves(skeleton))

@@ -24,7 +24,9 @@ from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
@@ -43,7 +45,7 @@ __all__ = [
 
 def moving_actors(state: AppState) -> list[Actor]:
     """Return the actors whose joints are moved by a motion."""
-    return [a for a in state.scene.actors if isinstance(a.clip, Clip | SampledClip)]
+    return [a for a in state.scene.actors if isinstance(a.clip, JointMotion)]
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -159,7 +161,8 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # Edits made during the export must not change what is written.
         copied = actor.copy()
-        rate = state.clock.frame_rate if isinstance(actor.clip, Clip) else None
+        is_keyed = isinstance(actor.clip, Clip | TransformClip)
+        rate = state.clock.frame_rate if is_keyed else None
         parts.append(_Part(copied, file, frames, rate, number))
     if not parts:
         raise RigError("all actors are absent in the playback range: nothing to export")
