@@ -15,6 +15,7 @@ __all__ = ["parsed"]
 
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_THOROUGH = 1 << 20  # characters below which repeated keys are always looked for
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -50,7 +51,10 @@ def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
             repeated.extend(key for key, count in counts.items() if count > 1)
         return values
 
-    decoder = json.JSONDecoder(object_pairs_hook=unique, parse_constant=constant)
+    # Looking for repeated keys takes half as long as parsing.
+    looks = len(text) < _THOROUGH or source.diagnostics.keeps_errors
+    hook = unique if looks else None
+    decoder = json.JSONDecoder(object_pairs_hook=hook, parse_constant=constant)
     try:
         root = decoder.decode(text)
     except json.JSONDecodeError as problem:
