@@ -96,6 +96,7 @@ MESSAGES = {
     "F002.gltf-bind-count": "expected {expected:#matrix} as there are joints, found {found}",
     "F002.gltf-bind-row": "joint {joint}: expected 0 0 0 1 as the last row, found {found}",
     "F003.gltf-bind": "joint {joint}: expected a finite inverse bind matrix, found another",
+    "G004.no-joints": "skin without joints: not used",
     "G004.joint-twice": "{n:#joint|is|are} listed more than once",
     "G004.skeleton": "expected the index of a node, found {found}: ignored",
     "G004.bind-count": "expected {expected:#matrix} as there are joints, found {found}: the rest "
@@ -104,7 +105,7 @@ MESSAGES = {
     "joints: ignored",
     # Animations
     "F002.gltf-no-keys": "expected times of at least one key, found none",
-    "F002.gltf-times": "key {index}: expected increasing times, found {found:.6g} after "
+    "F002.gltf-times": "key {index}: expected ascending times, found {found:.6g} after "
     "{before:.6g}",
     "F002.gltf-outputs": "expected {expected:#element} for {keys:#key}, found {found}",
     "F002.gltf-rotation": "key {index}: expected a rotation, found only zeros",
@@ -112,6 +113,9 @@ MESSAGES = {
     "F007.gltf-channels": "{n:#animation channel|changes|change} nothing that is shown: "
     "{names:list}",
     "G005.animation": "{problem}: animation left out",
+    "G005.equal-times": "{n:#key|is|are} at the time of the next one: ignored",
+    "G005.range": "expected keys from {start:.6g} to {end:.6g} s as the accessors declare, found "
+    "{first:.6g} to {last:.6g} s",
     "G005.channel-twice": "another channel for {path:text} of node {node}: ignored",
 }
 

@@ -25,8 +25,11 @@ def pointer_to(base: str, *keys: str | int) -> str:
     >>> pointer_to("/nodes/3", "extensions", "a/b")
     '/nodes/3/extensions/a~1b'
     """
-    escaped = (str(key).replace("~", "~0").replace("/", "~1") for key in keys)
-    return "/".join((base, *escaped))
+    for key in keys:
+        if type(key) is str and ("/" in key or "~" in key):
+            key = key.replace("~", "~0").replace("/", "~1")
+        base = f"{base}/{key}"
+    return base
 
 
 class Element:

@@ -19,14 +19,14 @@ _THOROUGH = 1 << 20  # characters below which repeated keys are always looked fo
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
-def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
+def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     """Return the parsed root object.
 
     Parameters
     ----------
     source : Source
         The file, which records diagnostics.
-    data : memoryview
+    data : bytes
         UTF-8 text, possibly padded.
     has_lines : bool
         Whether the text is the whole file, so that errors have a line.
@@ -36,7 +36,7 @@ def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
     FormatError
         If it is no valid JSON object.
     """
-    text = _text(source, bytes(data).rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
+    text = _text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []
     repeated: list[str] = []
 
