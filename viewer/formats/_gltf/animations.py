@@ -33,7 +33,7 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     """Return the animations that are valid as far as their keys need not be read.
 
     An invalid animation is left out with a warning. The keys of the first one are read, because
-    it is the one that is played by default.
+    it is the one that is played by default; those of all are if errors are kept.
     """
     table = document.table("animations")
     unused = _Unused()
@@ -41,7 +41,8 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     for index in range(len(table)):
         try:
             animation = _animation(document, targets, table[index], unused)
-            found.append(animation if found else _checked(animation))
+            reads = not found or document.source.diagnostics.keeps_errors
+            found.append(_checked(animation) if reads else animation)
         except FormatError as problem:
             _leave_out(document, problem, index)
     if unused.n:

@@ -29,6 +29,7 @@ from viewer.formats._gltf.nodes import read_tree
 from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
+from viewer.formats._gltf.targets import node_weights
 from viewer.formats._nodes.content import NodeFile, NodeSkin, NodeTree
 from viewer.formats._source import Source
 from viewer.rig.material import Material
@@ -56,6 +57,7 @@ def read_nodes(source: Source) -> NodeFile:
     skins = read_skins(document)
     tree = _without_empty_skins(read_tree(document), skins)
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
+    tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
     root = document.root
     return NodeFile(
         name=source.path.stem,
