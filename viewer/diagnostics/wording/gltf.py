@@ -104,6 +104,7 @@ MESSAGES = {
     "F002.gltf-bind-row": "joint {joint}: expected 0 0 0 1 as the last row, found {found}",
     "F003.gltf-bind": "joint {joint}: expected a finite inverse bind matrix, found a non-finite "
     "one",
+    "G004.no-joints": "skin without joints: not used",
     "G004.joint-twice": "{n:#joint|is|are} listed more than once",
     "G004.skeleton": "expected the index of a node, found {found}: ignored",
     "G004.bind-count": "expected {expected:#matrix}, one per joint, found {found}: the rest "
@@ -112,13 +113,16 @@ MESSAGES = {
     "joints: ignored",
     # Animations
     "F002.gltf-no-keys": "expected times of at least one key, found none",
-    "F002.gltf-times": "key {index}: expected increasing times, found {found:.6g} after "
+    "F002.gltf-times": "key {index}: expected ascending times, found {found:.6g} after "
     "{before:.6g}",
     "F002.gltf-outputs": "expected {expected:#element} for {keys:#key}, found {found}",
     "F002.gltf-rotation": "key {index}: expected a rotation, found only zeros",
     "F003.gltf-keys": "key {index}: expected finite numbers, found {found}",
     "F007.gltf-channels": "{n:#animation channel|has|have} no visible effect: {names:list}",
     "G005.animation": "{problem}: animation omitted",
+    "G005.equal-times": "{n:#key|has|have} the same time as the next key: ignored",
+    "G005.range": "expected keys from {start:.6g} to {end:.6g} s as declared by the accessors, found "
+    "{first:.6g} to {last:.6g} s",
     "G005.channel-twice": "ignored second channel for {path:text} of node {node}",
 }
 

@@ -13,9 +13,11 @@ from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element, Table
 from viewer.formats._gltf.keys import read_times
 from viewer.formats._gltf.target_paths import Targets
-from viewer.formats._nodes.content import NodeAnimation
+from viewer.formats._nodes.content import NodeAnimation, NodeChannel
 
 __all__ = ["read_animations"]
+
+_SAME_TIME = 1e-4  # s; decimals of times in JSON
 
 
 @dataclass(slots=True)
@@ -31,7 +33,7 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     """Return the animations that are valid, except for keys that are read later.
 
     An invalid animation is omitted with a warning. The keys of the first one are read, because
-    it is the one that is played by default.
+    it is the one that is played by default; those of all are if errors are kept.
     """
     table = document.table("animations")
     unused = _Unused()
@@ -39,7 +41,8 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     for index in range(len(table)):
         try:
             animation = _animation(document, targets, table[index], unused)
-            found.append(animation if found else _checked(animation))
+            reads = not found or document.source.diagnostics.keeps_errors
+            found.append(_checked(animation) if reads else animation)
         except FormatError as problem:
             _leave_out(document, problem, index)
     if unused.n:
@@ -71,8 +74,21 @@ def _animation(
     plain = _plain_channels(channels.items, samplers.items, targets)
     nodes, inputs = plain or _any_channels(document, targets, animation, unused)
     start, end = _range(document, animation, inputs)
-    read = partial(read_channels, document, targets, animation)
+    read = partial(_channels, document, targets, animation, (start, end))
     return NodeAnimation(animation.text("name"), start, end, frozenset(nodes), read)
+
+
+def _channels(
+    document: Document, targets: Targets, animation: Element, declared: tuple[float, float]
+) -> tuple[NodeChannel, ...]:
+    """Return the channels of an animation, with a warning if its range is another."""
+    channels = read_channels(document, targets, animation)
+    start, end = declared
+    first = min((float(channel.times[0]) for channel in channels), default=start)
+    last = max((float(channel.times[-1]) for channel in channels), default=end)
+    if max(abs(first - start), abs(last - end)) > _SAME_TIME:
+        animation.warn("G005.range", "samplers", start=start, end=end, first=first, last=last)
+    return channels
 
 
 def _plain_channels(

@@ -18,6 +18,8 @@ __all__ = ["Element", "Table", "pointer_to"]
 
 Choice = TypeVar("Choice", int, str)
 
+_BEYOND = 1 << 64  # whole numbers that no file can mean
+
 
 def pointer_to(base: str, *keys: str | int) -> str:
     """Return the JSON pointer of a member (RFC 6901).
@@ -25,8 +27,11 @@ def pointer_to(base: str, *keys: str | int) -> str:
     >>> pointer_to("/nodes/3", "extensions", "a/b")
     '/nodes/3/extensions/a~1b'
     """
-    escaped = (str(key).replace("~", "~0").replace("/", "~1") for key in keys)
-    return "/".join((base, *escaped))
+    for key in keys:
+        if type(key) is str and ("/" in key or "~" in key):
+            key = key.replace("~", "~0").replace("/", "~1")
+        base = f"{base}/{key}"
+    return base
 
 
 class Element:
@@ -82,7 +87,7 @@ class Element:
             return default
         if type(value) is float and value.is_integer():
             value = int(value)
-        if type(value) is not int or value < 0:
+        if type(value) is not int or not 0 <= value < _BEYOND:
             raise self.wrong(name, "a whole number of at least 0")
         return value
 
@@ -243,7 +248,7 @@ class Element:
     def _wrong_index(self, name: str, place: int, item: Any, count: int, what: str) -> FormatError:
         """Return the exception for an item that is not a valid index."""
         pointer = self.at(name, place)
-        if type(item) is int and item >= 0:
+        if type(item) is int and 0 <= item < _BEYOND:
             return self.source.fault("F002.gltf-index", pointer, what=what, count=count, found=item)
         wanted = "a whole number of at least 0"
         return self.source.fault("F002.gltf-type", pointer, wanted=wanted, found=describe(item))
