@@ -61,6 +61,10 @@ golden: $(READY) system
 manual: $(READY)
 	@$(BIN)/python tests/manual/reference.py
 
+# Draws the pictures of README and manual anew, from bundled data.
+gallery: $(READY) system
+	@$(BIN)/python assets/make_gallery.py
+
 # Makes the bundled figures and the studio anew; they need scipy and scikit-image beside the rest.
 figure: $(READY)
 	@$(BIN)/pip install --quiet scipy scikit-image xatlas

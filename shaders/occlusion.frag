@@ -1,7 +1,7 @@
 #version 330
 // Ambient occlusion in screen space from the horizons around each pixel (Jimenez et al. 2016, GTAO).
 
-uniform sampler2D u_geometry;   // unit normal and z, camera space; z is 0 where nothing is
+uniform sampler2D u_geometry;   // unit normal and z, camera space; z is 0 in the background
 uniform vec4 u_unproject;       // camera x and y at depth 1, or at any depth: scale and shift of pixels
 uniform bool u_orthographic;
 uniform float u_radius;         // scene units

@@ -8,6 +8,13 @@ uniform int u_item;     // number of the draw call, from 1
 
 out ivec4 f_id;         // draw call, instance, triangle, bits of the camera-space z
 
+#ifdef MATERIALS
+#pragma include surface
+#endif
+
 void main() {
+#ifdef MATERIALS
+    cut_out(FAINTEST);
+#endif
     f_id = ivec4(u_item, v_instance, gl_PrimitiveID, floatBitsToInt(v_position.z));
 }

@@ -17,7 +17,7 @@ from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import scene_box
 
 BESIDE = MotionSettings(drives=False)
-GUESS = "taken for centimetres (skeleton 170 high)"
+GUESS = "centimetres assumed (skeleton 170 high)"
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_bvh_with_figures_that_look_like_metres(bvh, scale, word):
     scene = load(*fox, bvh(scale))
     assert [actor.figure.name for actor in scene.actors] == ["fox", "walk"]
     assert units(scene) == ["", "m"]
-    assert f"taken for {word}" in scene.warnings[-1] and "scaled to metres" in scene.warnings[-1]
+    assert f"{word} assumed" in scene.warnings[-1] and "scaled to metres" in scene.warnings[-1]
     assert_allclose(places(scene.actors[1]), PERSON_TURNED, rtol=0, atol=1e-12)
 
 
@@ -126,7 +126,7 @@ def test_a_requested_up_axis_is_not_guessed(bvh):
     for number in ("-0.400000", "-0.450000", "0.600000", "0.200000"):
         text = text.replace(f"0.000000 {number} 0.000000", f"0.000000 0.000000 {number}")
     path = bvh(text=text)
-    note = "z taken for up: the head is above the feet along z"
+    note = "z up assumed: the head is above the feet along z"
     assert f"{path}: {note}; --up overrides it" in load(path).warnings
     asked = load(path, motion=MotionSettings(up="z"))
     assert asked.up == "z" and asked.warnings == ()
@@ -139,7 +139,7 @@ def test_bvh_drives_the_model(bvh):
     assert [actor.figure.name for actor in named.actors] == ["body"]
     assert named.warnings == among.warnings
     assert any("walk drives 6 of 24 joints of body" in text for text in named.warnings)
-    assert not any("taken for" in text for text in named.warnings)
+    assert not any("assumed (skeleton" in text for text in named.warnings)
     one, other = named.actors[0].clip, among.actors[0].clip
     assert np.array_equal(one.rotations, other.rotations)
     assert np.array_equal(one.figure_translations, other.figure_translations)

@@ -22,6 +22,7 @@ RATE = 30.0
 N_FRAMES = 61
 IMAGE = 20  # frame of the capture that has images
 _SIZE, _FOCAL = (480, 270), 330.0
+_RADIUS = 2.5  # distance of the cameras from the middle, metres
 _LENS = (-0.22, 0.03)
 _ANGLES = (-62.0, 8.0, 75.0, 165.0)  # azimuths of the cameras around the people, degrees
 
@@ -53,8 +54,8 @@ def _make_capture(folder: Path, body: Figure) -> None:
     write_frames(folder, body, people, with_points=True)
     views = []
     for number, angle in enumerate(np.radians(_ANGLES), start=1):
-        eye = 3.1 * np.sin(angle), 1.7, 3.1 * np.cos(angle)
-        views.append(camera_at(f"{number:02}", eye, (0.0, 0.9, 0.0), _SIZE, _FOCAL, _LENS))
+        eye = _RADIUS * np.sin(angle), 1.5, _RADIUS * np.cos(angle)
+        views.append(camera_at(f"{number:02}", eye, (0.0, 0.82, 0.0), _SIZE, _FOCAL, _LENS))
     write_cameras(folder, views)
     scene = load(folder, motion=MotionSettings(model=bundled_body(), up="y"))
     for actor in scene.actors:

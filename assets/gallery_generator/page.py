@@ -12,10 +12,10 @@ _HEAD = """<!-- Written by assets/make_gallery.py: make gallery -->
 
 # Gallery
 
-Pictures from bundled data alone, and the commands that drew them, with the options
+Pictures of bundled data only, and the commands that drew them, with the options
 `{common}`. `make gallery` draws them again, and
-fails if 0.1 % of the pixels are burnt or black. `walk` and `capture` are synthetic recordings in
-EasyMocap's layout, `scan.obj` a person without a rig, `body.npz` the bundled body;
+fails if 0.1 % of the pixels are overexposed or black. `walk` and `capture` are synthetic recordings
+in EasyMocap's layout, `scan.obj` a person without a rig, `body.npz` the bundled body;
 `assets/gallery_generator/` makes them.
 """
 _WIDTH = 96

@@ -82,15 +82,14 @@ def _draw_finding() -> Bytes:
     _lower_arms(actor)
     scene = Scene([actor])
     finding = next(f for f in lint_scene(scene) if f.code in ("W004", "W005"))
-    options = _options(grid=False)
+    options = _options()
     places = places_of(finding, scene, options.skinning)
-    points = scene_points(scene)
-    camera = Camera(azimuth=25.0, inclination=12.0)
-    fit(camera, points[points[:, 1] > -0.4], 1.6)
+    camera, size = Camera(azimuth=32.0, inclination=12.0), (600, 800)
+    fit(camera, scene_points(scene), size[0] / size[1])
     with Offscreen() as offscreen:
         vertices = places.vertices
         offscreen.renderer.marks = Marks(vertices, np.full(len(vertices), 3.0))
-        return offscreen.render(scene, (800, 500), camera, options, scene_box(scene))
+        return offscreen.render(scene, size, camera, options, scene_box(scene))
 
 
 def _lower_arms(actor: Actor) -> None:
@@ -106,11 +105,10 @@ def _draw_knee() -> Bytes:
     _bend(actor)
     scene = Scene([actor])
     options = _options(shading="scalar", scalar="weight:left_knee", legend=True, grid=False)
-    camera = Camera(azimuth=62.0, inclination=8.0)
-    points = scene_points(scene)
-    fit(camera, points[points[:, 1] < -0.05], 1.4)
+    camera, size = Camera(azimuth=62.0, inclination=8.0), (840, 960)
+    fit(camera, scene_points(scene), size[0] / size[1])
     with Offscreen() as offscreen:
-        return offscreen.render(scene, (700, 500), camera, options, scene_box(scene))
+        return offscreen.render(scene, size, camera, options, scene_box(scene))
 
 
 def _draw_influences() -> Bytes:
@@ -131,9 +129,10 @@ def _draw_influences() -> Bytes:
     scene = Scene(actors)
     options = _options(shading="scalar", scalar="field:difference", legend=True, grid=False)
     camera = Camera(azimuth=20.0, inclination=8.0)
-    fit(camera, scene_points(scene), 1.6)
+    size = 1200, 750
+    fit(camera, scene_points(scene), size[0] / size[1])
     with Offscreen() as offscreen:
-        return offscreen.render(scene, (800, 500), camera, options, scene_box(scene))
+        return offscreen.render(scene, size, camera, options, scene_box(scene))
 
 
 def _bend(actor: Actor) -> None:
@@ -176,46 +175,50 @@ PICTURES: dict[str, Picture] = {
         "A contact sheet",
         "The same walk in cells with frame numbers, at one scale and with one ground line.",
         ("viewer render walk --model body.npz --contact-sheet 6 --frames 0:28 --azimuth -75",),
-        size=(900, 270),
+        size=(1350, 405),
     ),
     "capture": Picture(
         "A capture",
         "Two people fitted to keypoints, and the calibrated cameras with their images.",
         (f"viewer render capture --model body.npz --frame {IMAGE} --cameras --azimuth 35",),
-        size=(760, 460),
+        size=(1140, 690),
     ),
     "view": Picture(
         "Through a camera",
         "The same frame through camera 02: its image, without the lens distortion, dimmed behind "
         "the fitted bodies.",
-        (f"viewer render capture --model body.npz --frame {IMAGE} --view 02 --xray",),
-        size=(800, 450),
+        (
+            f"viewer render capture --model body.npz --frame {IMAGE} --view 02 --xray "
+            "--image-brightness 0.9",
+        ),
+        size=(960, 540),
     ),
     "knee": Picture(
         "The weights of a joint",
-        "How much the left knee moves each vertex, with lines at every tenth.",
+        "Influence of the left knee on each vertex, with isolines at every tenth.",
         draw=_draw_knee,
         has_data=True,
     ),
     "finding": Picture(
         "A finding of lint",
-        "Vertices of the forearm without weights stay where the skin was bound. Lint names them; "
+        "Vertices of the forearm without weights stay in the bind pose. Lint lists them; "
         "the Lint panel marks them in the view.",
         draw=_draw_finding,
         has_data=True,
     ),
     "scan": Picture(
         "A mesh without a rig",
-        "A person of another shape, as a scanner leaves it.",
+        "A person of another shape, as scanned.",
         ("viewer render scan.obj",),
         size=(420, 560),
     ),
     "rigged": Picture(
         "The same mesh, rigged",
-        "With the skeleton and the weights of the bundled body, in a pose of its own.",
+        "With the skeleton and the weights of the bundled body, in a different pose.",
         (
             "viewer rig scan.obj --from body -o scan.npz",
-            "viewer render scan.npz --show both --dof left_hip.x=-50deg --dof left_knee.x=70deg",
+            "viewer render scan.npz --show both --dof left_hip.x=-40deg --dof left_knee.x=65deg "
+            "--dof left_shoulder.z=-55deg --dof right_shoulder.z=55deg",
         ),
         size=(420, 560),
     ),

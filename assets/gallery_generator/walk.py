@@ -64,7 +64,7 @@ def walk(body: Figure, n_frames: int, rate: float, gait: Gait) -> Walk:
     Parameters
     ----------
     body : Figure
-        With SMPL's joints, +Y up, facing +Z.
+        Figure with SMPL's joints, +Y up, facing +Z.
     n_frames : int
         Number of frames.
     rate : float

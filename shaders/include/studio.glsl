@@ -1,10 +1,10 @@
-// The light of the studio around the scene; assets/make_studio.py generates it.
+// Image-based lighting by the studio; assets/make_studio.py generates the maps.
 
 uniform sampler2DArray u_studio;    // octahedral maps; the last layer is irradiance / pi
 uniform mat3 u_to_studio;           // camera space to the studio's: +y up, +z towards the camera
 uniform float u_studio_strength;
 
-const float STUDIO_SIZE = 128.0;    // texels of a side, and a border of one
+const float STUDIO_SIZE = 128.0;    // texels per side, with a border of one texel
 const float STUDIO_ROUGH = 7.0;     // layer of roughness 1
 
 // Octahedral coordinates of a direction (Cigolle et al. 2014), +y in the middle.

@@ -51,6 +51,14 @@ float surface_alpha() {
     return 1.0;
 }
 
+const float FAINTEST = 0.05;    // largest alpha of blended surfaces that counts as invisible
+
+// Discards masked fragments, and blended ones whose alpha is not larger than this.
+void cut_out(float alpha) {
+    if (surface_alpha() <= alpha)
+        discard;
+}
+
 // A normal perturbed by the normal map. The tangents are those of the screen's derivatives
 // (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
 vec3 mapped_normal(vec3 position, vec3 normal) {

@@ -14,11 +14,11 @@ vec3 category_color(float number) {
     return column < 0 ? u_nothing : texelFetch(u_colormap, ivec2(column, 0), 0).rgb;
 }
 
-// Colour of the category with the largest barycentric weight here. Interpolated numbers would be
-// other categories.
+// Colour of the category with the largest barycentric weight here. Interpolating the numbers would
+// give other categories.
 vec3 category() {
     bvec3 same = equal(v_corners.xyz, v_corners.yzx);  // first and second, second and third, …
-    vec3 w = v_barycentric;  // summed over corners of equal category
+    vec3 w = v_barycentric;  // summed over corners of the same category
     w += mix(vec3(0.0), v_barycentric.yzx, same);
     w += mix(vec3(0.0), v_barycentric.zxy, same.zxy);
     int best = w.x >= w.y ? (w.x >= w.z ? 0 : 2) : (w.y >= w.z ? 1 : 2);

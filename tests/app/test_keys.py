@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from app.tiny import FILE_POSE
 from imgui_bundle import imgui
 from PIL import Image
 
+import viewer.app
 from viewer.app.features import KEYS
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
@@ -51,6 +55,17 @@ def test_k_toggles_the_bind_pose(hand):
     hand.key("k")
     assert hand.state.options.show == "skin"
     assert (hand.scene_picture() == attached).all()
+
+
+def test_keys_named_in_the_interface_are_in_the_table():
+    labels = {key.label for key in KEYS} | {"", "Alt+click"}
+    used = set()
+    for path in Path(viewer.app.__file__).parent.rglob("*.py"):
+        text = path.read_text("utf-8")
+        used |= set(re.findall(r'key_name\(state, "([^"]+)"\)', text))
+        used |= set(re.findall(r'with_key\(state, [^()]+, "([^"]+)"\)', text))
+        used |= set(re.findall(r'menu_item\(state, f?"[^"]+", "([^"]*)"', text))
+    assert len(used) > 20 and used <= labels
 
 
 @pytest.mark.parametrize("key", OPTION_KEYS)

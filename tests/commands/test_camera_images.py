@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from formats.capture_files import points, write_frames
+from formats.filmed_capture import CENTER, SIDE, write_filmed
 from PIL import Image
 
 import viewer
@@ -14,36 +14,11 @@ from viewer.rendering.overlay.frusta import frustum_corners
 pytestmark = pytest.mark.slow
 
 _QUICK = ("--quality", "draft", "--force")
-K1 = 0.2
-SIDE = 101  # pixels of the cameras' images
-CENTER = 50.0
-FOCAL = 100.0
-
-
-def matrix(key, rows, columns, data):
-    head = f"{key}: !!opencv-matrix\n  rows: {rows}\n  cols: {columns}\n  dt: d\n"
-    return f"{head}  data: [{data}]\n"
 
 
 @pytest.fixture
 def recording(tmp_path):
-    """One camera at (0, -5, 0) that looks along +y, z up; images of frames 0 and 2."""
-    folder = tmp_path / "take"
-    write_frames(folder / "keypoints3d", {frame: [points(0)] for frame in range(3)})
-    head = '%YAML:1.0\n---\nnames: [ "01" ]\n'
-    lens = f"{FOCAL}, 0., {CENTER}, 0., {FOCAL}, {CENTER}, 0., 0., 1."
-    inner = matrix("K_01", 3, 3, lens) + matrix("dist_01", 1, 5, f"{K1}, 0., 0., 0., 0.")
-    (folder / "intri.yml").write_text(f"{head}{inner}H_01: {SIDE}\nW_01: {SIDE}\n")
-    outer = matrix("Rot_01", 3, 3, "1., 0., 0., 0., 0., -1., 0., 1., 0.")
-    (folder / "extri.yml").write_text(head + outer + matrix("T_01", 3, 1, "0., 0., 5."))
-    images = folder / "images" / "01"
-    images.mkdir(parents=True)
-    for number in (0, 2):
-        pixels = np.full((SIDE, SIDE, 3), 100 + 50 * number, dtype=np.uint8)
-        # The lens draws the direction (0.4, 0), ideal pixel 90, at 0.4 (1 + k1 0.16) = 0.4128.
-        pixels[:, 91:92] = 0
-        Image.fromarray(pixels).save(images / f"{number:06}.png")
-    return folder
+    return write_filmed(tmp_path / "take")
 
 
 def drawn(recording, out, *options):

@@ -83,7 +83,7 @@ def test_keypoints_alone_are_not_joint_motion(keypoints, tmp_path, capsys, argum
     assert convert(keypoints, "-o", tmp_path / name, *others) == 2
     assert capsys.readouterr().err == (
         "viewer: there are only keypoints: a motion of joints cannot be written "
-        "(.npz holds points)\n"
+        "(.npz stores points)\n"
     )
     assert not [*tmp_path.glob("m*")]
 
@@ -140,8 +140,7 @@ def test_untracked_people_have_unique_names(recording, tmp_path, capsys):
     assert names == ["w-3.bvh", "w-untracked-2.bvh", "w-untracked.bvh"]
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1] == (
-        "w-untracked.bvh, w-untracked-2.bvh: without a track, "
-        "possibly a different person in each frame"
+        "w-untracked.bvh, w-untracked-2.bvh: not tracked, possibly a different person in each frame"
     )
     assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # whoever has a track comes first
 

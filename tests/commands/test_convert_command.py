@@ -312,7 +312,7 @@ def test_actor_that_cannot_be_written_reverts_the_others(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("out", "code", "message"),
     [
-        ("x.fbx", 2, f'no exporter for ".fbx"; there are: {SUFFIXES}'),
+        ("x.fbx", 2, f'no exporter for ".fbx"; supported: {SUFFIXES}'),
         ("x", 2, NO_MEMBER),
         ("missing/x.obj", 5, "{folder}/missing/x.obj: the folder {folder}/missing does not exist"),
         (

@@ -218,7 +218,7 @@ REFUSED = {
     "suffix": (
         ["-o", "{tmp}/x.glb"],
         2,
-        'viewer: a rigged mesh cannot be written as ".glb"; there are: .skel (with .skin, .obj and '
+        'viewer: a rigged mesh cannot be written as ".glb"; supported: .skel (with .skin, .obj and '
         "the target's pose as .json), .npz",
     ),
     "folder": (

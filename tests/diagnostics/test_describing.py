@@ -28,6 +28,7 @@ def test_a_diagnostic_describes_all_its_data() -> None:
         "part": "weights",
         "places": [3, 7],
         "n_places": 2,
+        "pointer": "",
         "count": 2,
         "values": {"n": 2, "joint": "hip", "weight": -0.5, "vertex": 7},
     }
@@ -58,3 +59,9 @@ def test_long_location_lists_are_truncated_but_counted() -> None:
     found = Diagnostic("C013.no-height", part="joints", places=np.arange(300, dtype=np.int32))
     told = described(found)
     assert told["places"] == list(range(100)) and told["n_places"] == 300
+
+
+def test_a_json_pointer_is_the_place_of_a_diagnostic() -> None:
+    found = Diagnostic("F002.unknown-folder", Path("a.glb"), pointer="/skins/0/joints/3")
+    assert found.place == "a.glb#/skins/0/joints/3"
+    assert described(found)["pointer"] == "/skins/0/joints/3"

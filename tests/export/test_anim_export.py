@@ -177,7 +177,7 @@ def test_placement_moves_the_root_and_leftovers_are_reported(tmp_path):
     assert [channel.values.tolist() for channel in again.channels[:3]] == [
         [0.5, 1.0], [1.0, 2.0], [1.5, 3.0]]  # fmt: skip
     assert notes[3:] == [
-        ".anim cannot hold the figure's scale of 2, which is omitted",
+        ".anim cannot store the figure's scale of 2, which is omitted",
         ".anim translates only the root: translations of other joints, up to 0.5 "
         "units, are omitted",
     ]

@@ -67,8 +67,8 @@ def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
     motion = family_motion(COUNTS[kind], shape=shape)
     frames, notes = written(family_animation(family(kind), motion), tmp_path / "out", world_up="z")
     assert notes == [
-        f"{tmp_path}/out/smpl: 4 frames of 1 person, z up; EasyMocap stores no frame rate: it is "
-        "50 fps"
+        f"{tmp_path}/out/smpl: 4 frames of 1 person, z up; EasyMocap does not store the "
+        "frame rate of 50 fps"
     ]
     assert list(frames) == [0, 1, 2, 3]
     for frame, people in frames.items():
@@ -205,7 +205,7 @@ def test_other_files_are_never_deleted(family, tmp_path):
     with pytest.raises(OutputError) as caught:
         written(animation, tmp_path)
     assert str(caught.value) == (
-        f"{tmp_path}/smpl: holds files other than frames (000000.jpg) and is not replaced"
+        f"{tmp_path}/smpl: contains files other than frames (000000.jpg) and is not replaced"
     )
     assert [path.name for path in tmp_path.rglob("*")] == ["smpl", "000000.jpg"]
 
@@ -261,7 +261,7 @@ def test_people_must_be_compatible(family, tmp_path):
             easymocap.export_animations(animations, tmp_path / "out", MotionOptions(), persons)
         assert str(caught.value).replace(f"{animation.name}:", "walk:") == message
     nobody = replace(animation, frames=replace(animation.frames, present=np.zeros(4, dtype=bool)))
-    with pytest.raises(RigError, match=r"every frame is missing, there is nothing to write$"):
+    with pytest.raises(RigError, match=r"every frame is missing: there is nothing to write$"):
         easymocap.export_animations([nobody], tmp_path / "out", MotionOptions())
     assert not list(tmp_path.iterdir())
 

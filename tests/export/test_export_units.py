@@ -28,7 +28,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.smpl_family import FAMILY
 
-GUESS = "taken for centimetres (skeleton 170 high); --unit overrides it"
+GUESS = "centimetres assumed (skeleton 170 high); --unit overrides it"
 TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # y up to z up
 
 

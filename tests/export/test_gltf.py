@@ -89,7 +89,7 @@ def test_fox_positions_match_skinning(tmp_path):
         "metres",
         f"up to {counts.max()} influences per vertex, all of them written, strongest first: "
         f"programs that read only JOINTS_0 have errors of up to {percent:.3g} % of the size",
-        "not held by glTF: limits of joints",
+        "not stored in glTF: limits of joints",
     ]
 
 
@@ -110,8 +110,8 @@ def test_body_is_baked_in_shape_and_pose(tmp_path):
         "the shape is baked into mesh and joints",
         f"{tmp_path}/out.glb: vertices differ from the pose by up to {1000 * off.max():.3g} mm "
         f"(vertex {off.argmax()}): pose correctives are not supported",
-        "not held by glTF: 10 blend shapes as such, pose correctives, the symmetry map, the joint "
-        "regressor",
+        "not stored in glTF: 10 blend shapes (baked into the mesh), pose correctives, "
+        "the symmetry map, the joint regressor",
     ]
     # The placement is a node above the skeleton, and moves nothing else.
     node = gltf.nodes[gltf.named(actor.figure.name)]
@@ -203,7 +203,7 @@ def test_morphs_are_targets(tmp_path):
     assert gltf.accessor(target["POSITION"]).tolist()[1] == [0, 0, 2]
     # The normal (0, 3, 4) is normalised, so it and its morph offset are divided by 5.
     assert_allclose(gltf.accessor(target["NORMAL"])[1], [0, -0.6, -0.6], rtol=0, atol=EXACT)
-    assert notes[1:] == ["2 blend shapes are morph targets", "not held by glTF: 1 blend shape"]
+    assert notes[1:] == ["2 blend shapes are morph targets", "not stored in glTF: 1 blend shape"]
 
 
 def test_too_many_morphs_are_baked_in(tmp_path):
@@ -215,7 +215,7 @@ def test_too_many_morphs_are_baked_in(tmp_path):
     assert_drawn(gltf, actor.figure, actor.pose)
     assert "targets" not in gltf.primitives[0]
     assert notes[1] == "the shape is baked into mesh and joints"
-    assert notes[2] == "not held by glTF: 65 blend shapes as such"
+    assert notes[2] == "not stored in glTF: 65 blend shapes (baked into the mesh)"
 
 
 def test_skeleton_alone(tmp_path):

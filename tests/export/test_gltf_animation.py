@@ -28,7 +28,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning, deform
 
-LIMIT = "not held by glTF"
+LIMIT = "not stored in glTF"
 ROOM = 3e-5  # metres: keys in single precision, accumulated along a body's longest chain
 
 
@@ -212,8 +212,8 @@ def test_body_with_correctives_and_shape(tmp_path):
         "the shape is baked into mesh and joints",
         f"{tmp_path}/out.glb: vertices differ from the motion by up to {1000 * np.max(errors):.3g} "
         f"mm (vertex {vertex}, frame {frame}): pose correctives are not supported",
-        f"{LIMIT}: 10 blend shapes as such, pose correctives, the symmetry map, the joint "
-        "regressor",
+        f"{LIMIT}: 10 blend shapes (baked into the mesh), pose correctives, the symmetry map, the "
+        "joint regressor",
     ]
 
 
@@ -313,7 +313,7 @@ def test_invalid_animations_are_refused(tmp_path):
             write(tmp_path, animation, **options)
         assert str(caught.value) == message
 
-    text = "roof: every frame is missing, there is nothing to write"
+    text = "roof: every frame is missing: there is nothing to write"
     refused(roof_animation(rows=[-1, -1]), text)
     refused(roof_animation(), 'unit of glTF: expected m, found "cm"', unit="cm")
     refused(roof_animation(), 'up axis of glTF: expected y, found "z"', up="z")

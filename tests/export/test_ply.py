@@ -16,6 +16,7 @@ from seamed import (
     seamed_mesh,
 )
 
+from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.export import export
 from viewer.rig.figure import Figure
@@ -90,8 +91,10 @@ def test_posed_vertices_are_written(tmp_path):
 
 def test_textures_are_left_out(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
-    write(tmp_path, seamed_actor(mesh=mesh))
+    notes = export(seamed_actor(mesh=mesh), tmp_path / "out.ply")
     assert [path.name for path in tmp_path.iterdir()] == ["out.ply"]
+    values = {"format": ".ply", "parts": [Phrase("part-all-materials")]}
+    assert [(note.key, note.values) for note in notes[1:]] == [("X003.parts", values)]
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "end_header\n", "é\udcff 文", "", "x" * 5000, "\r"])

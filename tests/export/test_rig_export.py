@@ -309,13 +309,13 @@ def refused(actor, folder, error=RigError):
 def test_other_orders_of_rotation_are_refused(tmp_path):
     joints = skeleton([-1, 0], [(0, "x", 0), (1, "z", 0), (1, "x", 0)], names=["hip", "knee"])
     assert refused(Actor(Figure("a", skeleton=joints)), tmp_path) == (
-        ".skel rotates joints about x, then y, then z; joint knee has another rotation order"
+        ".skel rotates joints about x, then y, then z; joint knee has a different rotation order"
     )
 
 
 def test_two_rotations_about_one_axis_are_refused(tmp_path):
     joints = skeleton([-1], [(0, "x", 0), (0, "x", 0)], names=["hip"])
-    assert "joint hip has another rotation order" in refused(
+    assert "joint hip has a different rotation order" in refused(
         Actor(Figure("a", skeleton=joints)), tmp_path
     )
 
@@ -326,20 +326,20 @@ def test_rest_rotations_are_refused(tmp_path):
     turned = joints.rest_rotations.copy()
     turned[1] = matrix_to_quaternion(about_z[None])[0]
     actor = Actor(Figure("a", skeleton=replace(joints, rest_rotations=turned)))
-    assert refused(actor, tmp_path) == ".skel cannot hold the rest rotation of joint knee"
+    assert refused(actor, tmp_path) == ".skel cannot store the rest rotation of joint knee"
 
 
 def test_scaled_joints_are_refused(tmp_path):
     actor = seamed_actor()
     actor.pose.scales[1] = 1, 1, 1.5
-    assert refused(actor, tmp_path) == ".skel cannot hold the scale of joint tip"
+    assert refused(actor, tmp_path) == ".skel cannot store the scale of joint tip"
 
 
 def test_nonzero_joint_translations_below_the_root_are_refused(tmp_path):
     joints = skeleton([-1, 0], [(1, "ty", 0)], names=["hip", "knee"])
     actor = Actor(Figure("a", skeleton=joints))
     actor.pose.dofs[0] = 1e-3
-    assert refused(actor, tmp_path) == ".skel cannot hold a translation of joint knee"
+    assert refused(actor, tmp_path) == ".skel cannot store a translation of joint knee"
     actor.pose.dofs[0] = 0
     export(actor, tmp_path / "rig.skel")
     assert names(tmp_path) == ["rig.skel"]

@@ -44,7 +44,7 @@ def test_rigged_file_names():
     with pytest.raises(UnsupportedFormatError) as caught:
         files_of(Path("b.fbx"))
     assert str(caught.value) == (
-        'a rigged mesh cannot be written as ".fbx"; there are: .skel (with .skin, .obj and '
+        'a rigged mesh cannot be written as ".fbx"; supported: .skel (with .skin, .obj and '
         "the target's pose as .json), .npz"
     )
 

@@ -113,7 +113,7 @@ def test_a_texture_from_outside_is_not_read(folder, kind, name):
     assert (warning.path, fault_of(warning)) == (named, fault)
 
 
-@pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
+@pytest.mark.parametrize("kind", ["skin", "ply"])
 def test_an_absolute_path_is_reported_even_within_the_folder(folder, kind):
     path, named, line = write_model(folder, kind, f"{folder}/in.png")
     source = Source.open(path)
@@ -121,6 +121,16 @@ def test_an_absolute_path_is_reported_even_within_the_folder(folder, kind):
     (warning,) = source.diagnostics
     values = {"name": f"{folder}/in.png", "reason": Phrase("absolute-path")}
     assert (warning.path, fault_of(warning)) == (named, ("F005.texture-refused", line, values))
+
+
+def test_a_library_with_an_absolute_path_gets_the_image_beside_it_and_says_so(folder):
+    path, named, line = write_model(folder, "obj", "/home/elsewhere/in.png")
+    source = Source.open(path)
+    (material,) = read(source).mesh.materials
+    assert (material.texture, material.image.tolist()) == ("in.png", [[[9, 8, 7, 255]]])
+    (warning,) = source.diagnostics
+    values = {"name": "/home/elsewhere/in.png", "used": "in.png"}
+    assert (warning.path, fault_of(warning)) == (named, ("F005.mtl-moved", line, values))
 
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])

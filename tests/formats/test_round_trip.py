@@ -1,5 +1,7 @@
 """Round trips of all writers, and refusal of content that a format cannot store."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from formats.round_trips import (
@@ -12,6 +14,7 @@ from formats.round_trips import (
     skeleton,
 )
 
+from viewer.diagnostics import Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats import Source, skel, skin, write
 from viewer.rig.figure import Figure
@@ -200,8 +203,8 @@ def test_skeleton_with_fewer_dofs_is_refused(tmp_path):
             {"triangles": np.zeros((0, 3), np.int32)},
             "figure a has no triangles to write as .skin",
         ),
-        ({"positions": np.full((3, 3), 1e39)}, ".skin cannot hold numbers beyond 3.4e+38"),
-        ({"uvs": np.full((3, 2), -1e39)}, ".skin cannot hold numbers beyond 3.4e+38"),
+        ({"positions": np.full((3, 3), 1e39)}, ".skin cannot store numbers beyond 3.4e+38"),
+        ({"uvs": np.full((3, 2), -1e39)}, ".skin cannot store numbers beyond 3.4e+38"),
         (
             {
                 "materials": (Material("x"), Material("y")),
@@ -220,31 +223,31 @@ def test_skeleton_with_fewer_dofs_is_refused(tmp_path):
         ),
         (
             {"materials": (Material("a{", Texture("b.png")),)},
-            '.skin cannot hold the material "a{" with the texture "b.png"',
+            '.skin cannot store the material "a{" with the texture "b.png"',
         ),
         (
             {"materials": (Material("my normals", Texture("b.png")),)},
-            '.skin cannot hold the material "my normals" with the texture "b.png"',
+            '.skin cannot store the material "my normals" with the texture "b.png"',
         ),
         (
             {"materials": (Material("a", Texture("b}.png")),)},
-            '.skin cannot hold the material "a" with the texture "b}.png"',
+            '.skin cannot store the material "a" with the texture "b}.png"',
         ),
         (
             {"materials": (Material("a", Texture(" b.png")),)},
-            '.skin cannot hold the material "a" with the texture " b.png"',
+            '.skin cannot store the material "a" with the texture " b.png"',
         ),
         (
             {"materials": (Material("a", Texture("b\nc.png")),)},
-            '.skin cannot hold the material "a" with the texture "b\\nc.png"',
+            '.skin cannot store the material "a" with the texture "b\\nc.png"',
         ),
         (
             {"materials": (Material("a", Texture("")),)},
-            '.skin cannot hold the material "a" with the texture ""',
+            '.skin cannot store the material "a" with the texture ""',
         ),
         (
             {"materials": (Material("\ud800", Texture("\ud800")),)},
-            '.skin cannot hold the material "\\ud800" with the texture "\\ud800"',
+            '.skin cannot store the material "\\ud800" with the texture "\\ud800"',
         ),
     ],
 )
@@ -259,7 +262,7 @@ def test_weights_beyond_float32_are_refused(tmp_path):
     heavy = skin_from_lists([[(0, 1e39)], [], []], np.eye(4)[None])
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", mesh(), skin=heavy), tmp_path / "a.skin")
-    assert str(caught.value) == ".skin cannot hold numbers beyond 3.4e+38"
+    assert str(caught.value) == ".skin cannot store numbers beyond 3.4e+38"
 
 
 def test_parts_that_a_figure_lacks_cannot_be_written(tmp_path):
@@ -281,3 +284,28 @@ def test_unknown_suffix_cannot_be_written(tmp_path):
 def test_suffix_in_capitals_is_written(tmp_path):
     write(Figure("a", mesh()), tmp_path / "A.SKIN")
     assert (tmp_path / "A.SKIN").read_text().startswith("positions 3 {\n")
+
+
+def test_properties_of_materials_that_skin_omits_are_named(tmp_path):
+    plain = Material("a", Texture("a.png", np.full((1, 1, 4), 255, np.uint8)))
+    figure = Figure("a", mesh(uvs=np.zeros((3, 2)), materials=(plain,), triangle_materials=[0]))
+    assert write(figure, tmp_path / "a.skin") == []
+    tinted = replace(plain, base_color=(1.0, 0.0, 0.0, 1.0), alpha_mode="mask")
+    shape = replace(figure.mesh, materials=(tinted,), second_uvs=np.ones((3, 2)))
+    (note,) = write(Figure("a", shape), tmp_path / "a.skin")
+    parts = [Phrase("part-materials"), Phrase("part-second-uvs")]
+    assert (note.key, note.values) == ("X003.parts", {"format": ".skin", "parts": parts})
+
+
+def test_texture_seams_are_split(tmp_path):
+    """Three vertices, two triangles; vertices 0 and 2 have other coordinates in the second one."""
+    uvs = np.arange(10.0).reshape(5, 2)
+    shape = mesh(triangles=[[0, 1, 2], [0, 2, 1]], uvs=uvs, uv_triangles=[[0, 1, 2], [3, 4, 1]])
+    weights = skin_from_lists([[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(1, 1.0)]], [np.eye(4)] * 2)
+    (note,) = write(Figure("a", shape, skin=weights), tmp_path / "a.skin")
+    assert (note.key, note.values) == ("X005.seams", {"before": 3, "after": 5})
+    found = skin.read(Source.open(tmp_path / "a.skin"))
+    assert np.array_equal(found.mesh.uvs[found.mesh.triangles], uvs[shape.uv_triangles])
+    corners = found.mesh.positions[found.mesh.triangles]
+    assert np.array_equal(corners, shape.positions[shape.triangles])
+    assert found.skin.weights.tolist() == [1.0, 1.0, 0.5, 0.5, 1.0, 1.0]

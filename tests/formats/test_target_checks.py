@@ -79,7 +79,7 @@ def test_folders_are_checked(tmp_path, old):
 def test_read_only_folder_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
     target = tmp_path / "x"
-    assert refused([target]) == f"{target}: the folder {tmp_path} cannot be written to"
+    assert refused([target]) == f"{target}: the folder {tmp_path} is not writable"
 
 
 def test_devices_are_never_replaced_and_need_no_force(tmp_path):

@@ -163,7 +163,7 @@ def options() -> str:
         for group in command_parser(command)._action_groups:
             for action in group._group_actions:
                 if action.dest != "help":
-                    row = _names(action), action.help or ""
+                    row = _names(action), (action.help or "").replace("%%", "%")
                     rows = groups.setdefault(_title(group), {})
                     rows.setdefault(row, []).append(command)
     return "\n".join(

@@ -14,7 +14,7 @@ from viewer.rendering.bounds import Bounds
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rendering.quality_limits import limit_passes
+from viewer.rendering.quality_limits import limit_passes, time_note
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skinning import deform
@@ -180,7 +180,7 @@ def test_spheres_of_joints_contain_all_vertices(seed):
 
 
 def test_software_draws_fewer_passes_of_large_pictures(offscreen):
-    """8.3 megapixels take an estimated 0.85 s per pass: only 2 of 8 passes would be too few."""
+    """8.3 megapixels are 0.85 units of work per pass: only 2 of 8 passes would be too few."""
     scene = Scene([])
     found = {}
     for size in ((640, 480), (2400, 1800), (3840, 2160), (8000, 8000)):
@@ -195,3 +195,18 @@ def test_software_draws_fewer_passes_of_large_pictures(offscreen):
         (3840, 2160): ("normal", 8, 1),
         (8000, 8000): ("normal", 8, 1),
     }
+
+
+def test_the_time_of_a_pass_is_measured_once_and_stated_if_all_take_long(offscreen):
+    scene, camera, times = scene_of(sphere(8)), front(), []
+    for options in (plain(), plain(quality="final", passes=4)):
+        once = offscreen.render(scene, (N, N), camera, options, GROUND)
+        timed = offscreen.render(
+            scene, (N, N), camera, options, GROUND, lambda *time: times.append(time)
+        )
+        assert np.array_equal(once, timed)
+    ((seconds, count),) = times
+    assert seconds > 0.0 and count == 4
+    assert time_note(0.6, 8) == []
+    (note,) = time_note(1.25, 8)
+    assert "about 10 s" in note and "8 passes of 1.2 s" in note

@@ -136,7 +136,7 @@ def test_deferred_correctives_are_read_when_a_joint_rotates():
 def test_correctives_need_nine_rows_a_joint():
     with pytest.raises(RigError) as caught:
         Correctives(np.zeros((10, 2, 3)))
-    assert str(caught.value) == "offsets: expected nine for each joint but the root, found 10"
+    assert str(caught.value) == "offsets: expected nine for each joint except the root, found 10"
 
 
 def test_sparse_regression_matches_the_dense_matrix():

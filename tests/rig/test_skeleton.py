@@ -146,7 +146,7 @@ def test_find_dof_accepts_names_with_dots_and_blanks():
         ("root.w", '"root.w": expected JOINT.KIND with KIND one of tx, ty, tz, x, y, z'),
         ("", '"": expected JOINT.KIND with KIND one of tx, ty, tz, x, y, z'),
         ("root.z", "joint root has no DOF z; it has ty, x"),
-        ("knee.x", '"knee" names 2 joints: use one of knee#1, knee#3'),
+        ("knee.x", '"knee" is the name of 2 joints: use one of knee#1, knee#3'),
         ("knee#9.x", 'no joint is called "knee#9"; did you mean knee#1 or knee#3?'),
         ("toe.x", 'no joint is called "toe"; there are 4: root, knee#1, #2, knee#3'),
         ("root#1.x", 'no joint is called "root#1"; did you mean root?'),

@@ -16,26 +16,26 @@ __all__ = ["NoDisplay", "find_display", "import_glfw", "window_error"]
 
 
 class NoDisplay(ViewerError):  # noqa: N818  a state of the machine, not a fault
-    """Raised if there is no display to open a window on."""
+    """Raised if there is no display on which a window can be opened."""
 
 
 def import_glfw() -> Any:
     """Return the module glfw, bound to the library shipped with imgui-bundle.
 
     Two copies of GLFW in one process do not share windows. imgui-bundle tells glfw
-    which one to load, so it has to be imported first.
+    which one to load, so imgui-bundle must be imported first.
     """
     import imgui_bundle  # noqa: F401, I001
 
     import glfw
 
-    # By default errors become Python warnings; the viewer queries and raises them instead.
+    # By default, errors become Python warnings; the viewer queries and raises them instead.
     glfw.ERROR_REPORTING = "ignore"
     return glfw
 
 
 def window_error(message: str) -> RenderError:
-    """Return an error with the OpenGL version of a display on which no window could be created.
+    """Return an error with the OpenGL version of a display on which no window can be created.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def find_display() -> None:
     Raises
     ------
     NoDisplay
-        If not; the message gives the reason in one line.
+        If no window can be opened; the message gives the reason in one line.
     """
     if sys.platform.startswith("linux"):
         names = ("DISPLAY", "WAYLAND_DISPLAY")

@@ -17,7 +17,7 @@ from viewer.media.unfinished import remove_unfinished
 
 __all__ = ["stop_watching", "watch_display"]
 
-_LIBRARY = "libX11.so.6"  # the one that GLFW loads, which shares its handlers
+_LIBRARY = "libX11.so.6"  # the library that GLFW loads, which shares the handlers
 _Handler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 

@@ -1,7 +1,7 @@
 """Tables of the panels and keys that features add to the window.
 
 A panel is a module ``<name>_panel.py`` of its feature's folder with ``draw(state)``; a key runs a
-function of the state. Both are imported when they are first used.
+function of the state. Both are imported on first use.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ class Panel:
         Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
         Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
-        ``"actors"`` a motion or several actors; empty if the panel is always available.
+        ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts; empty if the
+        panel is always available.
     leads : bool
-        Whether it is brought to the front of its tabs when a scene makes it available.
+        Whether it is brought in front of the other tabs when a scene makes it available.
     on_demand : bool
         Whether it is closed until the user opens it.
     """
@@ -80,7 +81,7 @@ class Shortcut:
     action : str
         Module and function within ``viewer.app``, called with the state.
     arguments : tuple
-        Further arguments of the action.
+        Additional arguments of the action.
     """
 
     chords: tuple[int, ...]
@@ -91,7 +92,7 @@ class Shortcut:
 
     @property
     def name(self) -> str:
-        """Name of the action, for preferences: it stays while keys and texts change."""
+        """Name of the action in the preferences: it stays the same when keys and texts change."""
         return " ".join([self.action, *map(str, self.arguments)])
 
     def run(self, state: AppState) -> None:
@@ -106,13 +107,13 @@ class Action:
     Attributes
     ----------
     text : str
-        Its name.
+        Name of the action.
     action : str
         Module and function within ``viewer.app``; called with the state.
     arguments : tuple
-        Further arguments of the action.
+        Additional arguments of the action.
     why : str
-        Function of the state that returns why it is disabled; empty if it never is.
+        Function of the state that returns why the action is disabled; empty if it never is.
     """
 
     text: str
@@ -150,6 +151,7 @@ PANELS = {
     "lights": Panel("view", "Lights", "right 2"),
     "stats": Panel("view", "Stats", "right 3"),
     "actors": Panel("actors", "Actors", "right 3", needs="actors"),
+    "parts": Panel("actors", "Parts", "right 3", needs="parts"),
     "timeline": Panel("playback", "Timeline", "bottom", needs="motion", leads=True),
     "curves": Panel("curves", "Curves", "bottom", needs="motion"),
 }
@@ -261,6 +263,7 @@ ACTIONS = (
     Action("Reset the pose of this actor", "posing.pose_actions.reset_actor"),
     Action("Reset shape", "posing.pose_actions.reset_shape"),
     Action("Random shape", "posing.pose_actions.random_shape"),
+    Action("Show all parts", "actors.part_actions.show_all_parts", why="core.reasons.no_parts"),
     Action("Reset lights", "view.display_actions.reset_lights"),
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),

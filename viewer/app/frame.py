@@ -202,7 +202,7 @@ class Frame:
         state.history.follow(state.clock.time)
 
     def _draw_scene(self, scale: float) -> None:
-        """Draw the scene if anything about it changed, and show it behind the panels."""
+        """Draw the scene if it has changed, and show it behind the panels."""
         state = self.state
         x, y, width, height = state.view_rect
         size = (round(width * scale), round(height * scale))
@@ -212,7 +212,7 @@ class Frame:
         renderer.annotations = pinned_annotations(state, size)
         key = self._keys.key(state, size, renderer.marks, renderer.ghost, renderer.annotations)
         self._drawn = key
-        # Even if drawing fails, it is retried only after a change.
+        # If drawing fails, it is retried only after a change.
         step = self.pace.step(key, state.options, time.perf_counter())
         if step is not None:
             self._draw_target(size, step)
@@ -380,7 +380,7 @@ class Frame:
         return self.target.read()
 
     def finish_picture(self) -> None:
-        """Draw all passes, with full shadows, of an image that would improve in later frames."""
+        """Draw all passes of an image with full shadows instead of improving it in later frames."""
         if self.target is not None and self.pace.is_unfinished:
             options = self.state.options
             self._draw_target(self.target.size, Step(options, range(n_passes(options)), 1.0))

@@ -99,7 +99,7 @@ class HeadlessApp:
         while self.state.of(Files).stream is None and not self.state.framing.is_settled:
             self.step(1)
         self.step(1)
-        # Frames in quick succession count as motion, in which slow drivers draw no shadows.
+        # Frames in quick succession count as motion, during which slow drivers draw no shadows.
         self.frame.finish_picture()
         pixels = self.pixels()
         pixels[..., 3] = 255
@@ -123,7 +123,7 @@ class HeadlessApp:
 
 
 def _upload_textures() -> None:
-    """Upload the glyph textures that ImGui has requested, as painting would do first."""
+    """Upload the glyph textures that ImGui has requested, which painting would do otherwise."""
     for texture in imgui.get_platform_io().textures:
         if texture.status != imgui.ImTextureStatus.ok:
             # This function is missing from the stubs of imgui-bundle.

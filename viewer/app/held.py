@@ -16,11 +16,22 @@ def is_held(state: AppState) -> bool:
     drag = state.of(Posing).drag
     is_dragged = drag is not None and not drag.is_over
     moves_template = state.of(Rigging).holds_mouse and imgui.is_mouse_down(imgui.MouseButton_.left)
-    return imgui.is_any_item_active() or is_dragged or moves_template
+    return _is_widget_held() or is_dragged or moves_template
+
+
+def _is_widget_held() -> bool:
+    """Return whether a widget is held. A field that is typed into changes nothing until it is left.
+
+    Tab goes from field to field without a frame in between, and each number is an edit of its own.
+    """
+    active = imgui.internal.get_active_id()
+    # The state stays after typing: a slider may be dragged whose number was typed before.
+    is_text = imgui.internal.get_input_text_state(active) is not None
+    return active != 0 and not (is_text and imgui.get_io().want_text_input)
 
 
 def stops_time(state: AppState) -> bool:
-    """Return whether time must stand still: a handle is held but has not been dragged yet.
+    """Return whether time must stop: a handle is held but has not been dragged yet.
 
     A click must not pause playback, and a drag must start from an unchanged pose.
     """

@@ -21,7 +21,7 @@ __all__ = ["draw_interface"]
 
 
 def draw_interface(state: AppState) -> list[Path]:
-    """Draw everything but the scene; return files to open from a menu."""
+    """Draw everything except the scene; return files to open from a menu."""
     state.item_rects.clear()
     if state.panels_visible:
         chosen = draw_menus(state)
@@ -54,7 +54,7 @@ def draw_interface(state: AppState) -> list[Path]:
 
 
 def _dock_of_neighbour(panel: Panel) -> int:
-    """Return the dock node of another panel with the same place, 0 if none is docked."""
+    """Return the dock node of another panel with the same place, or 0 if none is docked."""
     for other in PANELS.values():
         window = None
         if other.place == panel.place and other is not panel:

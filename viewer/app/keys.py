@@ -52,19 +52,19 @@ class Keyboard:
 def handle_keys(state: AppState) -> None:
     """Run the actions of keys pressed in this frame; letters typed into a text box are ignored."""
     keyboard = state.of(Keyboard)
-    # Otherwise ImGui would move the focus with Tab.
-    imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
     # Ctrl may be released in the frame in which the letter is pressed. Modifiers held in the
-    # previous frame still count, or Ctrl+S would be taken for S.
+    # previous frame still count, or Ctrl+S would be interpreted as S.
     now = imgui.get_io().key_mods
     held, keyboard.modifiers = now | keyboard.modifiers, now
     if imgui.get_io().want_text_input:
         return
+    # Otherwise ImGui would move the focus with Tab also while nothing is typed.
+    imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
     if imgui.is_key_pressed(imgui.Key.escape, False) and _close_menus():
         return
     appearance = state.of(Appearance)
     if appearance.captured:
-        # The key is for the list of keys and must not run an action.
+        # The key belongs to the list of keys and must not run an action.
         appearance.captured = "" if appearance.captured == CAPTURED else appearance.captured
         return
     is_covered = bool(state.error) or state.of(Files).dialog is not None

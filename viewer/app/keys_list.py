@@ -1,4 +1,4 @@
-"""List of keys over the window, in columns or with a scroll bar if the window is small."""
+"""List of keys over the window, in columns, or with a scroll bar if the window is small."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 
 from viewer.app.core.ink import ink
+from viewer.app.core.key_names import KeyNames
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import overlay_rect
 from viewer.app.features import KEYS, MOUSE
@@ -32,7 +33,8 @@ def draw_keys(state: AppState) -> None:
     """Draw the list if it is open; the wheel scrolls it in a small window."""
     if not state.of(Keyboard).is_listed:
         return
-    lines = [*((state.key_label(key.label), key.text) for key in KEYS), *MOUSE]
+    changed = state.of(KeyNames).changed
+    lines = [*((changed.get(key.label, key.label), key.text) for key in KEYS), *MOUSE]
     style, viewport = imgui.get_style(), imgui.get_main_viewport()
     letter = imgui.get_font_size()
     first = max(imgui.calc_text_size(label).x for label, _ in lines) + _GAP * letter
@@ -54,7 +56,7 @@ def draw_keys(state: AppState) -> None:
 
 
 def _flags(fits: bool) -> int:
-    """Return the flags of a window that takes input only if it scrolls."""
+    """Return the flags of a window that accepts input only if it scrolls."""
     flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
     flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.always_auto_resize
     flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
@@ -65,7 +67,7 @@ def _flags(fits: bool) -> int:
 
 
 def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
-    """Return the smallest number of columns that fit the height, limited by the width.
+    """Return the smallest number of columns that fit into the height, limited by the width.
 
     >>> _columns(50, (1000, 600), (400, 20)), _columns(50, (1000, 400), (400, 20))
     (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))

@@ -20,7 +20,7 @@ _LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
 _LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
 _MOST = 0.5
 """Largest fraction of the window's width that panels may take."""
-_THREE_ROWS = 60.0  # font sizes: a window of smaller height has two rows of panels on the right
+_THREE_ROWS = 60.0  # font sizes: a window of lower height has two rows of panels on the right
 _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 """Smallest height of bottom panels in font sizes, and its largest fraction of the window."""
 
@@ -51,9 +51,9 @@ class Layout:
     Attributes
     ----------
     is_arranged : bool
-        Whether the user has moved or resized panels; the arrangement is then left alone.
+        Whether the user has moved or resized panels; the arrangement is then kept.
     sizes : Sizes or None
-        Sizes for which the panels were arranged last.
+        Sizes for which the panels were last arranged.
     nodes : dict
         Dock nodes of the left side, the right side and the bottom.
     fronts : list of str
@@ -164,7 +164,7 @@ def _build(layout: Layout, dock: int, sizes: Sizes) -> None:
         builder.dock_builder_dock_window(panel.title, places[panel.place])
     builder.dock_builder_finish(dock)
     layout.nodes, layout.sizes, layout.found = nodes, sizes, ()
-    # Otherwise the panel that is drawn last would be in front of its neighbours.
+    # Otherwise, the last panel drawn would be in front of its neighbours.
     firsts = {places[panel.place]: panel.title for panel in reversed(PANELS.values())}
     layout.fronts = list(firsts.values())
 

@@ -76,7 +76,7 @@ def draw_menus(state: AppState) -> list[Path]:
             reset_layout(state)
         imgui.end_menu()
     if begin_menu(state, "Help"):
-        if menu_item(state, "Keys", "H", keyboard.is_listed):
+        if menu_item(state, "Keys", "H or ?", keyboard.is_listed):
             keyboard.is_listed = not keyboard.is_listed
         draw_manual_menu(state)
         imgui.end_menu()
@@ -158,7 +158,7 @@ def ask_for_pose(state: AppState) -> None:
 
 
 def ask_for_export(state: AppState) -> None:
-    """Ask where to export the chosen actor as it is posed."""
+    """Ask where to export the chosen actor in its current pose."""
     kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
     suffixes = tuple(suffix for kind in kinds for suffix in kind.suffixes)
     state.of(Files).dialog = FileDialog(

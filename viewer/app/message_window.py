@@ -65,7 +65,7 @@ def _draw_message(message: Message) -> None:
 
 
 def draw_error(state: AppState) -> None:
-    """Draw the error dialog over everything, if there is an error."""
+    """Draw the error dialog above everything else, if there is an error."""
     state.messages.log_error(state.error)
     if not state.error:
         return

@@ -22,7 +22,7 @@ _BUTTONS = (_LEFT, _RIGHT, imgui.MouseButton_.middle)
 
 
 def drop_motion_before_press() -> None:
-    """Discard the pointer's motion that preceded a press in the same frame.
+    """Discard pointer motion that preceded a press in the same frame.
 
     ImGui may report a motion and a subsequent press in one frame. Drags that use the motion of
     the frame, as in plots, would begin with a jump. Called before anything is drawn.

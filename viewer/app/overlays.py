@@ -1,7 +1,7 @@
 """Overlays of the view: progress, messages, the list of keys, and hints in a corner.
 
 They do not overlap: the colour legend is at the top left, the progress bar at the top beside or
-below it, and messages grow upwards from the bottom as far as there is room.
+below it, and messages are stacked upwards from the bottom as far as there is room.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import NamedTuple
 from imgui_bundle import imgui
 
 from viewer.app.cancel import cancel
+from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, begin_overlay, button, overlay_rect
 from viewer.app.files.state import Files
@@ -43,13 +44,14 @@ def draw_overlays(state: AppState) -> None:
 
 
 def draw_hints(state: AppState) -> None:
-    """Draw the hints about the grid's spacing and the list of keys, in a corner of the view.
+    """Draw hints about the grid's spacing and the list of keys in a corner of the view.
 
-    Like the image of the scene they are drawn behind the panels, so they must be drawn after it.
+    Like the image of the scene, they are drawn behind the panels, so they must be drawn after it.
     """
     x, y, width, height = state.view_rect
-    grid = f"grid {grid_step(state.box):g} units   " if state.options.grid else ""
-    text = f"{grid}H keys"
+    step = grid_step(state.box)
+    grid = f"grid {step:g} unit{'s' * (step != 1.0)}   " if state.options.grid else ""
+    text = f"{grid}{key_name(state, 'H or ?')} keys"
     size = imgui.calc_text_size(text)
     place = (x + width - size.x - 10, y + height - size.y - 8)
     draw_list = imgui.get_background_draw_list()
@@ -154,7 +156,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
 
 
 def _newest(heights: Sequence[float], line: float, room: float) -> int:
-    """Return how many of the last messages fit, leaving room for a line about the hidden ones.
+    """Return how many of the latest messages fit, leaving room for a line about hidden ones.
 
     >>> _newest([10, 10, 10], 10, 30), _newest([10, 10, 10], 10, 29), _newest([10] * 20, 10, 500)
     (3, 1, 8)

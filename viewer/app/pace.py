@@ -1,4 +1,4 @@
-"""What to draw in each frame of the window: more passes while it is still, less while it moves."""
+"""Choice of what to draw in each frame: more passes of still scenes, less of moving ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LONGEST = 0.1  # maximum time step for fading, seconds
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What to draw now: options, passes of final quality, and strength of shadows, 0 to 1."""
+    """Drawing step: options, passes of final quality, and strength of shadows, 0 to 1."""
 
     options: DisplayOptions
     passes: range
@@ -41,12 +41,12 @@ class Pace:
         self.is_unfinished = False
 
     def step(self, key: object, options: DisplayOptions, now: float) -> Step | None:
-        """Return what to draw in this frame; None if the image is finished.
+        """Return the drawing step of this frame; None if the image is finished.
 
         Parameters
         ----------
         key : object
-            Everything that the image depends on.
+            Everything on which the image depends.
         options : DisplayOptions
             Display options with the requested quality.
         now : float

@@ -20,7 +20,7 @@ __all__ = ["PictureKeys"]
 class PictureKeys:
     """Builds one key per frame; large parts are copied only when they have changed.
 
-    Poses cache their own keys; those of options and of the actors' placements are cached here.
+    Poses cache their own keys; the keys of options and of the actors' placements are cached here.
     Figures and clips are compared by identity: they are replaced and never mutated.
     """
 
@@ -36,7 +36,7 @@ class PictureKeys:
         ghost: Ghost | None = None,
         annotations: Sequence[Annotation] = (),
     ) -> tuple[object, ...]:
-        """Return everything the image of the scene depends on.
+        """Return everything on which the image of the scene depends.
 
         Parameters
         ----------
@@ -45,7 +45,7 @@ class PictureKeys:
         size : (int, int)
             Width and height in pixels.
         marks, ghost, annotations : Marks or None, Ghost or None, sequence of Annotation
-            Drawn over the scene in this frame; compared by identity.
+            Items drawn over the scene in this frame; compared by identity.
         """
         camera, options = state.camera, state.options
         if options != self._options:
@@ -72,7 +72,7 @@ class PictureKeys:
             else:
                 self._places[row] = self._places[row].updated(*arrays)
             look = (actor, actor.figure, actor.is_drawn, actor.color, actor.opacity)
-            motion = actor.clip, actor.offset
+            motion = actor.clip, actor.offset, actor.hidden_parts
             pose = None if actor.pose is None else pose_key(actor.pose)
             found.append((look, motion, self._places[row], pose))
         return tuple(found)

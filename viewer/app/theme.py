@@ -49,7 +49,7 @@ _USES = {
 
 
 def apply_theme(scale: float, theme: str = "dark") -> None:
-    """Set up font and style of the current ImGui context.
+    """Set up font, style and behaviour of the current ImGui context.
 
     Parameters
     ----------
@@ -61,6 +61,8 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
     if font.is_file():
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
+    # A click on a number that can be dragged begins to type it.
+    imgui.get_io().config_drag_click_to_input_text = True
     set_theme(theme)
     style = imgui.get_style()
     style.window_rounding = style.child_rounding = 3.0

@@ -1,4 +1,4 @@
-"""Checks of a transferred rig, and the lines that report them."""
+"""Checks of a transferred rig, and messages about their results."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def newly_outside(
     Parameters
     ----------
     template : Figure
-        With its shape applied.
+        Figure with its shape applied.
     pose : Pose
         Pose of the template.
     posed : (V, 3)
@@ -44,7 +44,7 @@ def newly_outside(
     joints : (J, 3) or None
         Joint positions in the target's frame; None if they are the template's.
     transferred : (J,) bool or None
-        Joints that are expected inside, unlike those of a part that the target lacks. None for all.
+        Joints that are expected inside, unlike those of a part that the target lacks; None for all.
     """
     own = joint_matrices(template, pose)[:, :3, 3]
     before = outside(posed, template.require_mesh().triangles, own)
@@ -60,7 +60,7 @@ def residual_of(figure: Figure, pose: Pose, placement: Floats, target: Mesh) -> 
     Parameters
     ----------
     figure : Figure
-        With as many vertices as the target.
+        Figure with as many vertices as the target.
     pose : Pose
         The pose in which the target was found.
     placement : (4, 4)

@@ -30,13 +30,13 @@ def transfer(
     Parameters
     ----------
     template : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     pose : Pose
-        Poses and shapes the template approximately like the target.
+        Pose and shape of the template, approximately those of the target.
     target : Mesh
-        Not modified; the new figure, posed by ``Rigged.pose``, reproduces it.
+        Mesh to rig, not modified; the new figure, posed by ``Rigged.pose``, reproduces it.
     settings : TransferSettings, optional
-        The robust method with its default limits if omitted.
+        Settings; the robust method with its default limits if omitted.
     report : callable, optional
         Called with progress; may raise to cancel.
     name : str

@@ -20,8 +20,8 @@ from viewer.rig.pose import Pose
 __all__ = ["CONFIDENCE", "Rigged", "clip_for", "with_fields"]
 
 CONFIDENCE = ("matched", "inpainted", "rigid")
-"""Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours, or
-the rigid attachment of the island that it belongs to."""
+"""Origin of a vertex's weights: the closest surface of the template, the vertex's neighbours,
+or the rigid attachment of its island."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +35,7 @@ class Rigged:
     pose : Pose
         The pose that reproduces the target.
     placement : (4, 4)
-        From the posed figure to the target's frame; the identity unless the method changed the
+        Maps the posed figure to the target's frame; the identity unless the method changed the
         target.
     alignment : Alignment or None
         Placement of the template; None for a method that only aligns boxes.

@@ -1,4 +1,4 @@
-"""The recommended method: alignment, checked closest points, joint transfer, inverse skinning."""
+"""The recommended method: alignment, validated closest points, joint transfer, inverse skinning."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def robust(
     pose : Pose
         Pose without shape weights.
     target : Mesh
-        With triangles.
+        Mesh with triangles.
     how : TransferSettings
         All settings except the method.
     report : callable
@@ -234,7 +234,7 @@ def _judged(template: Figure, figure: Figure, weights: WeightTransfer) -> list[D
 
 
 def _dropped_parts(template: Figure, figure: Figure, how: TransferSettings) -> list[Diagnostic]:
-    """Return messages about template data that the new figure lacks."""
+    """Return messages about template data that is missing in the new figure."""
     lines = []
     if template.blend_shapes is not None:
         lines.append(Diagnostic("R013.shapes", values={"n": template.n_shapes}))

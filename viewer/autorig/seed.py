@@ -26,10 +26,10 @@ __all__ = ["nearest"]
 
 
 def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: str) -> Rigged:
-    """Follow Tex-An Mesh step by step: the target is changed, the template's joints are not.
+    """Apply the steps of Tex-An Mesh: the target is changed, the template's joints are not.
 
-    As there, pose correctives are neither removed nor added back. Only where a blended matrix
-    is nearly singular, the nearest rotation replaces it, which is reported.
+    As in the original, pose correctives are neither removed nor added back. Only nearly singular
+    blended matrices are replaced by the nearest rotation, which is reported.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: st
     pose : Pose
         Pose without shape weights.
     target : Mesh
-        With triangles.
+        Mesh with triangles.
     report : callable
         Called with progress.
     name : str

@@ -15,13 +15,14 @@ Report = Callable[[float, str], None]
 """Called with the completed fraction and the current step; may raise to cancel."""
 
 METHODS = {
-    "robust": "closest surface points, checked, the rest inpainted (Abdrashitov et al. 2023)",
+    "robust": "closest surface points if they agree, other weights inpainted (Abdrashitov et al. "
+    "2023)",
     "nearest": "aligned boxes, nearest vertices, joints copied (Tex-An Mesh)",
 }
 """Methods offered by menus and the command line."""
 
 JOINTS = ("surface", "alignment")
-"""What joints follow: the surface around them, or only the alignment."""
+"""Placement of joints: by the surface around them, or only by the alignment."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +36,7 @@ class TransferSettings:
     alignment : AlignmentSettings
         Known facts about the alignment.
     weights : WeightSettings
-        When a vertex matches; smoothing; number of influences.
+        Criteria for matching vertices, smoothing, and number of influences.
     joints : str
         One of ``JOINTS``.
     fits : bool

@@ -14,7 +14,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._numbers import to_number
+from viewer.formats._text.numbers import to_number
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
@@ -29,10 +29,10 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     """Read pairs of points.
 
     ``source``: the file.
-    ``template``: has the joints that are named.
-    ``pose``: of the template, gives the positions of its joints.
-    Returns (N, 2, 3): the template's point and the target's for each pair.
-    Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
+    ``template``: figure with the joints that the file refers to.
+    ``pose``: pose of the template. Returns (N, 2, 3): the template's point and the target's for
+    each pair. Raises FormatError at a line that is not a pair or names an unknown joint, or at the
+    last line
       if there are fewer than three pairs.
     """
     skeleton = template.require_skeleton()

@@ -48,7 +48,7 @@ def morph_record(figure: Figure, values: Floats) -> PoseRecord:
 def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
     """Return the first actor that has all shapes named in a text, and a record that sets them.
 
-    Returns ``actor``: with a pose.
+    Returns ``actor``: actor with a pose.
     Returns ``record``: sets the named shapes and keeps the others.
     Raises ViewerError if the text is invalid, or no actor has these shapes; the message lists the
       existing ones.

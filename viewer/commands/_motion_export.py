@@ -37,8 +37,8 @@ from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
 
 _MOST_DIGITS = 15
-_OF_POINTS = "npz"  # the exporter for captured points
-# Their motions are written as one file per frame, so only on request.
+_OF_POINTS = "npz"  # exporter for captured points
+# These write one file per frame, so motions are written only on request.
 _ONE_A_FRAME = (".obj",)
 
 
@@ -121,7 +121,7 @@ def write_motions(
     from all frames are omitted, and the others keep their file names. ``check`` is called with
     all files before the first is written, and raises if one of them must not be replaced.
 
-    Raises ViewerError if no actor has a motion that the format can hold, or nobody is present
+    Raises ViewerError if no actor has a motion that the format can store, or nobody is present
       in the frames; nothing is written then.
     """
     options = motion_options(arguments, skinning)
@@ -233,7 +233,7 @@ def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> 
 
 
 def _untracked_notes(parts: list[_Part], key: str) -> list[Diagnostic]:
-    """Return a note about files of people without a track."""
+    """Return a note about files of untracked people."""
     names = [
         printable(part.path.name) if key != "easymocap" else person_label(part.actor.person)
         for part in parts
@@ -264,7 +264,7 @@ def pose_or_point_actors(scene: Scene) -> list[Actor]:
 
 
 def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) -> list[Actor]:
-    """Return the actors whose motion is written, or whose pose is, as a motion of one frame.
+    """Return the actors whose motion is written, or whose pose is written as a one-frame motion.
 
     Raises RigError if there are none.
     """
@@ -291,7 +291,8 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
     if isinstance(actors[0].clip, PointClip):
         if _OF_POINTS not in found or arguments.kind not in (None, _OF_POINTS):
             raise RigError(
-                "there are only keypoints: a motion of joints cannot be written (.npz holds points)"
+                "there are only keypoints: a motion of joints cannot be written (.npz stores "
+                "points)"
             )
         return _OF_POINTS
     if arguments.kind is not None:
@@ -325,7 +326,7 @@ def check_kind(arguments: argparse.Namespace, output: Path) -> None:
 def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
     """Check the name pattern of numbered files.
 
-    Raises ViewerError if one file holds the whole motion, or all names would be the same.
+    Raises ViewerError if one file contains the whole motion, or all names would be the same.
     """
     suffix = output.suffix.lower()
     if "{frame" not in output.name and not (arguments.frames and suffix in _ONE_A_FRAME):

@@ -1,4 +1,4 @@
-"""Export of one pose to motion formats: when it is requested, and its frame number."""
+"""Export of a single pose to motion formats: detection of such requests, and frame numbers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def check_frame_options(arguments: argparse.Namespace) -> None:
 
 
 def asks_one_pose(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
-    """Return whether one pose of joints is written: at a frame or time, or without motion."""
+    """Return whether a single pose is written: at a frame or time, or if there is no motion."""
     if arguments.frames is not None or all(actor.pose is None for actor in scene.actors):
         return False
     is_still = not _moving(scene) and "{frame" not in output.name
@@ -45,7 +45,7 @@ def animation_of_pose(
 ) -> tuple[SampledAnimation, str]:
     """Return an actor's current pose as a sampled animation, and its up axis, for an exporter.
 
-    The frame has the number that ``--frame`` uses; between two frames it is the one displayed.
+    The frame has the number that ``--frame`` uses; between two frames, the displayed one counts.
     """
     frames = numbering_of(scene.actors, arguments.fps)
     time = frames.start if scene.time is None else scene.time

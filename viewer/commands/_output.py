@@ -15,10 +15,10 @@ PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".t
 
 
 def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list[Path]:
-    """Return all files that are read: the named ones, and those they refer to.
+    """Return all files that are read: the named files, and those they refer to.
 
-    ``arguments``: of a command that opens a scene.
-    ``scene``: the opened scene; without it only the named files are returned.
+    ``arguments``: arguments of a command that opens a scene.
+    ``scene``: the opened scene; if omitted, only the named files are returned.
     """
     model = [] if arguments.model is None else [resolve(arguments.model)]
     named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *model)]

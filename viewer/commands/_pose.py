@@ -35,7 +35,7 @@ _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 
 def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that shape and pose."""
-    group = parser.add_argument_group("shape and pose, in this order")
+    group = parser.add_argument_group("shape and pose, applied in this order")
     group.add_argument("--hands", choices=("flat", "mean"), help="start from flat or mean hands")
     group.add_argument(
         "--pose",
@@ -46,7 +46,7 @@ def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
         "--shape",
         metavar="A,B,…|NAME=A,…",
         help="shape coefficients (betas) of a body model, or weights of morphs (1: the "
-        "full target); a list from the first on, or some by name, such as open=0.5,wide=1",
+        "full target); a list in order, or some by name, such as open=0.5,wide=1",
     )
     group.add_argument(
         "--expression", metavar="A,B,…", help="expression coefficients of a body model"
@@ -135,7 +135,7 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagno
 
 
 def pose_files(arguments: argparse.Namespace) -> list[str]:
-    """Return the requested pose file: an input that must not be overwritten."""
+    """Return the requested pose file, an input that must not be overwritten."""
     return [arguments.pose] if arguments.pose and not _is_numbers(arguments.pose) else []
 
 
@@ -144,7 +144,8 @@ def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
-    # A JSON list is detected as people; read as a pose, it is refused as it is not an object.
+    # A JSON list is detected as a list of people; read as a pose, it is rejected, not being an
+    # object.
     is_list = not source.is_folder and detect(source) == "easymocap"
     record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):
@@ -188,12 +189,12 @@ def _apply_record(
 
 
 def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
-    """Set shape weights by name or from the first on; figures without shapes may have morphs."""
+    """Set shape weights by name or in order; figures without shapes may have morphs."""
     if is_named(text):
         actor, record = named_record(scene, text)
         return apply_record(record, actor.figure, actor.require_pose())
     values = _numbers("--shape", text)
-    assert values is not None  # there is a text
+    assert values is not None  # the option was given
     posed = [actor for actor in scene.actors if actor.pose is not None]
     morphed = [actor for actor in posed if has_only_morphs(actor.figure)]
     others = [actor for actor in posed if actor not in morphed]
@@ -261,7 +262,7 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
 
 
 def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
-    """Move or scale the first posed figure as a whole; return whether the label asks for it."""
+    """Move or scale the first posed figure as a whole; return whether the label refers to it."""
     part = label[len(_FIGURE) :].lower()
     actor = next((actor for actor in scene.actors if actor.pose is not None), None)
     if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:

@@ -49,7 +49,7 @@ class Progress:
 
 
 def _bar() -> Bar:
-    """Return a bar that only ``show`` redraws: without a thread or redirected streams."""
+    """Return a bar that only ``show`` redraws, without a thread or redirected streams."""
     from rich import progress
     from rich.console import Console
 

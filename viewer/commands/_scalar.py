@@ -45,13 +45,13 @@ def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--scalar-range",
         metavar="A:B",
-        help="range of the colour map, in the legend's unit (default: that of the values); write "
+        help="range of the colour map, in the legend's unit (default: all values); write "
         "--scalar-range=-20:20 if A is below 0",
     )
     group.add_argument(
         "--isolines",
         action=argparse.BooleanOptionalAction,
-        help="lines at every tenth of the range (default: for weights)",
+        help="isolines at every tenth of the range (default: for weights only)",
     )
     group.add_argument("--legend", action="store_true", help="draw a colour legend")
 
@@ -99,7 +99,7 @@ def _parse_range(text: str) -> tuple[float, float]:
 
 
 def choose_subject(scene: Scene, options: DisplayOptions) -> list[str]:
-    """Choose a joint or field for a quantity without one; return a message about the joint.
+    """Choose a joint or field if the quantity needs one; return a message about the joint.
 
     The choice is the joint with the most influence, or the first field that is not 0 everywhere.
     """
@@ -130,7 +130,7 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
     if joint:
         _refuse_name(figures, options.scalar)
     if SCALARS[key].takes_joint and not joint and bound is not None:
-        return []  # the window selects one
+        return []  # the window selects a joint
     return [f"--scalar {options.scalar}: {SCALARS[key].title}: no figure has {missing[0]}"]
 
 
@@ -182,6 +182,6 @@ def scalar_text(scene: Scene, options: DisplayOptions) -> str:
 
 
 def _n_different(name: str, scene: Scene, values: list[Floats]) -> str:
-    """Return how many joints or parts are visible, of how many: ``"22 of 24"``."""
+    """Return the number of visible joints or parts and their total: ``"22 of 24"``."""
     found = len(np.unique(np.concatenate([numbers[numbers >= 0] for numbers in values])))
     return f"{found} of {max(len(categories(name, actor.figure)) for actor in scene.actors)}"

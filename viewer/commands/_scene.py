@@ -46,8 +46,8 @@ def add_scene_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT
 def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT) -> None:
     """Add FILES and the options that locate them.
 
-    ``parser``: of a command.
-    ``default``: name of the default without files, for the help; empty if files are required.
+    ``parser``: parser of a command.
+    ``default``: default if no files are given, for the help; empty if files are required.
     """
     group = parser.add_argument_group("files")
     group.add_argument(
@@ -59,7 +59,9 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         f"{f' (default: {default})' if default else ''}",
     )
     group.add_argument("--body", action="store_true", help="also open the bundled human body")
-    group.add_argument("--model-path", metavar="FOLDER", help="folder of body models; remembered")
+    group.add_argument(
+        "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
+    )
     group.add_argument(
         "--max-size",
         default="2G",
@@ -74,11 +76,11 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--model",
         metavar="FIGURE",
-        help="body model for captured bodies, or driven by BVH (default: one among FILES, else "
-        "the bundled one for captured bodies)",
+        help="body model for captured bodies, or driven by BVH (default: one among FILES; for "
+        "captured bodies, otherwise the bundled body)",
     )
     group.add_argument(
-        "--up", choices=("y", "z", "-y", "-z"), help="the axis that points up in captures and BVH"
+        "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
     group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
     group.add_argument(
@@ -196,7 +198,7 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
 
 
 def _announce(files: Sequence[str | Path]) -> None:
-    """Print a message in a terminal about files that take longer than a second to read."""
+    """In a terminal, print a message about files that take longer than a second to read."""
     if not sys.stderr.isatty():
         return
     for file in files:

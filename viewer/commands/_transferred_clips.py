@@ -44,9 +44,9 @@ def add_clip_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="a motion of the template; transferred to the target, with its path scaled to the "
-        "figure, it is written next to the result as NAME-FILE.anim (.skel-style rigs) "
-        "or .bvh; may be repeated",
+        help="a motion of the template: it is transferred to the target, with its path scaled to "
+        "the figure, and written next to the result as NAME-FILE.anim (.skel-style rigs) or "
+        ".bvh; may be repeated",
     )
 
 
@@ -55,11 +55,11 @@ def read_clips(
 ) -> list[TransferredClip]:
     """Return the motions named by ``--clip``, before any work is done.
 
-    ``arguments``: of ``viewer rig``.
+    ``arguments``: arguments of ``viewer rig``.
     ``template``: the template's files.
     ``figure``: the template.
-    Raises ViewerError if there is no output to write next to, a file holds no motion of the
-      template, or two output files would have the same name.
+    Raises ViewerError if there is no output to write next to, a file contains no motion of the
+    template, or two output files would have the same name.
     """
     if not arguments.clips:
         return []

@@ -1,4 +1,4 @@
-"""Usage errors: one line each, unknown names first and with the nearest known name."""
+"""One-line usage errors: unknown names are reported first, with the nearest known name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 _NUMBER = re.compile(r"-\.?\d")  # start of a value or file name, not of an option
-_WORD = re.compile(r"[^\W\d_]+")  # looks like a command; files mostly have a suffix or a folder
+_WORD = re.compile(r"[^\W\d_]+")  # looks like a command; most files have a suffix or a folder
 _LONGEST = 60  # characters of a name in a message
 
 
@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
         raise ViewerError(f"{message} ({self.prog} --help lists the options)")
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
-        """Print the help, or raise if it cannot be printed, which ``argparse`` ignores.
+        """Print the help, or raise if it cannot be printed; ``argparse`` ignores that.
 
         ``argparse`` would also print to the error stream if the output is closed.
         """
@@ -45,10 +45,10 @@ class Parser(argparse.ArgumentParser):
 
         ``argparse`` would first report a missing argument, possibly the mistyped one.
 
-        ``arguments``: those before ``--``.
+        ``arguments``: arguments before ``--``.
         Raises ViewerError with the nearest options.
         """
-        known = self._option_string_actions  # argparse has no public name for it
+        known = self._option_string_actions  # argparse has no public name for this table
         for argument in arguments:
             name = argument.partition("=")[0]
             # argparse treats arguments with spaces as values, and "-" as a file.
@@ -87,7 +87,7 @@ def command_parser(name: str) -> Parser:
 def check_command(word: str) -> None:
     """Raise for a word that is not a file but resembles a command.
 
-    ``word``: the first argument.
+    ``word``: first argument of the command line.
     Raises ViewerError with the nearest command.
     """
     if not _WORD.fullmatch(word) or os.path.lexists(resolve(word)):

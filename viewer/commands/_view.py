@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 
 from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
@@ -30,7 +32,7 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
 
 _SWITCHES = (
-    ("no-shadows", "leave out shadows"),
+    ("no-shadows", "omit shadows"),
     ("flat", "use one normal per triangle"),
     ("wireframe", "draw triangle edges"),
     ("normals", "draw vertex normals"),
@@ -38,7 +40,7 @@ _SWITCHES = (
     ("no-grid", "omit the ground grid"),
     ("keypoints", "draw a model's keypoints"),
     ("reduced", "draw the coarser mesh, if there is one"),
-    ("xray", "draw bones visible through the skin"),
+    ("xray", "draw bones that are visible through the skin"),
     ("joint-names", "label joints, where labels do not overlap"),
     ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
     ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
@@ -54,7 +56,7 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", *FRONTS),
         default="auto",
         metavar="AXIS",
-        help="the axis that the figures face, as in --front=-z, from which the first view looks "
+        help="the axis that the figures face, as in --front=-z; the initial view looks from there "
         "(default: auto, estimated from the figures)",
     )
     group.add_argument("--inclination", type=number, metavar="I", help="degrees above the horizon")
@@ -62,13 +64,20 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         "--distance",
         type=number,
         metavar="D",
-        help="from the target, in scene units (default: frames the scene)",
+        help="distance from the target, in scene units (default: the whole scene is visible)",
     )
     group.add_argument("--orthographic", action="store_true", help="parallel projection")
     group.add_argument(
         "--view",
         metavar="NAME|N",
         help="look through a calibrated camera of a capture, by name or number from 1",
+    )
+    group.add_argument(
+        "--image-brightness",
+        type=number,
+        default=0.6,
+        metavar="0..1",
+        help="with --view, of the camera's image behind the scene; 0 hides it (default: 0.6)",
     )
 
 
@@ -94,7 +103,7 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         "--background",
         default="gradient",
         metavar="NAME|#rrggbb",
-        help="gradient, white, environment (the studio, out of focus), transparent or a colour "
+        help="gradient, white, environment (the studio, out of focus), transparent, or a colour "
         "(default: gradient)",
     )
     group.add_argument(
@@ -113,8 +122,8 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         "--hide-part",
         action="append",
         default=[],
-        metavar="NAME",
-        help="hide a body part; may be repeated",
+        metavar="NAME|GLOB",
+        help="hide parts of meshes or bodies, by name or pattern; may be repeated",
     )
 
 
@@ -133,7 +142,7 @@ def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
             type=number,
             default=default,
             metavar="0..1",
-            help=f"with --shading pbr, of materials that do not state it (default: {default:g})",
+            help=f"for materials that do not specify it, with --shading pbr (default: {default:g})",
         )
     group.add_argument(
         "--matcap",
@@ -211,9 +220,10 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
-    for name in ("metallic", "roughness"):
-        if not 0.0 <= getattr(arguments, name) <= 1.0:
-            raise ViewerError(f"--{name}: expected 0 to 1, found {getattr(arguments, name):g}")
+    for name in ("metallic", "roughness", "image-brightness"):
+        value = getattr(arguments, name.replace("-", "_"))
+        if not 0.0 <= value <= 1.0:
+            raise ViewerError(f"--{name}: expected 0 to 1, found {value:g}")
     options = DisplayOptions(
         show=arguments.show,
         shading=arguments.shading,
@@ -237,6 +247,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         joint_names=arguments.joint_names,
         joint_axes=arguments.joint_axes,
         cameras=arguments.cameras,
+        image_brightness=arguments.image_brightness,
     )
     set_scalar(arguments, options)
     return options
@@ -260,23 +271,38 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
-    """Hide body parts, given by name or index, of the first figure that has any.
+    """Hide parts of meshes, and body parts of the first figure that has any, by name.
 
-    Raises ViewerError if no figure has a part of this name; the message lists the known ones.
+    Raises ViewerError if no part has one of the names; the message lists the known ones.
     """
     if not arguments.hide_part:
         return
     parts = next((a.figure.body_parts for a in scene.actors if a.figure.body_parts), None)
-    if parts is None:
-        raise ViewerError("--hide-part: no figure has body parts")
-    names = [name.lower() for name in parts.names]
-    hidden = []
+    of_body = () if parts is None else parts.names
+    of_meshes = [() if a.figure.mesh is None else a.figure.mesh.parts for a in scene.actors]
+    everything = (*of_body, *(name for names in of_meshes for name in names))
+    known = tuple(dict.fromkeys(filter(None, everything)))
+    if not known:
+        raise ViewerError("--hide-part: no figure has parts")
+    hidden: set[int] = set()
     for wanted in arguments.hide_part:
-        if wanted.lower() not in names:
-            hint = name_hint(wanted, parts.names)
+        if not _named(wanted, known):
+            hint = name_hint(wanted, known)
             raise ViewerError(f'--hide-part: no part is called "{printable(wanted, 60)}"; {hint}')
-        hidden.append(names.index(wanted.lower()))
-    options.hidden_parts = tuple(sorted(set(hidden)))
+        hidden |= _named(wanted, of_body)
+        for actor, names in zip(scene.actors, of_meshes, strict=True):
+            actor.hidden_parts |= _named(wanted, names)
+    options.hidden_parts = tuple(sorted(hidden))
+
+
+def _named(wanted: str, names: Sequence[str]) -> set[int]:
+    """Return the indices of the names that a name or pattern matches, regardless of case."""
+    pattern = wanted.lower()
+    return {
+        index
+        for index, name in enumerate(names)
+        if name.lower() == pattern or fnmatchcase(name.lower(), pattern)
+    }
 
 
 def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:

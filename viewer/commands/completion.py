@@ -39,13 +39,13 @@ def command_line() -> argparse.ArgumentParser:
     """Return the whole command line as one parser; file arguments are marked for completion."""
     import shtab
 
-    whole = Parser(prog="viewer", description="See, check and produce skinned characters.")
+    whole = Parser(prog="viewer", description="View, check and convert skinned characters.")
     whole.add_argument("--version", action="store_true", help="print the version")
     commands: Any = whole.add_subparsers(dest="command", parser_class=Parser)
     for name, text in COMMANDS.items():
         parser = commands.add_parser(name, help=text, description=text)
         import_module(f"viewer.commands.{name}").add_arguments(parser)
-        for action in parser._actions:  # argparse has no public name for it
+        for action in parser._actions:  # argparse has no public name for this action
             if _names_a_file(action):
                 action.complete = shtab.FILE
     return whole

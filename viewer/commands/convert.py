@@ -87,12 +87,13 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     if is_stdout(output) and not output.suffix:
         name = printable(output, 300)
         raise UnsupportedFormatError(
-            f"{name}: expected a suffix, which chooses the format; a link to {name} may have one"
+            f"{name}: expected a suffix, which selects the format; use a link to {name} that has "
+            f"one"
         )
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
     if not kinds:
-        raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {_known_suffixes()}')
+        raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:

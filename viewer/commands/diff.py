@@ -57,7 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="also open this file with every input, such as the .skel of .anim files",
     )
-    files.add_argument("--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH")
+    files.add_argument(
+        "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
+    )
     files.add_argument("--unit", choices=METRES, help="length unit of BVH")
     _add_poses(parser)
     _add_results(parser)
@@ -86,8 +88,8 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=float,
         metavar="X",
-        help="exit with 1 if anything differs by more: lengths as a fraction of the reference's "
-        "size, angles in radians, weights as stored",
+        help="exit with 1 if anything differs by more than X: lengths as a fraction of the "
+        "reference's size, angles in radians, weights as stored",
     )
     group.add_argument("--json", action="store_true", help="print everything as JSON")
     group.add_argument(

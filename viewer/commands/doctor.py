@@ -1,4 +1,4 @@
-"""Report on this machine: packages, OpenGL, EGL and display, with remedies."""
+"""Report about this machine: packages, OpenGL, EGL and display, with remedies."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _examine_packages() -> Iterator[Finding]:
 
 
 def _examine_devices() -> Iterator[Finding]:
-    """Report every EGL device; `--gpu N` chooses one."""
+    """Report every EGL device; `--gpu N` selects one."""
     if not sys.platform.startswith("linux"):
         return
     from viewer.rendering.gpu.context import device_count, headless_context, unreadable_devices

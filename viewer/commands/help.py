@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=[*PAGES, *COMMANDS],
         metavar="TOPIC",
-        help="a page of the manual, or a command whose options to list (default: list the topics)",
+        help="a page of the manual, or a command to list its options (default: list the topics)",
     )
 
 
@@ -56,7 +56,7 @@ def _print_page(text: str) -> None:
     if sys.stdout is None or not sys.stdout.isatty():
         print(text, end="")
         return
-    # Imported late: importing rich takes longer than the rest of this command.
+    # This import is late because rich takes longer to import than the rest of this command to run.
     from rich.console import Console
     from rich.markdown import Markdown
     from rich.theme import Theme
@@ -65,5 +65,5 @@ def _print_page(text: str) -> None:
     console = Console(theme=Theme({"markdown.code": "bold cyan"}))
     with console.capture() as page:
         console.print(Markdown(text, hyperlinks=False))
-    # Printed here, so that a failed write is reported like any other.
+    # The text is printed here so that a failed write is reported like any other.
     print(page.get(), end="")

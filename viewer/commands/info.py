@@ -299,8 +299,8 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
         if skin[key]:
             lines.append(f"    {skin[key]} {text}")
     if skin["joints_without_vertices"]:
-        idle = counted(len(skin["joints_without_vertices"]), "joint", "moves", "move")
-        lines.append(f"    {idle} no vertex")
+        idle = counted(len(skin["joints_without_vertices"]), "joint", "has", "have")
+        lines.append(f"    {idle} no influence")
     return lines
 
 

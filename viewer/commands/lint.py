@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_limits(group: argparse._ArgumentGroup) -> None:
-    """Add the limits of motions that depend on the user's purpose."""
+    """Add the limits of motions, which depend on the user's purpose."""
     group.add_argument(
         "--max-speed",
         type=number,
@@ -83,17 +83,17 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
         type=number,
         default=0.3,
         metavar="C",
-        help="confidence of captured keypoints below which it is low; keypoints with low "
-        "confidence in more than 5 %% of their frames are reported (default: 0.3)",
+        help="minimum confidence of captured keypoints; keypoints that are below it in more than 5 "
+        "%% of their frames are reported (default: 0.3)",
     )
     group.add_argument(
         "--ground",
         type=_ground,
         default="auto",
         metavar="HEIGHT|auto|none",
-        help="height of the ground, for feet more than 1 %% of the figure's height below it (17 mm "
-        "for a person); auto: where feet rest longest; none: feet are not checked "
-        "(default: auto)",
+        help="height of the ground; feet that are below it by more than 1 %% of the figure's "
+        "height (17 mm for a person) are reported; auto: the height at which feet rest longest; "
+        "none: feet are not checked (default: auto)",
     )
     group.add_argument(
         "--fps",
@@ -101,7 +101,9 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
         metavar="N",
         help="frames per second of captures, and for sampling keyframed clips (default: 30)",
     )
-    group.add_argument("--hands", choices=("mean", "flat"), help="hand pose at pose parameters 0")
+    group.add_argument(
+        "--hands", choices=("mean", "flat"), help="hand pose for pose parameters of 0"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -193,12 +193,14 @@ def draw_scene(
     The default quality is lowered if drawing it in software would take long.
     """
     from viewer.rendering.offscreen import Offscreen
-    from viewer.rendering.quality_limits import limit_passes
+    from viewer.rendering.quality_limits import limit_passes, time_note
 
     with deferred(), Offscreen(device) as offscreen:
         notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)
-        pixels = offscreen.render(scene, size, camera, options, box)
         print_warnings(notes)
+        pixels = offscreen.render(
+            scene, size, camera, options, box, lambda *times: print_warnings(time_note(*times))
+        )
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:
             left_out, n_seen = offscreen.renderer.names_left_out

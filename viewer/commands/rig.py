@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FILE",
         help="the rigged figure: any file, a model's name, body (default) or fox; repeat it for "
-        "further files of the figure or its motion",
+        "other files of the figure or its motion",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help=".skel (with .skin, .obj, .json), or .npz"
@@ -95,14 +95,14 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
         type=number,
         default=0.05,
         metavar="X",
-        help="distance up to which a vertex matches, relative to the target's size (default: 0.05)",
+        help="maximum distance of matching points, relative to the target's size (default: 0.05)",
     )
     group.add_argument(
         "--max-angle",
         type=number,
         default=30.0,
         metavar="DEG",
-        help="angle between normals up to which a vertex matches (default: 30)",
+        help="maximum angle between the normals of matching points (default: 30)",
     )
     group.add_argument(
         "--smooth",
@@ -120,7 +120,7 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
         "--joints",
         choices=JOINTS,
         default="surface",
-        help="joints follow the surface around them, or only the alignment (default: surface)",
+        help="place joints by the surface around them, or only by the alignment (default: surface)",
     )
     group.add_argument(
         "--no-fit",
@@ -135,17 +135,13 @@ def _add_method_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("alignment")
-    group.add_argument(
-        "--up", choices=AXES, help="up axis of the target (default: found automatically)"
-    )
-    group.add_argument(
-        "--facing", choices=AXES, help="front of the target (default: found automatically)"
-    )
+    group.add_argument("--up", choices=AXES, help="up axis of the target (default: estimated)")
+    group.add_argument("--facing", choices=AXES, help="front of the target (default: estimated)")
     group.add_argument(
         "--scale",
         choices=SCALES,
         default="uniform",
-        help="scale of the template: one, one per axis, or none (default: uniform)",
+        help="scale of the template: one factor, one factor per axis, or none (default: uniform)",
     )
     group.add_argument(
         "--landmarks",
@@ -200,7 +196,7 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
-    """Return the mesh to rig; a mesh with a rig in its current pose."""
+    """Return the mesh to rig; a mesh that has a rig is used in its current pose."""
     scene = load(*map(resolve, arguments.files))
     inputs += scene.files
     print_warnings(scene.diagnostics)

@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene, builders = begin_scene(arguments)
     if arguments.time is not None or arguments.frame is not None:
         for builder in builders:
-            finish(builder, scene)  # who is present at that time is known only now
+            finish(builder, scene)  # only now is it known who is present at that time
     print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))

@@ -29,8 +29,8 @@ def described(found: Diagnostic) -> dict[str, Any]:
     Returns
     -------
     dict
-        Code, key, severity, message, file and line (or None), part, count, values as returned by
-        ``plain``, the first 100 indices, and the number of indices.
+        Code, key, severity, message, file, line (or None), JSON pointer, part, count, values as
+        returned by ``plain``, the first 100 indices, and the number of indices.
     """
     places = np.zeros(0, dtype=np.int32) if found.places is None else found.places
     return {
@@ -40,6 +40,7 @@ def described(found: Diagnostic) -> dict[str, Any]:
         "message": printable(found.full_message, 2000),
         "file": None if found.path is None else printable(found.path, 1000),
         "line": found.line,
+        "pointer": found.pointer,
         "part": found.part or None,
         "places": places[:_LISTED].tolist(),
         "n_places": len(places),

@@ -58,6 +58,8 @@ class Diagnostic:
         Whether ``load`` refuses the file because of it.
     is_final : bool
         Whether it stopped parsing of the file.
+    pointer : str
+        JSON pointer (RFC 6901) to the element of that file, as in ``"/skins/0/joints/3"``.
     """
 
     key: str
@@ -70,6 +72,7 @@ class Diagnostic:
     level: str = ""
     is_refusal: bool = False
     is_final: bool = False
+    pointer: str = ""
 
     @property
     def code(self) -> str:
@@ -100,10 +103,12 @@ class Diagnostic:
 
     @property
     def place(self) -> str:
-        """``file:line``, or the known part of it."""
+        """``file:line`` or ``file#pointer``, or the known part of it."""
         if self.path is None:
             return ""
         path = printable(self.path, 300)
+        if self.pointer:
+            return f"{path}#{printable(self.pointer, 120)}"
         return path if self.line is None else f"{path}:{self.line}"
 
     @property

@@ -1,4 +1,4 @@
-"""Exporters of posed figures and motions to files of other programs, one module each."""
+"""Exporters of posed figures and motions for other programs, one module each."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Exporter:
     writes_motion : bool
         Whether its module has ``export_animation(animation, path, options)``.
     keeps_world : bool
-        Whether it keeps the up axis of a motion's own world, even if that is upside down.
+        Whether it keeps the up axis of the motion's own world, even if that is upside down.
     """
 
     title: str
@@ -99,7 +99,7 @@ def exporter_for(path: str | Path) -> str:
         if suffix in kind.suffixes:
             return key
     known = ", ".join(suffix for kind in kinds.values() for suffix in kind.suffixes)
-    raise UnsupportedFormatError(f'no exporter for "{suffix}"; there are: {known}')
+    raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
 
 
 def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> list[Diagnostic]:
@@ -110,20 +110,20 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     actor : Actor
         Figure and pose.
     path : str or Path
-        The suffix chooses the exporter; existing files are replaced.
+        The suffix selects the exporter; existing files are replaced.
     skinning : Skinning, optional
         Skinning method and options.
 
     Returns
     -------
     list of Diagnostic
-        Notes: the written files, then the data that the format cannot hold, with errors. ``str`` of
-        each is its text.
+        Notes: the written files, then the data that the format cannot store, with errors. ``str``
+        gives the text of each.
 
     Raises
     ------
     UnsupportedFormatError
-        If no exporter has this suffix.
+        If no exporter writes this suffix.
     RigError
         If the figure lacks the data that the format needs.
     OutputError
@@ -147,7 +147,7 @@ def motion_exporters(path: str | Path) -> list[str]:
     found = [key for key, kind in kinds.items() if suffix in kind.suffixes]
     if not found:
         known = ", ".join(dict.fromkeys(s for kind in kinds.values() for s in kind.suffixes))
-        raise UnsupportedFormatError(f'no motion exporter for "{suffix}"; there are: {known}')
+        raise UnsupportedFormatError(f'no motion exporter for "{suffix}"; supported: {known}')
     return found
 
 
@@ -159,7 +159,7 @@ def suited_exporter(path: str | Path, figure: Figure) -> str:
     Raises
     ------
     UnsupportedFormatError
-        If no exporter of motions has this suffix.
+        If no exporter writes motions with this suffix.
     """
     found = motion_exporters(path)
     if "amass" not in found or len(found) == 1:
@@ -188,8 +188,8 @@ def export_animation(
     Returns
     -------
     list of Diagnostic
-        Notes: the written files, then the data that the format cannot hold, with errors. ``str`` of
-        each is its text.
+        Notes: the written files, then the data that the format cannot store, with errors. ``str``
+        gives the text of each.
 
     Raises
     ------
@@ -231,12 +231,12 @@ def animation_for(
 
 
 def files_written(path: str | Path) -> list[Path]:
-    """Return all files that an export to ``path`` writes: two for a rig or a ``.gltf``.
+    """Return all files that an export to ``path`` writes, such as two for a rig or a ``.gltf``.
 
     Raises
     ------
     UnsupportedFormatError
-        If no exporter has this suffix.
+        If no exporter writes this suffix.
     """
     suffixes = EXPORTERS[exporter_for(path)].suffixes
     if exporter_for(path) == "rig":

@@ -17,12 +17,11 @@ _CUBE = 0.01  # half the side of default boxes, relative to the skeleton's size
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
     """Return the skeleton in the form of ``.skel`` files, with the pose as its rest pose.
 
-    ``skeleton``: without rest rotations and scales; its lengths already include the figure's
-      scale.
-    ``pose``: becomes the file's pose; the figure's translation is added to the roots' offsets.
-    Returns ``skeleton``: joints in depth-first order.
-    Returns ``order`` (J,) int32: the old index of each new joint.
-    Raises RigError if a joint has properties that the format cannot hold.
+    ``skeleton``: skeleton without rest rotations and scales; its lengths already include the
+    figure's scale. ``pose``: becomes the file's pose; the figure's translation is added to the
+    roots' offsets. Returns ``skeleton``: joints in depth-first order. Returns ``order`` (J,) int32:
+    the old index of each new joint. Raises RigError if a joint has properties that the format
+    cannot store.
     """
     _check(skeleton, pose)
     order = depth_first(skeleton.parents)
@@ -59,7 +58,7 @@ def _check(skeleton: Skeleton, pose: Pose) -> None:
     ):
         worst = int(off.argmax())
         if off[worst] > 1e-12:
-            raise RigError(f".skel cannot hold the {what} of joint {joint_label(skeleton, worst)}")
+            raise RigError(f".skel cannot store the {what} of joint {joint_label(skeleton, worst)}")
 
 
 def _rotation_rows(skeleton: Skeleton) -> Ints:
@@ -71,14 +70,14 @@ def _rotation_rows(skeleton: Skeleton) -> Ints:
         if rows[joint, axis:].max() >= 0:
             raise RigError(
                 f".skel rotates joints about x, then y, then z; joint "
-                f"{joint_label(skeleton, joint)} has another rotation order"
+                f"{joint_label(skeleton, joint)} has a different rotation order"
             )
         rows[joint, axis] = row
     return rows
 
 
 def _root_shift(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return the translation of the first joint by its DOFs; others must not translate."""
+    """Return the translation of the first joint by its DOFs; other joints must not translate."""
     shift = np.zeros(3)
     for row in np.flatnonzero(skeleton.dof_kinds < 3).tolist():
         joint = int(skeleton.dof_joints[row])
@@ -86,7 +85,7 @@ def _root_shift(skeleton: Skeleton, pose: Pose) -> Floats:
             shift[skeleton.dof_kinds[row]] += pose.dofs[row]
         elif pose.dofs[row] != 0.0:
             raise RigError(
-                f".skel cannot hold a translation of joint {joint_label(skeleton, joint)}"
+                f".skel cannot store a translation of joint {joint_label(skeleton, joint)}"
             )
     return shift
 

@@ -32,7 +32,7 @@ class FamilyFrames:
     member : Member
         Model of the family.
     vectors : (F, J, 3)
-        Rotation vectors in the member's own order, angles up to pi.
+        Rotation vectors in the member's own joint order, with angles up to pi.
     translations : (F, 3)
         t, metres.
     roots : (F, 3) or (1, 3)
@@ -66,7 +66,7 @@ class FamilyFrames:
 def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Member:
     """Return the member of the family that has the same joints as a figure.
 
-    ``figure``: with a skeleton.
+    ``figure``: figure with a skeleton.
     ``what``: name of the output, for the message.
     ``roots``: allowed names of the root: ``"pelvis"`` for bodies, ``"wrist"`` for hands.
     Raises RigError if no member has these joints, or if the figure's unit is unknown.
@@ -99,7 +99,7 @@ def check_unit(options: MotionOptions, title: str) -> None:
 def up_axis(options: MotionOptions) -> str:
     """Return the up axis of the file, by default that of the scene.
 
-    Raises RigError if the requested one is neither y nor z; the scene's axis may be negative.
+    Raises RigError if the requested axis is neither y nor z; the scene's axis may be negative.
     """
     if options.up not in ("", "y", "z"):
         raise RigError(f'up axis: expected y or z, found "{options.up}"')
@@ -115,7 +115,7 @@ def family_frames(
     """Return an animation as parameters of the family.
 
     The root joint is at t + J0, so t is its displacement from the rest position. For a different up
-    axis the world is rotated by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
+    axis, the world is rotated by Q about its x axis: R' = Q R, t' = Q (t + J0) - J0.
 
     ``animation``: an animation of a figure whose unit is known.
     ``frames``: its frames; rows of missing frames are undefined.
@@ -182,7 +182,7 @@ def _own_shapes(figure: Figure) -> list[Diagnostic]:
 
 
 def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
-    """Return notes about a skeleton's unit, and a rest root that differs from a model's."""
+    """Return notes about a skeleton's unit, and a rest root unlike the model's."""
     notes = []
     if figure.unit != "m":
         unit = UNIT_NAMES[figure.unit]

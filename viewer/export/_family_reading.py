@@ -26,7 +26,7 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Motion
 
     ``motion``: the read motion, in metres.
     ``animation``: the written animation.
-    ``options``: define the up axes of the animation and the file.
+    ``options``: options with the up axes of the animation and the file.
     """
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
@@ -40,7 +40,7 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Motion
 
 
 def _rotated(frames: Frames, animation: SampledAnimation, vector: Floats) -> Frames:
-    """Return frames in a rotated world: R' = Q R, T' = Q (p + T) - p with the rest root at p."""
+    """Return frames in a rotated world: R' = Q R, T' = Q (p + T) - p; p is the root at rest."""
     rotations = frames.rotations.copy()
     rotations[:, 0] = multiply(rotation_vector_to_quaternion(vector), rotations[:, 0])
     root = rest_translations_of(animation.figure, frames.shape_weights)[:, 0]

@@ -31,7 +31,7 @@ def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> lis
     ``present`` (F,): whether each frame is present.
     ``first_frame``: number of the first frame.
     ``closing``: a key of ``GAPS``.
-    ``how``: phrases by key of ``GAPS``, where they differ from the usual ones.
+    ``how``: phrases by key of ``GAPS``, if they differ from the usual ones.
     """
     if present.all():
         return []
@@ -47,7 +47,7 @@ def frames_phrase(first: int, count: int) -> Phrase:
 
 
 def kept_note(present: Bools, first_frame: int) -> list[Diagnostic]:
-    """Return a note about frames that are missing in the file too, if there are any."""
+    """Return a note about frames that are also missing in the file, if there are any."""
     return [] if present.all() else [Diagnostic("X004.kept", values=_gaps(present, first_frame))]
 
 
@@ -64,7 +64,7 @@ def _gaps(present: Bools, first_frame: int) -> dict[str, object]:
 def filled(frames: Frames, interpolate: bool) -> Frames:
     """Return frames without gaps.
 
-    ``frames``: at least one of them present.
+    ``frames``: frames, at least one of them present.
     ``interpolate``: if true, interpolate between the frames around a gap, rotations along the
       shorter arc and everything else linearly; if false, hold the frame before it. Gaps at the ends
       hold the first or last frame.

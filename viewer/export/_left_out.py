@@ -1,4 +1,4 @@
-"""Parts of figures that formats cannot hold."""
+"""Parts of figures that formats cannot store."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.rig.figure import Figure
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:
-    """Return the data of a figure other than mesh, skeleton, skin and shapes."""
+    """Return the parts of a figure other than mesh, skeleton, skin and shapes."""
     extras = {
         "part-body-parts": figure.body_parts,
         "part-keypoints": figure.keypoints,
@@ -21,5 +21,5 @@ def extra_parts(figure: Figure) -> list[Phrase]:
 
 
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:
-    """Return a note that lists the parts that a format cannot hold, if there are any."""
+    """Return a note that lists the parts that a format cannot store, if there are any."""
     return [Diagnostic("X003.parts", values={"format": kind, "parts": parts})] if parts else []

@@ -31,13 +31,13 @@ _ONE_NUMBER = ("metallic_texture", "roughness_texture")
 
 
 def material_library(mesh: Mesh, path: Path) -> dict[Path, bytes]:
-    """Return the images and, last, the ``.mtl`` that refers to them; nothing for plain meshes."""
+    """Return the images, followed by the ``.mtl`` that refers to them; empty for plain meshes."""
     uvs = mesh.uvs if mesh.uvs is not None else np.zeros((0, 2))
     materials = mesh.materials if any(map(_has_look, mesh.materials)) else ()
     files: dict[Path, bytes] = {}
     parts = [f"newmtl {PLAIN}\nKd 1 1 1\n"]
     stem = path.stem[:80]  # longer names would be truncated after the number
-    # Options before the name are unknown to some programs, so they are written where they count.
+    # Some programs do not support options before the name, so only necessary ones are written.
     clamps = bool(((uvs < 0.0) | (uvs > 1.0)).any())
     for index, material in enumerate(materials):
         parts.append(f"newmtl material{index}\n{_numbers(material)}")
@@ -80,7 +80,7 @@ def _numbers(material: Material) -> str:
 
 
 def _pictures(material: Material) -> dict[str, tuple[Texture, Bytes, str]]:
-    """Return texture, pixels and ending of the name of each statement."""
+    """Return the texture, pixels and name ending for each statement."""
     found = {}
     for name, (statement, ending) in _MAPS.items():
         texture = getattr(material, name)
@@ -114,7 +114,7 @@ def _options(texture: Texture, clamps: bool) -> str:
 
 
 def library_losses(mesh: Mesh) -> list[Phrase]:
-    """Return the material properties of a mesh that a material library cannot hold."""
+    """Return the material properties of a mesh that a material library cannot store."""
     materials = mesh.materials
     placed = [texture for material in materials for texture in material.textures.values()]
     lost = {

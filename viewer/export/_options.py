@@ -1,4 +1,4 @@
-"""Options of motion export; each exporter uses those of its format."""
+"""Options of motion export; each exporter uses the options of its format."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _CLOSED = "hold"  # default of formats that do not support missing frames
 
 @dataclass(slots=True)
 class MotionOptions:
-    """Options of writing a motion.
+    """Options for writing a motion.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class MotionOptions:
     digits : int
         Decimals of text formats.
     world_up : "y", "z", "-y" or "-z"
-        The up axis of the animation's world; the last two only for exporters that keep that
+        The up axis of the animation's world; negative axes are only for exporters that keep that
         world.
     skinning : Skinning
         Skinning method and options, if vertices are written.

@@ -37,7 +37,7 @@ def files_of(output: Path) -> list[Path]:
     if suffix in (".skel", ".skin"):
         return [output.with_suffix(each) for each in _RIG]
     raise UnsupportedFormatError(
-        f'a rigged mesh cannot be written as "{suffix}"; there are: .skel (with .skin, .obj and '
+        f'a rigged mesh cannot be written as "{suffix}"; supported: .skel (with .skin, .obj and '
         "the target's pose as .json), .npz"
     )
 
@@ -47,10 +47,10 @@ def write_rigged(rigged: Rigged, output: Path) -> list[Diagnostic]:
 
     ``rigged``: the result of the rig transfer.
     ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
-      coordinates as ``.obj``, the target's pose as ``.json``; they hold no pose correctives, see
+      coordinates as ``.obj``, the target's pose as ``.json``; they contain no pose correctives, see
       ``without_correctives``. ``.npz``: everything in one file.
-    Returns: notes about the written files, and about data that a format cannot hold.
-    Raises RigError if ``.skel`` cannot hold the skeleton.
+    Returns: notes about the written files, and about data that the format cannot store.
+    Raises RigError if ``.skel`` cannot store the skeleton.
     Raises UnsupportedFormatError as ``files_of``.
     Raises OutputError if a file cannot be written.
     """

@@ -65,7 +65,7 @@ def export_animation(
     Returns
     -------
     list of Diagnostic
-        Notes: the written files, then the data that the format cannot hold.
+        Notes: the written files, then the data that the format cannot store.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def export_animation(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not present.any():
-        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
     frames = filled(animation.frames, options.closing == "interpolate")
     body, notes = family_frames(animation, frames, member, options)
     is_split = options.closing == "split" and not present.all()

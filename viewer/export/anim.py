@@ -1,4 +1,4 @@
-"""Exporter of ``.anim`` files: motions of .skel-style rigs, as original keys or a key per frame."""
+"""Exporter of ``.anim`` files: motions of .skel-style rigs, by original keys or a key per frame."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def export_animation(
     """Write a motion as a clip of keys, see ``viewer.export.export_animation``.
 
     A keyframed clip that is requested as a whole is written exactly, with its own keys. Any other
-    motion gets a key per frame, with linear or smooth tangents, whichever have the smaller joint
+    motion gets a key per frame, with linear or smooth tangents, whichever give the smaller joint
     error.
 
     Parameters
@@ -55,7 +55,7 @@ def export_animation(
     Returns
     -------
     list of Diagnostic
-        Notes: the written files, joint errors, and the data that the format cannot hold.
+        Notes: the written files, joint errors, and the data that the format cannot store.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def export_animation(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
     if isinstance(animation.motion, Clip) and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
             write(animation.motion, path)
@@ -212,7 +212,7 @@ def _summary(path: Path, clip: Clip, how: Phrase | str) -> Diagnostic:
 
 
 def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
-    """Return notes about everything that a clip cannot hold."""
+    """Return notes about everything that a clip cannot store."""
     notes, there = [], frames.present
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:

@@ -40,13 +40,13 @@ _MOST_DIGITS = 15
 def export_animation(
     animation: SampledAnimation, path: Path, options: MotionOptions
 ) -> list[Diagnostic]:
-    """Write a motion, read it back, and report the errors of its joints and of a skin on them.
+    """Write a motion, read it back, and report the errors of its joints and of a bound skin.
 
     Offsets are those of the shape in the first present frame. The root has offset 0 and its
     position in its channels, so that readers which add offsets and readers which replace them
     agree. Angles are unwrapped.
 
-    A file holds no mesh. The reported vertex error is the distance between the figure's mesh and
+    A file contains no mesh. The reported vertex error is the distance between the figure's mesh and
     the same mesh, in the shape of the bones, skinned with the file's joints; both use LBS.
 
     Parameters
@@ -74,7 +74,7 @@ def export_animation(
     """
     _check(options)
     if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
     reference = int(animation.frames.present.argmax())
     is_split = options.closing == "split" and not animation.frames.present.all()
     frames = filled(animation.frames, options.closing == "interpolate")
@@ -134,7 +134,7 @@ def _up_rotation(start: str, end: str) -> Floats:
 
 
 def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
-    """Return a figure with one root: several roots become children of a joint at its origin."""
+    """Return a figure with one root: several roots become children of a joint at the origin."""
     skeleton = figure.require_skeleton()
     if int((skeleton.parents < 0).sum()) == 1:
         return figure, frames
@@ -184,7 +184,7 @@ class _Writer:
     """Writer of all files of one animation."""
 
     animation: SampledAnimation
-    figure: Figure  # with one root
+    figure: Figure  # has a single root
     body: Body
     ends: dict[int, Floats]
     space: Space

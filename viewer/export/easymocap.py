@@ -54,7 +54,7 @@ _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 def export_animation(
     animation: SampledAnimation, path: Path, options: MotionOptions
 ) -> list[Diagnostic]:
-    """Write one person with the number 0; see ``export_animations``."""
+    """Write one person, with number 0; see ``export_animations``."""
     return export_animations([animation], path, options)
 
 
@@ -66,14 +66,14 @@ def export_animations(
 ) -> list[Diagnostic]:
     """Write several people into one folder, with seven decimals.
 
-    Frames keep the numbers of the animations. Frames without people hold an empty list.
+    Frames keep the numbers of the animations. Frames without people contain an empty list.
 
     Parameters
     ----------
     animations : sequence of SampledAnimation
         At least one animation of an SMPL-family body, all with the same frame rate.
     path : Path
-        The folder; its subfolder ``smpl`` is replaced if it holds only numbered frames.
+        The folder; its subfolder ``smpl`` is replaced if it contains only numbered frames.
     options : MotionOptions
         Up axis (that of the scene if empty), and handling of gaps, which are kept unless the
         options request holding or interpolation.
@@ -83,7 +83,7 @@ def export_animations(
     Returns
     -------
     list of Diagnostic
-        Notes: the written folder, then the data that the format cannot hold.
+        Notes: the written folder, then the data that the format cannot store.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def export_animations(
         If a figure has other joints or an unknown unit, a unit other than metres is requested,
         frame rates differ, two people have the same number, or no frame is present.
     OutputError
-        If the folder cannot be written, or holds other files.
+        If the folder cannot be written, or contains other files.
     """
     persons = range(len(animations)) if persons is None else persons
     check_unit(options, "EasyMocap")
@@ -178,7 +178,7 @@ def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> No
                 f"{animation.name}: expected frames from 0 on, found {animation.first_frame}"
             )
         if not animation.frames.present.any():
-            raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+            raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
 
 
 class _Records:
@@ -254,7 +254,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
 
 
 def _refuse_others(path: Path, target: Path) -> None:
-    """Raise OutputError for a folder that holds anything but numbered frames."""
+    """Raise OutputError for a folder that contains anything other than numbered frames."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"{printable(path, 300)}: expected a folder, found a file")
     if not target.exists():
@@ -263,6 +263,6 @@ def _refuse_others(path: Path, target: Path) -> None:
         other = next((entry.name for entry in entries if not _FRAME.fullmatch(entry.name)), None)
     if other is not None:
         raise OutputError(
-            f"{printable(target, 300)}: holds files other than frames ({printable(other, 60)}) "
+            f"{printable(target, 300)}: contains files other than frames ({printable(other, 60)}) "
             "and is not replaced"
         )

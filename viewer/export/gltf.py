@@ -1,7 +1,7 @@
 """Exporter of glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
 
 It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are in
-metres, y is up. Data are not converted: a node above the figure rotates it if z is up, and scales
+metres, y is up. Data is not converted: a node above the figure rotates it if z is up, and scales
 it if it is in another unit.
 """
 
@@ -68,7 +68,7 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write a figure at rest and its motion; see ``viewer.export.export_animation``.
 
-    A changing shape that has to be baked into the mesh is that of the first present frame.
+    A changing shape that must be baked into the mesh is taken from the first present frame.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def export_animation(
     Returns
     -------
     list of Diagnostic
-        Notes: the written files, then the data that the format cannot hold, with errors.
+        Notes: the written files, then the data that the format cannot store, with errors.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
             one = "one of " * (len(list(filter(None, known))) > 1)
             raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
     if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing, there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,8 +8,8 @@
 
 For a motion of F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (F, J, 4, 4),
 ``rotations`` (F, J, 4) relative to the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
-``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``. Rows of missing frames are NaN,
-unless gaps are held or interpolated: then ``present`` is true throughout.
+``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``. Rows of missing frames are NaN.
+If gaps are held or interpolated, ``present`` is true for all frames.
 
 For K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not visible,
 ``confidences`` (K,) or (F, K), ``joint_names`` (K,), ``limbs`` (L, 2), ``sides`` (K,) -1 for right,
@@ -122,7 +122,7 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
     animation : SampledPoints
         Points of one person.
     path : Path
-        The file; replaced if it exists.
+        The file to write, replaced if it exists.
     options : MotionOptions
         Options; ``world_up`` is written to the file.
 
@@ -158,7 +158,7 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
 
 
 def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None:
-    """Raise RigError for options that need a conversion, or if no frame is present."""
+    """Raise RigError if an option needs a conversion, or no frame is present."""
     for what, requested, own in (
         ("unit", options.unit, unit),
         ("up axis", options.up, options.world_up),
@@ -168,7 +168,7 @@ def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None
                 f'{what} of arrays: expected {own or "none"}, as in the scene, found "{requested}"'
             )
     if not present.any():
-        raise RigError(f"{name}: every frame is missing, there is nothing to write")
+        raise RigError(f"{name}: every frame is missing: there is nothing to write")
 
 
 def _point_arrays(

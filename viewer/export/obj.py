@@ -45,7 +45,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         parts.append(_rows("vt", mesh.uvs))
     parts.append(_rows("vn", normals))
     parts += _faces(mesh, bool(beside))
-    # The other files exist with the same content.
+    # Files that are not missing already have the same content.
     missing = [file for file in beside if not os.path.lexists(file)]
     with all_or_none(missing):
         for file in missing:
@@ -62,7 +62,7 @@ def export_animation(
 ) -> list[Diagnostic]:
     """Write one numbered file per frame; see ``viewer.export.export_animation``.
 
-    ``{frame}`` in the name stands for the frame's number, as in ``walk_{frame:05}.obj``. Missing
+    ``{frame}`` in the name is replaced by the frame number, as in ``walk_{frame:05}.obj``. Missing
     frames have no file unless ``options.gaps`` requests holding or interpolation.
     """
     poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)

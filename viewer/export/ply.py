@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import require_mesh
+from viewer.export._left_out import not_held_note
 from viewer.formats import save_bytes
 from viewer.phrases import printable
 from viewer.rig.mesh import Mesh
@@ -38,7 +39,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     text = "\n".join(header).encode("ascii", "backslashreplace")
     save_bytes(path, text + vertices.tobytes() + faces.tobytes())
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
-    return [Diagnostic("X001.mesh", path, values=counts)]
+    lost = [Phrase("part-all-materials")] if mesh.materials else []
+    if mesh.second_uvs is not None:
+        lost.append(Phrase("part-second-uvs"))
+    return [Diagnostic("X001.mesh", path, values=counts), *not_held_note(".ply", lost)]
 
 
 def _faces(mesh: Mesh) -> np.ndarray:

@@ -13,10 +13,11 @@ from viewer.export._course_rig import course_skeleton
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
 from viewer.formats import Source, all_or_none, keeping_written, read, write
+from viewer.formats.skin import lost_parts
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.mesh import Mesh, split_seams
+from viewer.rig.mesh import without_seams
 from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor
@@ -55,7 +56,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
-    """Return all written files, including images under the names that the mesh gives them."""
+    """Return all written files, including images under the names used by the mesh."""
     if rig.mesh is None:
         return [skel]
     pictures = [material.texture for material in rig.mesh.materials if material.image is not None]
@@ -68,15 +69,7 @@ def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.
     posed, order = course_skeleton(skeleton, pose)
     if mesh is None:
         return Figure(figure.name, skeleton=posed), None
-    sources, uv_indices, triangles = split_seams(mesh)
-    split = Mesh(
-        positions=mesh.positions[sources],
-        normals=mesh.normals[sources],
-        triangles=triangles,
-        uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
-        materials=mesh.materials,
-        triangle_materials=mesh.material_indices,
-    )
+    split, sources = without_seams(mesh)
     if skin is None:
         return Figure(figure.name, split, posed), sources
     used = skin_rows(skin_used(skin, skinning), sources)
@@ -104,14 +97,14 @@ def scaled(figure: Figure, factor: float) -> Figure:
 
 
 def _lost(figure: Figure) -> list[Diagnostic]:
-    """Return a note that lists the data that the formats cannot hold."""
+    """Return a note that lists the data that the formats cannot store."""
     lost = []
     if figure.blend_shapes is not None:
         lost.append(Phrase("part-current-shape", n=figure.n_shapes))
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
-    if figure.mesh is not None and not all(one.is_plain for one in figure.mesh.materials):
-        lost.append(Phrase("part-materials"))
+    if figure.mesh is not None:
+        lost += lost_parts(figure.mesh)
     if figure.up != "y":
         lost.append(Phrase("part-up", up=figure.up))
     return not_held_note(".skel and .skin", [*lost, *extra_parts(figure)])

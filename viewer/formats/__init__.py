@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from viewer.formats.rig import NamedFiles
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
+    from viewer.rig.figure_group import FigureGroup
     from viewer.rig.morph_target import MorphTarget
     from viewer.rig.motion.body_motion import BodyMotion
     from viewer.rig.motion.clip import Clip
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
     Content = (
         Figure
+        | FigureGroup
         | Clip
         | PoseRecord
         | SkeletonMotion
@@ -138,6 +140,18 @@ FORMATS = {
     ),
     "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False, is_bare_mesh=True),
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
+    "gltf": Format(
+        "glTF 2.0, VRM",
+        (".glb", ".gltf", ".vrm"),
+        rb"\AglTF|\A\{(?s:.*?)\"asset\"\s*:\s*\{",
+        writes=False,
+    ),
+    "fbx": Format(
+        "FBX",
+        (".fbx",),
+        rb"\AKaydara FBX Binary|\A;\s*FBX|\A(?s:.{0,2000}?)FBXHeaderExtension\s*:",
+        writes=False,
+    ),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),
@@ -294,7 +308,7 @@ def read(source: Source) -> Content:
     return import_module(f"{__name__}.{detect(source)}").read(source)
 
 
-def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
     """Write a clip, a pose, or the part of a figure that the format of the suffix holds.
 
     An existing file is replaced.
@@ -306,10 +320,15 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     path : str or Path
         Its suffix determines the format.
 
+    Returns
+    -------
+    list of Diagnostic
+        Notes about data of this part that the format cannot hold, or holds in another form.
+
     Raises
     ------
     UnsupportedFormatError
-        If no format has this suffix, or it cannot hold the content.
+        If no format has this suffix, or it cannot store the content.
     OutputError
         If the file cannot be written.
     """
@@ -317,8 +336,8 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
     writers = {key: kind for key, kind in FORMATS.items() if kind.writes}
     for key, kind in writers.items():
         if suffix in kind.suffixes:
-            import_module(f"{__name__}.{key}").write(content, path)
-            return
+            notes: list[Diagnostic] = import_module(f"{__name__}.{key}").write(content, path)
+            return notes
     known = list(dict.fromkeys(s for kind in writers.values() for s in kind.suffixes))
     values = {"suffix": suffix, "known": known}
     raise UnsupportedFormatError(Diagnostic("F002.no-writer", values=values))

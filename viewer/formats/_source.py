@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
-from viewer.formats._numbers import word_begins
+from viewer.formats._text.numbers import word_begins
 from viewer.rig.arrays import Ints
 
 __all__ = ["MAX_SIZE", "Source", "read_bytes"]
@@ -23,7 +23,7 @@ Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-_ANY_END = (b"ply\n", b"ply\r")  # binary data follows, which may end with any byte
+_ANY_END = (b"ply\n", b"ply\r", b"glTF")  # binary data follows, which may end with any byte
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
@@ -162,7 +162,7 @@ class Source:
         """Offset after the last word, where anything missing is reported."""
         return len(self.data.rstrip())
 
-    def fault(self, key: str, offset: int | None = None, **values: Any) -> FormatError:
+    def fault(self, key: str, offset: int | str | None = None, **values: Any) -> FormatError:
         """Return the exception for an error after which the reader cannot continue.
 
         Parameters
@@ -170,7 +170,7 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, if known.
+            Position in the file, or a JSON pointer, if known.
         **values : object
             Values in the message. They are keywords so that calls read like the templates.
         """
@@ -179,7 +179,7 @@ class Source:
     def refuse(
         self,
         key: str,
-        offset: int | None = None,
+        offset: int | str | None = None,
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,
@@ -192,7 +192,7 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, if known; that of the first of several errors.
+            Position in the file, or a JSON pointer, if known; that of the first of several errors.
         count : int
             Number of errors.
         part, places : str, (N,)
@@ -214,7 +214,7 @@ class Source:
     def warn(
         self,
         key: str,
-        offset: int | None = None,
+        offset: int | str | None = None,
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,
@@ -227,7 +227,7 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, if known.
+            Position in the file, or a JSON pointer, if known.
         count, part, places : int, str, (N,)
             Number of errors, and their indices; see ``Diagnostic``.
         **values : object
@@ -238,15 +238,16 @@ class Source:
     def _diagnostic(
         self,
         key: str,
-        offset: int | None,
+        offset: int | str | None,
         values: dict[str, Any],
         count: int = 1,
         part: Part = "",
         places: ArrayLike | None = None,
     ) -> Diagnostic:
-        line = None if offset is None else self.line(offset)
+        line = None if offset is None or isinstance(offset, str) else self.line(offset)
         indices = None if places is None else _indices(places)
-        return Diagnostic(key, self.path, line, part, indices, values, count)
+        pointer = offset if isinstance(offset, str) else ""
+        return Diagnostic(key, self.path, line, part, indices, values, count, pointer=pointer)
 
     @property
     def warnings(self) -> list[str]:

@@ -23,10 +23,10 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.errors import FormatError, UnsupportedFormatError
-from viewer.formats._numbers import to_number
 from viewer.formats._reach import FARTHEST
 from viewer.formats._source import Source
-from viewer.formats._words import number_key
+from viewer.formats._text.numbers import to_number
+from viewer.formats._text.words import number_key
 from viewer.media.saving import save_text
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import (
@@ -301,7 +301,7 @@ class _Parser:
         return tangent
 
 
-def write(clip: Clip | Figure, path: str | Path) -> None:
+def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     """Write a clip.
 
     Parameters
@@ -310,6 +310,11 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
         Clip with one channel per DOF, in the order of the DOF table.
     path : str or Path
         Replaced only when the whole text has been written.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the format holds all of a clip.
 
     Raises
     ------
@@ -325,6 +330,7 @@ def write(clip: Clip | Figure, path: str | Path) -> None:
     head = f"animation {{\n\trange {clip.start!r} {clip.end!r}\n"
     head += f"\tnumchannels {len(clip.channels)}\n"
     save_text(path, head + "".join(map(_channel_text, clip.channels)) + "}\n")
+    return []
 
 
 def _channel_text(channel: Channel) -> str:

@@ -40,7 +40,7 @@ from viewer.formats._archive.values import describe
 from viewer.formats._pose.named_values import NamedValues, described, parse_json
 from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
 from viewer.formats._source import Source
-from viewer.formats._table import read_numbers
+from viewer.formats._text.table import read_numbers
 from viewer.media.saving import save_arrays, save_text
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.phrases import printable
@@ -286,7 +286,7 @@ def _named(record: PoseRecord) -> dict[str, Any]:
     )
 
 
-def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
+def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
     """Write one pose in the format of the suffix.
 
     Parameters
@@ -295,6 +295,11 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
         Pose to write; other content is refused.
     path : str or Path
         ``.json``, ``.npz``, or ``.txt`` for the model's own pose vector alone.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the formats hold all that they are given for.
 
     Raises
     ------
@@ -319,3 +324,4 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> None:
         arrays["dof_names"] = np.array(list(dofs), dtype=np.str_)
         arrays["dofs"] = np.array(list(dofs.values()))
         save_arrays(path, arrays)
+    return []

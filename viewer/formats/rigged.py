@@ -284,7 +284,7 @@ def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | No
     Parameters
     ----------
     figure : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     path : str or Path
         Replaced in one step.
     more : mapping of str to array, optional

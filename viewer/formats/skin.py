@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._neutral import neutral_positions
-from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
     check_mesh,
@@ -38,6 +38,7 @@ from viewer.formats._skin.checks import (
 )
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.formats._texture import load_image
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text
@@ -45,10 +46,10 @@ from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
-from viewer.rig.mesh import Mesh, vertex_normals
-from viewer.rig.skin import Skin
+from viewer.rig.mesh import Mesh, vertex_normals, without_seams
+from viewer.rig.skin import Skin, skin_rows
 
-__all__ = ["read", "write"]
+__all__ = ["lost_parts", "read", "write"]
 
 _SHORTEST = 1e-15  # length of a normal; the square of a shorter one is 0 in float32
 
@@ -165,7 +166,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     return skin
 
 
-def write(figure: Figure, path: str | Path) -> None:
+def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     """Write a figure's mesh, weights and bindings, and any of its texture images that are missing.
 
     Parameters
@@ -174,6 +175,11 @@ def write(figure: Figure, path: str | Path) -> None:
         Figure with a mesh. Without a skin, weights and bindings are omitted.
     path : str or Path
         Replaced only when the whole text has been written.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes about properties of materials that are omitted, and about vertices that were split.
 
     Raises
     ------
@@ -184,19 +190,39 @@ def write(figure: Figure, path: str | Path) -> None:
     """
     if figure.mesh is None:
         raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")
-    mesh = figure.mesh
-    _check_writable(figure.name, mesh, figure.skin)
+    mesh, sources = without_seams(figure.mesh)
+    skin = None if figure.skin is None else skin_rows(figure.skin, sources)
+    _check_writable(figure.name, mesh, skin)
     parts = [_table("positions", mesh.positions), _table("normals", mesh.normals)]
     if mesh.uvs is not None:
         parts.append(_table("texcoords", mesh.uvs))
-    if figure.skin is not None:
-        parts.append(_weights_text(figure.skin))
+    if skin is not None:
+        parts.append(_weights_text(skin))
     parts.extend(_triangle_runs(mesh))
-    if figure.skin is not None:
-        parts.append(_bindings_text(figure.skin))
+    if skin is not None:
+        parts.append(_bindings_text(skin))
     for material in mesh.materials:
         _save_texture(material, Path(path).parent)
     save_text(path, "".join(parts))
+    notes = []
+    if len(sources) != figure.mesh.n_vertices:
+        counts = {"before": figure.mesh.n_vertices, "after": mesh.n_vertices}
+        notes.append(Diagnostic("X005.seams", Path(path), values=counts))
+    if lost := lost_parts(mesh):
+        notes.append(
+            Diagnostic("X003.parts", Path(path), values={"format": ".skin", "parts": lost})
+        )
+    return notes
+
+
+def lost_parts(mesh: Mesh) -> list[Phrase]:
+    """Return the data of a mesh that the format cannot hold."""
+    lost = []
+    if not all(material.is_plain for material in mesh.materials):
+        lost.append(Phrase("part-materials"))
+    if mesh.second_uvs is not None:
+        lost.append(Phrase("part-second-uvs"))
+    return lost
 
 
 def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
@@ -204,7 +230,7 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
         raise UnsupportedFormatError(f"figure {name} has no triangles to write as .skin")
     arrays = [mesh.positions, mesh.normals, mesh.uvs, None if skin is None else skin.weights]
     if any(np.abs(array).max(initial=0.0) > LARGEST for array in arrays if array is not None):
-        raise UnsupportedFormatError(f".skin cannot hold numbers beyond {LARGEST:.3g}")
+        raise UnsupportedFormatError(f".skin cannot store numbers beyond {LARGEST:.3g}")
 
 
 def _table(name: str, rows: Floats | Ints) -> str:
@@ -243,7 +269,7 @@ def _material_text(material: Material) -> str:
     name, texture = as_words(material.name), _as_rest_of_line(material.texture)
     if name is None or not KEYWORDS.isdisjoint(name) or texture != material.texture:
         raise UnsupportedFormatError(
-            f'.skin cannot hold the material "{printable(material.name)}" '
+            f'.skin cannot store the material "{printable(material.name)}" '
             f'with the texture "{printable(material.texture)}"'
         )
     head = " ".join(filter(None, ["material", material.name, "{\n"]))

@@ -69,14 +69,14 @@ def lint_files(
     max_size : int, optional
         Larger files, in bytes, are not read.
     progress : callable, optional
-        As for ``lint_scene``; reading files is included.
+        As for ``lint_scene``; also called while files are read.
 
     Returns
     -------
     scene : Scene
-        Everything that could be opened; findings refer to its actors.
+        Contents of all files that could be opened; findings refer to its actors.
     findings : list of Finding
-        Messages of readers first, then results of checks, each with its file if known.
+        Messages of readers, then results of checks, each with its file if known.
     """
     from viewer.formats import MAX_SIZE
     from viewer.lint._opening import invalid_parts, open_files, with_files

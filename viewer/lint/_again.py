@@ -35,11 +35,11 @@ class Again:
     Attributes
     ----------
     findings : list of Finding
-        As from ``lint_files``, for the scene as it is now.
+        Findings as from ``lint_files``, for the current state of the scene.
     n_files : int
         Number of files that the scene was opened from.
     notes : tuple of str
-        One line each: files that are missing or were changed.
+        One line for each file that is missing or was changed.
     """
 
     findings: list[Finding]
@@ -58,7 +58,7 @@ def lint_again(
 ) -> Again:
     """Check an open scene, and report messages of the readers of its files.
 
-    Parts unchanged since opening are reported with file and line; edited parts without.
+    Parts unchanged since opening are reported with file and line, edited parts without them.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def lint_again(
     settings : MotionSettings, optional
         Settings with which its motions were interpreted.
     since : float, optional
-        Time at which it was opened, seconds since the epoch: files changed since are reported.
+        Time at which it was opened, seconds since the epoch: files changed later are reported.
     progress : callable, optional
         As for ``lint_scene``; reading files is included.
     is_likely : bool
-        Whether it is uncertain that the scene came from these files: they are used only if they
-        have a part in common with the scene.
+        Whether the scene may not come from these files: they are used only if they have a part in
+        common with the scene.
     """
     opened = open_files(paths, settings, progress=progress)
     findings = lint_scene(scene, options, progress)

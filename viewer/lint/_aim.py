@@ -27,7 +27,7 @@ class Places:
     triangles : (T, 3, 3)
         Corners of triangles; the worst triangle first.
     joints : (J, 3)
-        Joints, or captured points that are seen; for findings about a whole motion, its actor.
+        Joints or visible captured points; for findings about a whole motion, the actor's position.
     facing : (3,)
         Mean normal of the marked surface: length 1 if it all faces one direction, 0 if it faces
         all directions or there is no surface.
@@ -49,7 +49,7 @@ def places_of(
     Parameters
     ----------
     finding : Finding
-        In this scene.
+        A finding about this scene.
     scene : Scene
         The scene that was checked; poses may differ.
     skinning : Skinning, optional
@@ -107,7 +107,7 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
 
 
 def _middle(actor: Actor) -> Floats:
-    """Return the position of a whole actor: its roots, or the mean of its points: (N, 3)."""
+    """Return the position of a whole actor, its roots or the mean of its points: (N, 3)."""
     figure, points = actor.figure, actor.points
     if isinstance(actor.clip, PointClip):
         seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]
@@ -125,7 +125,7 @@ def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> F
     Parameters
     ----------
     finding : Finding
-        In this scene.
+        A finding about this scene.
     scene : Scene
         The scene that was checked.
     places : Places, optional
@@ -134,9 +134,8 @@ def points_of(finding: Finding, scene: Scene, places: Places | None = None) -> F
     Returns
     -------
     (N, 3)
-        Scene space: the vertices, else the corners of triangles, else the joints;
-        the actor's position if the finding names none of these, or none is present;
-        empty without an actor.
+        Scene space: vertices, or else corners of triangles, or else joints; the actor's position if
+        the finding refers to none of these, or none is present; empty without an actor.
     """
     if finding.actor is None or finding.actor >= len(scene.actors):
         return np.zeros((0, 3))

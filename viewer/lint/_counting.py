@@ -1,4 +1,4 @@
-"""Frame numbers of motions without frames of their own, as on the timeline."""
+"""Frame numbers, as on the timeline, of motions that are not stored as frames."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Counting:
 
 
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
-    """Return a scene's frame numbering: that of its longest capture, else from the earliest start.
+    """Return a scene's frame numbering: that of its longest capture, or from the earliest start.
 
     Parameters
     ----------
     scene : Scene
-        With or without motions.
+        Scene with or without motions.
     keyed_rate : float
         Frames per second if no motion consists of frames.
     """

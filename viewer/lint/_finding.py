@@ -28,8 +28,8 @@ MAX_ROTATION = 3400.0
 
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
-_STRAYS = 0.02  # fraction of vertices that may be strays, at each end of an axis
-_FAR = 10.0  # ratio of bounding boxes with and without strays above which strays are ignored
+_STRAYS = 0.02  # maximum fraction of stray vertices at each end of an axis
+_FAR = 10.0  # ratio of bounding boxes, with strays to without, above which strays are ignored
 
 Indices = NDArray[np.int64] | Ints | list[int]
 
@@ -78,7 +78,7 @@ class Finding:
     name : str
         Name of the actor.
     part : "", "mesh", "skeleton" or "clip"
-        The part of the actor that it refers to.
+        The part of the actor that the finding refers to.
     vertices, triangles, joints : (N,) int32
         Indices in the actor's figure, worst first; keypoints of captures are listed as joints.
     frames : (N,) int32
@@ -86,9 +86,9 @@ class Finding:
     times : (N,)
         Times of these frames on the scene's clock, in seconds.
     seek : float or None
-        Best time for viewing it, in seconds; None for the first of ``times``.
+        Best time for viewing the finding, in seconds; None for the first of ``times``.
     at : (str, int) or None
-        The first item in the message, for which the reader recorded a position in its file:
+        The first item of the message, whose position in the file the reader recorded:
         ``("weights", 5)`` is the line of vertex 5's weights.
     """
 
@@ -155,9 +155,9 @@ class Subject:
     Attributes
     ----------
     actor : Actor
-        Not changed.
+        The actor, which is not modified.
     index : int
-        In its scene.
+        Index of the actor in its scene.
     up : "y" or "z"
         The scene's up axis.
     options : LintOptions
@@ -165,7 +165,7 @@ class Subject:
     counting : Counting or None
         Frame numbering of keyed clips; None to number each clip separately.
     invalid : mapping of str to (N,)
-        Data that a reader replaced because those in the file are invalid: vertices by
+        Data that a reader replaced because the data in the file is invalid: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
         ``"joints"``, rows by ``"frames"``.
     tracks : list of Track
@@ -194,7 +194,7 @@ class Subject:
         Returns
         -------
         (count,)
-            False for items whose data were replaced.
+            False for items whose data was replaced.
         """
         result = np.ones(count, dtype=np.bool_)
         lost = self.invalid.get(part, _NONE)
@@ -254,7 +254,7 @@ class Subject:
         at: tuple[str, int] | None = None,
         **values: Any,
     ) -> Finding:
-        """Return a finding about this actor; ``values`` are those of the message of ``key``."""
+        """Return a finding about this actor, with the values of the message ``key``."""
         return Finding(
             Diagnostic(key, level=severity, values=values),
             actor=self.index,

@@ -16,29 +16,29 @@ Level = tuple[float, int]  # a height, and the number of frames in which feet re
 # Lengths are relative to the figure's height at rest: 0.01 is 17 mm for a person.
 _ALIKE = 0.005  # heights within this are one level: about half the tolerance for sunk feet
 _APART = 0.01  # minimum distance between separate levels
-_CUSTOM = 0.015  # from the conventional ground at most: captures are calibrated to about 25 mm
-_NEAR = 0.03  # the same for the lowest feet if they never rest
+_CUSTOM = 0.015  # maximum distance from a conventional ground: calibrations err by about 25 mm
+_NEAR = 0.03  # maximum distance of the lowest feet if they never rest
 _LONG = 0.1  # minimum seconds for which a foot rests
-_CALM = 0.006  # maximum vertical motion meanwhile; at the top of a jump a foot falls by 12 mm
-_MOST = 0.5  # fraction of these frames that must be this close to their mean
-_RESTS = 0.2  # fraction of all frames: with fewer at rest, equal heights may be coincidence
+_CALM = 0.006  # maximum vertical motion of a resting foot; at the top of a jump, it is 12 mm
+_MOST = 0.5  # fraction of these frames that must be this close to their mean height
+_RESTS = 0.2  # minimum fraction of resting frames: with fewer, equal heights may be coincidence
 _FRACTION = 0.1  # minimum fraction of the frames at rest for a level
 _TIE = 0.5  # fraction of the longest level's frames above which a likely level is chosen
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
-_ROLLS = 0.02  # minimum distance from the longest level: a rolling foot makes others this close
-_STEP = 0.06  # below the longest level: the ground may be this far below a step or a seat
+_ROLLS = 0.02  # minimum distance from the longest level: rolling feet create others this close
+_STEP = 0.06  # distance below the longest level: the ground may be this far below a step or a seat
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Height of the ground, or the evidence for why it is unknown.
+    """Height of the ground, or the reason why it is unknown.
 
     Attributes
     ----------
     height : float or None
         Along the up axis; None if unknown.
     levels : tuple of (float, int)
-        Heights on which feet rest with their numbers of frames, the most frequent first; if empty,
+        Heights at which feet rest with their numbers of frames, the most frequent first; if empty,
         the height is a guess.
     """
 
@@ -56,9 +56,9 @@ def ground_of(
 ) -> Ground:
     """Return the height at which feet rest, if the motion determines it.
 
-    This is the level on which they rest longest, or a likely one with a similar duration. It is
-    unknown if they rest nearly as long on another level, or on a likely one that is a step away,
-    or if they rest on two levels below it, as on descending stairs.
+    This is the level on which the feet rest longest, or a likely level with a similar duration. The
+    height is unknown if they rest nearly as long on another level, or on a likely level that is a
+    step away, or if they rest on two lower levels, as on descending stairs.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def _level_at(rests: Floats, height: float, size: float) -> list[Level]:
 def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -> bool:
     """Return whether a level other than the longest may be the ground.
 
-    A likely level with few frames is not a rival just below the longest: feet have sunk there.
-    It is one if it is a step below, as for a person sitting or standing on a box, or above, as the
-    longest level may itself be sunk.
+    A likely level with few frames just below the longest is not a rival, because feet have sunk
+    there. It is a rival if it is a step below, as for a person who sits or stands on a box, or
+    above, because feet may have sunk at the longest level.
     """
     longest, count = levels[0]
     long = [h for h, n in levels[1:] if n > _CLEAR * count and abs(h - longest) > _ROLLS * size]
@@ -147,5 +147,6 @@ def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
         level = float(np.median(left[first : ends[first]]))
         levels.append((level, int(counts[first])))
         left = left[np.abs(left - level) > _APART * size]
-    # Of levels with equally many frames the upper one is first: at the lower one, feet have sunk.
+    # Of levels with the same number of frames, the upper one is first: at the lower one, feet have
+    # sunk.
     return tuple(sorted(levels, key=lambda level: (-level[1], -level[0])))

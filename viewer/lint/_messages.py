@@ -14,7 +14,7 @@ from viewer.lint._finding import Finding
 __all__ = ["CHECKED", "of_diagnostic", "of_error", "of_refusal"]
 
 CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
-"""Codes of warnings that checks of the scene report again, with all locations."""
+"""Codes of warnings that the checks of the scene report too, with all locations."""
 
 
 def of_error(problem: ViewerError, path: Path | None = None) -> Finding:

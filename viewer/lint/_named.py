@@ -13,12 +13,12 @@ __all__ = ["aimed_at"]
 
 
 def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
-    """Return a reader's finding with its locations in an actor, None if there are none.
+    """Return a reader's finding with its locations in an actor, or None if there are none.
 
     Parameters
     ----------
     remark : Finding
-        Finding about the file that the part was read from.
+        Finding about the file from which the part was read.
     actor : Actor
         The actor with this part.
     part : "mesh", "skeleton" or "clip"

@@ -1,4 +1,4 @@
-"""Opens files for checks: files that fail become findings, the others are assembled."""
+"""Opens files for checks: files that fail become findings, the rest are assembled."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class Opened:
     Attributes
     ----------
     scene : Scene
-        Figures that match nothing are separate actors.
+        The scene; figures without a match are separate actors.
     contents : Contents
         Contents of all files that were read.
     findings : list of Finding
-        Files that cannot be read or assembled, and messages of readers.
+        Findings about files that cannot be read or assembled, and messages of readers.
     sources : dict of Path to Source
         All files that were read, with their errors and the positions of their data.
     """
@@ -74,7 +74,7 @@ def open_files(
     max_size: int = MAX_SIZE,
     progress: Progress | None = None,
 ) -> Opened:
-    """Read files and assemble those that can be; never fails because of their contents.
+    """Read files and assemble those that match; never fails because of their contents.
 
     Parameters
     ----------
@@ -106,12 +106,12 @@ def _resolved(path: Path) -> Path:
     """Return a path that identifies a file; invalid paths are reported by reading them."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a cycle of links, or a NUL in the name
+    except (OSError, RuntimeError, ValueError):  # a cycle of links, or a NUL character in the name
         return path
 
 
 def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -> tuple[Path, ...]:
-    """Read one file, recording all recoverable errors; return files that it names."""
+    """Read one file, recording all recoverable errors; return the files that it refers to."""
     contents, recorded = Contents(), Collector(keeps_errors=True)
     named: tuple[Path, ...] = ()
     refusals: list[Finding] = []
@@ -206,9 +206,9 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 
 
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
-    """Return the file that an error is about, or the last one read if the error has none.
+    """Return the file that an error is about, or the last file read if the error has none.
 
-    None if the file is not among those read.
+    None if the file was not read here.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
     found = problem.diagnostic
@@ -218,7 +218,7 @@ def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
 
 
 def _take_out(contents: Contents, culprit: Path) -> list[Figure]:
-    """Remove one file's contents, and return the figures in it."""
+    """Remove the contents of one file, and return its figures."""
     figures = [figure for path, figure in contents.figures if path == culprit]
     for name in _LISTS:
         setattr(contents, name, [item for item in getattr(contents, name) if item[0] != culprit])
@@ -237,9 +237,10 @@ def with_files(
     opened : Opened
         Provides the messages of readers, and the origin of the data.
     findings : list of Finding
-        About its scene, or about the one that was checked instead.
+        Findings about its scene, or about the scene that was checked instead.
     looked_at : (Scene, sequence of Owners), optional
-        The scene checked instead, and for each of its actors the parts equal to those opened.
+        The scene that was checked instead, and for each of its actors the parts equal to opened
+        parts.
     """
     if looked_at is None:
         actors = opened.scene.actors
@@ -252,7 +253,8 @@ def with_files(
         if twin is None:
             remarks.append(remark)
             continue
-        # The reader's finding states whether the file is rejected; the check's has all locations.
+        # The reader's finding states whether the file is rejected; the check's finding has all
+        # locations.
         severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
         line = remark.line if placed[twin].at is None else None
         placed[twin] = placed[twin].located(placed[twin].file, line, severity)
@@ -267,12 +269,12 @@ def _is_same(remark: Finding, other: Finding) -> bool:
 
 
 def _with_line(finding: Finding, opened: Opened) -> Finding:
-    """Return a finding with the line of the item it names, if the reader recorded it."""
+    """Return a finding with the line of the item it refers to, if the reader recorded it."""
     source = None if finding.file is None else opened.sources.get(finding.file)
     if source is None or finding.at is None:
         return finding
     kind, index = finding.at
-    # Normals that the file lacks are computed: the vertex is what can be fixed.
+    # If the file has no normals, they are computed: only the vertex can be fixed.
     place = source.place(kind, index) or source.place(_INSTEAD.get(kind, ""), index)
     return finding if place is None else finding.located(*place)
 
@@ -287,7 +289,7 @@ def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Findi
 
 
 def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
-    """Return readers' messages with their actors, where they name a location in one."""
+    """Return readers' messages with their actors, if they refer to a location in one."""
     known: dict[tuple[Path, str], int] = {}
     for number, parts in enumerate(owners):
         for part, owner in parts.items():
@@ -324,7 +326,7 @@ def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
     return [
         path
         for path, figure in contents.figures
-        # Applying a texture makes another mesh with the same positions.
+        # Applying a texture creates another mesh with the same positions.
         if mesh is not None and figure.mesh is not None and figure.mesh.positions is mesh.positions
     ]
 
@@ -335,7 +337,7 @@ _INVALID = {"mesh": ("positions", "weights", "triangles", "bindings"),
 
 
 def invalid_parts(opened: Opened) -> list[dict[str, Ints]]:
-    """Return the data of each actor that its readers replaced, see ``Subject``."""
+    """Return the data of each actor that its readers replaced; see ``Subject``."""
     return [_invalid(actor, opened) for actor in opened.scene.actors]
 
 

@@ -19,7 +19,7 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def some_poses(actor: Actor) -> list[Pose]:
-    """Return the rest pose, the current pose, and some from the clip, or else random poses.
+    """Return the rest pose, the current pose, and some poses of the clip, or else random ones.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Finding reports: one line each for people and editors, all data for programs."""
+"""Reports of findings: one line each for people and editors, all data for programs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["describe", "finding_text", "summary", "worst_first"]
 
-_LISTED = 100  # maximum locations of one finding in JSON; their count is always given
+_LISTED = 100  # maximum number of locations of a finding in JSON; the total is always given
 
 
 def worst_first(findings: Sequence[Finding]) -> list[Finding]:
@@ -52,7 +52,7 @@ def summary(findings: Sequence[Finding], n_files: int = 0) -> str:
     findings : sequence of Finding
         All findings.
     n_files : int
-        Number of files checked; 0 for none.
+        Number of files checked; 0 if none.
     """
     counts = Counter(finding.severity for finding in findings)
     parts = [counted(counts[kind], kind) for kind in reversed(SEVERITIES)]

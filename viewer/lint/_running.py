@@ -28,7 +28,7 @@ class Check:
     title : str
         Name of the checked part, for progress.
     of_motion : bool
-        Whether it depends on an actor's motion; else actors of one figure are checked once.
+        Whether it depends on an actor's motion; otherwise actors of one figure are checked once.
     """
 
     title: str
@@ -63,15 +63,15 @@ def lint_scene(
     options : LintOptions, optional
         Thresholds of the checks.
     progress : callable, optional
-        Called before every step with the completed steps, their number, and the next step; may
-        raise to cancel.
+        Called before every step with the number of completed steps, the total, and the next step;
+        may raise to cancel.
     invalid : sequence of mappings, optional
-        For each actor, data that is not to be checked; see ``Subject``.
+        Data of each actor that must not be checked; see ``Subject``.
 
     Returns
     -------
     list of Finding
-        Findings by actor, in the order of ``CHECKS``; each has the actor and the locations in it.
+        Findings by actor, in the order of ``CHECKS``; each has its actor and locations.
     """
     chosen = options or LintOptions()
     counting = counting_of(scene, chosen.frame_rate)

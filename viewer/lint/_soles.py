@@ -17,7 +17,7 @@ from viewer.rig.skin import Skin, owners
 __all__ = ["Soles", "extent", "soles_of"]
 
 _STRAYS = 0.001  # fraction of vertices at either end that are excluded from the height
-_TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot in steps and on tiptoe
+_TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot while walking and on tiptoe
 _N_SIDES = 8  # number of horizontal directions of tilts
 
 
@@ -28,7 +28,7 @@ class Soles:
     Attributes
     ----------
     joints : (N,) int32
-        For each of N feet the joint nearest to the ground: the ball of the foot, or the ankle.
+        For each of N feet, the joint nearest to the ground: the ball of the foot, or the ankle.
     feet : (P,)
         The foot that each point belongs to.
     movers : (P,) int32
@@ -86,14 +86,14 @@ def _axis(figure: Figure) -> int:
 
 
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
-    """Return the soles of a skeleton with two feet by name, None if it has none.
+    """Return the soles of a skeleton with two feet by name, or None.
 
     Parameters
     ----------
     figure : Figure
         Figure in the shape in which it is animated.
     is_bound : bool
-        Whether its bindings are valid; else joints are used instead of the mesh.
+        Whether its bindings are valid; otherwise joints are used instead of the mesh.
     """
     skeleton = figure.skeleton
     if skeleton is None:
@@ -131,7 +131,7 @@ def _whole_foot(skeleton: Skeleton, found: list[int]) -> Bools:
 
 
 def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Floats] | None:
-    """Return vertices of a foot's hull that can be lowest: their joints (P,), positions (P, 3)."""
+    """Return vertices of a foot's hull that can be lowest: joints (P,) and positions (P, 3)."""
     vertices = owners(skin)
     order = np.lexsort((skin.weights, vertices))
     last = np.flatnonzero(np.diff(vertices[order], append=-1))
@@ -147,7 +147,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 
 def _directions(axis: int) -> Floats:
-    """Return the down direction, and directions tilted from it to all sides: (D, 3)."""
+    """Return the downward direction, and directions tilted from it to all sides: (D, 3)."""
     angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
     sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]

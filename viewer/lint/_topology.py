@@ -20,7 +20,7 @@ def welded(positions: Floats, triangles: Ints) -> Indices:
     Parameters
     ----------
     positions : (V, 3)
-        Exactly equal positions are represented by the first of them.
+        Vertices at exactly equal positions are represented by the first of them.
     triangles : (T, 3)
         Vertex indices.
     """
@@ -49,7 +49,7 @@ class Edges:
     counts : (3 T,)
         Number of triangles with this edge.
     pairs : (P, 2)
-        Triangles on both sides of edges that exactly two triangles have.
+        Triangles on both sides of edges that belong to exactly two triangles.
     agree : (P,) bool
         Whether the two traverse the edge in opposite directions, as consistent neighbours do.
     """
@@ -85,15 +85,15 @@ def edges_of(corners: Indices) -> Edges:
 def components(count: int, pairs: Indices) -> Indices:
     """Return the smallest member of each node's component: (count,).
 
-    Every round each root takes the smallest label across its edges, and labels are shortened
-    until they are their own, so the number of rounds is logarithmic in the number of nodes.
+    In each round, every root takes the smallest label across its edges, and labels are followed
+    until they refer to themselves, so the number of rounds is logarithmic in the number of nodes.
 
     Parameters
     ----------
     count : int
         Number of nodes.
     pairs : (P, 2)
-        Connected nodes.
+        Pairs of connected nodes.
     """
     labels = np.arange(count)
     while True:
@@ -110,22 +110,22 @@ def components(count: int, pairs: Indices) -> Indices:
 def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     """Return which triangles must be flipped to orient neighbours consistently.
 
-    Every triangle is two nodes, unflipped and flipped; an edge joins consistent ones. If
-    both are in one component, the surface is non-orientable (Moebius).
+    Every triangle is represented by two nodes, unflipped and flipped; edges connect consistent
+    nodes. If both are in one component, the surface is non-orientable (Moebius).
 
     Parameters
     ----------
     count : int
         Number of triangles.
     edges : Edges
-        Of these triangles.
+        Edges of these triangles.
 
     Returns
     -------
     component : (count,)
         Smallest triangle of each triangle's component.
     flipped : (count,) bool
-        The smaller part of each component; of equal parts the one without the first triangle.
+        The smaller part of each component; of equal parts, the one without the first triangle.
     one_sided : (count,) bool
         Triangles of components that are not orientable.
     """

@@ -26,7 +26,7 @@ class Track:
         Number of each frame in the file; for keyed clips, the frame of the timeline. Several rows
         may have the same frame.
     present : (F,) bool
-        Rows where it is False are undefined: the actor is absent, or the file's data is invalid.
+        Whether the row is defined: the actor is present, and the data of the file is valid.
     positions : (F, J, 3)
         Joints in scene space.
     rotations : (F, J, 4)
@@ -36,7 +36,7 @@ class Track:
     scale : float
         Scene units per figure unit.
     feet : (N,) int32
-        The joint nearest to the ground of each foot; empty without two feet by name.
+        The joint of each foot nearest to the ground; empty without two feet by name.
     soles : (F, N)
         Height of each foot's lowest point in the scene.
     """

@@ -27,7 +27,7 @@ _ON_STEP = 1e-6  # fraction of a step
 
 
 def track_of(subject: Subject) -> Track | None:
-    """Return the track of an actor's skeleton, cached; None if it has none."""
+    """Return the cached track of an actor's skeleton; None if it has none."""
     if not subject.tracks:
         track = _track(subject)
         if track is None:
@@ -80,7 +80,7 @@ def _track(subject: Subject) -> Track | None:
 def key_times(subject: Subject, clip: Clip) -> Floats:
     """Return the sampling times of a keyed clip: its frames, and steps between them. (F,).
 
-    Seconds on the clip's own clock.
+    Times are seconds on the clip's own clock.
     """
     options = subject.options
     rate = options.frame_rate * max(1, math.ceil(options.rate / options.frame_rate))

@@ -63,7 +63,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _about(subject: Subject, key: str, wrong: Bools, values: Floats) -> list[Finding]:
-    """Report joints with invalid bind matrices, with the value of the first."""
+    """Report joints with invalid bind matrices, and the value of the first."""
     joints = np.flatnonzero(wrong)
     if len(joints) == 0:
         return []

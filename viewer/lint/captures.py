@@ -177,7 +177,7 @@ def _n_frames(rows: Ints) -> int:
 
 
 def _size(clip: PointClip) -> float:
-    """Return the median size of the bounding box of the seen points in a frame."""
+    """Return the median size of the bounding box of the visible points in a frame."""
     seen = clip.points[..., 3:] > 0.0
     low = np.where(seen, clip.points[..., :3], np.inf).min(axis=1)
     high = np.where(seen, clip.points[..., :3], -np.inf).max(axis=1)

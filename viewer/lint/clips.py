@@ -103,7 +103,7 @@ def _keys(subject: Subject, clip: Clip) -> list[Finding]:
 
 
 def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
-    """Report curves that leave the limits, to which they are clamped during playback."""
+    """Report curves that exceed the limits, to which they are clamped during playback."""
     times = np.append(key_times(subject, clip)[:_MOST], clip.end)
     targets, values = evaluate_all(clip, times)
     low, high = skeleton.dof_limits[targets].T
@@ -193,7 +193,7 @@ class _TooFast:
     rate : float
         The highest rate, per second.
     worst : int
-        The row of a track at the end of the fastest movement.
+        Row of the track at the end of the fastest movement.
     rows : (N,)
         One row for each frame with a joint above the limit, worst first.
     joints : (J,)

@@ -16,7 +16,7 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check"]
 
-# Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm for a guess.
+# Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm if it is a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03
 _FACTOR = 3.0  # at this multiple of the limit even a single frame is reported
 # Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
@@ -68,7 +68,7 @@ def _moving(subject: Subject, figure: Figure) -> Track | None:
 
 
 def _unsure(subject: Subject, found: Ground, step: float) -> Finding:
-    """Report that the ground is unknown, so that feet were not checked."""
+    """Report that the ground is unknown, and feet were therefore not checked."""
     if not found.levels:
         return subject.found("C013.no-height", part="clip")
     levels = [
@@ -163,7 +163,7 @@ def _slipped(
 def _path(along: Floats, slides: Bools, width: int) -> float:
     """Return the distance that a foot slides in all windows, in steps of one window.
 
-    Single frames are noisy: their steps would add up to more.
+    Single frames are noisy: their steps would add up to a longer distance.
     """
     edges = np.diff(slides.astype(np.int8), prepend=0, append=0)
     total = 0.0

@@ -18,11 +18,12 @@ Indices = NDArray[np.int64]
 _FLAT = 1e-7  # height of a triangle relative to the mesh: float32 rounding
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # a normal of this length counts as zero
-_AGAINST = -0.1  # cosine to a triangle's own normal: perpendicular ones are smoothed over an edge
-# Squared number of border edges per triangle: with smaller holes a volume keeps its sign.
+_AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are smoothed over an edge
+# Squared number of border edges per triangle: with smaller holes, the sign of the volume is
+# reliable.
 _CLOSED = 0.25
-# Times the median distance of vertices from their median: feet are 16 times as far in models
-# with half of their vertices in the face.
+# Multiple of the median distance of vertices from their median: feet are at 16 times that distance
+# in models with half of their vertices in the face.
 _FAR = 40.0
 _SAMPLE = 4096  # vertices sampled for the median
 
@@ -52,7 +53,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _heights(mesh: Mesh) -> Floats:
-    """Return the height of each triangle over its longest edge; 0 for a point. (T,)."""
+    """Return the height of each triangle over its longest edge, 0 for a point: (T,)."""
     corners = mesh.positions[mesh.triangles]
     edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
     areas = triangle_areas(mesh.positions, mesh.triangles)
@@ -103,7 +104,7 @@ def _doubled(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
 
 
 def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding]:
-    """Report non-manifold edges, between vertices as listed in the file: parts may touch."""
+    """Report non-manifold edges; vertices are not merged, because parts may touch."""
     edges = edges_of(mesh.triangles[whole].astype(np.int64))
     places = np.flatnonzero(edges.counts > 2)
     if len(places) == 0:
@@ -126,7 +127,7 @@ def _crowded_edges(subject: Subject, mesh: Mesh, whole: Indices) -> list[Finding
 
 
 def _edge_ends(triangles: Ints, places: Indices) -> Indices:
-    """Return the two vertices of edges, the smaller first; corner k starts edge 3 t + k. (N, 2)."""
+    """Return the two vertices of edges, the smaller first: (N, 2); corner k starts edge 3 t + k."""
     rows, corners = np.divmod(places, 3)
     ends = np.stack([triangles[rows, corners], triangles[rows, (corners + 1) % 3]], axis=1)
     return np.sort(ends, axis=1).astype(np.int64)
@@ -235,7 +236,7 @@ def _inside_out(
 
 
 def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
-    """Return each component's number of edges of valid triangles without a valid neighbour: (T,).
+    """Return each component's number of edges with a single valid triangle: (T,).
 
     Missing triangles do not close a surface: it may have ended there.
     """
@@ -278,8 +279,8 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
 def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
     """Report normals that point to the opposite side of all triangles at their vertex.
 
-    Degenerate triangles have no side. The two sides of a thin sheet have separate vertices,
-    or common ones, in which case each normal agrees with one side.
+    Degenerate triangles have no sides. The two sides of a thin sheet have separate vertices, or
+    shared ones, whose normals agree with one side each.
     """
     corners = mesh.triangles[valid]
     a, b, c = (mesh.positions[corners[:, k]] for k in range(3))

@@ -37,7 +37,7 @@ def check(subject: Subject) -> list[Finding]:
 
 
 def _known(subject: Subject, figure: Figure, part: str) -> Bools:
-    """Return the vertices that can be compared: they and their counterparts are valid. (V,)."""
+    """Return the vertices that can be compared, which are valid with their counterparts: (V,)."""
     assert figure.symmetry is not None  # checked by the caller
     valid = subject.valid(part, len(figure.symmetry))
     known: Bools = valid & valid[figure.symmetry]

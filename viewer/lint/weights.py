@@ -92,7 +92,7 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
     corners = welded(mesh.positions, mesh.triangles)
     pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
     islands = components(mesh.n_vertices, pairs)[corners[:, 0]]
-    # An island is counted by its triangles: a loose vertex is not an island.
+    # Only triangles form islands: a loose vertex is not an island.
     held = np.bincount(islands, moved[mesh.triangles].any(axis=1), minlength=mesh.n_vertices)
     lost = held[islands] == 0
     if lost.any():
@@ -207,7 +207,7 @@ def _cost(
 
 
 def _posable(subject: Subject, skin: Skin) -> Bools:
-    """Return the vertices whose posed position is known: they and all their joints are valid."""
+    """Return the vertices whose posed position is known, which are valid with all their joints."""
     lost = ~subject.valid("bindings", skin.n_joints) | are_singular(skin.inverse_bind)
     # A joint with weight 0 has no effect.
     holds = lost[skin.joints] & (skin.weights != 0.0)
@@ -216,7 +216,7 @@ def _posable(subject: Subject, skin: Skin) -> Bools:
 
 
 def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
-    """Return the largest displacement of each vertex if it is pruned to some influences."""
+    """Return the largest displacement of each vertex by pruning its influences."""
     figure = subject.actor.figure
     poses = some_poses(subject.actor)
     whole, cut = Skinning(normalize=True), Skinning(max_influences=limit)

@@ -35,11 +35,11 @@ def load(
     of joints, preferably one with the same name. A skeleton or skin without a match opens alone;
     several actors are placed side by side. A clip is assigned to the first actor without a clip
     that has its number of channels. A BVH drives the requested model if given, else the first
-    figure whose joints it names; otherwise it is a separate skeleton, in metres if there are other
-    actors, else in its file's unit.
-    Captured bodies are drawn with the first body model among the files, or the bundled body. All
-    actors are posed at the start of their motions. A pose is applied to the first actor that it
-    matches, an image to the first one with texture coordinates but no texture.
+    figure that has its joint names; otherwise it is a separate skeleton, in metres if there are
+    other actors, else in its file's unit. Captured bodies are drawn with the first body model among
+    the files, or the bundled body. All actors are posed at the start of their motions. A pose is
+    applied to the first actor that it matches, an image to the first one with texture coordinates
+    but no texture.
 
     Parameters
     ----------
@@ -54,14 +54,14 @@ def load(
     Returns
     -------
     Scene
-        One actor per figure; its ``warnings`` hold the readers' messages.
+        The scene with one actor per figure; its ``warnings`` are the readers' messages.
 
     Raises
     ------
     FormatError
         If a file cannot be read; includes the line if known.
     RigError
-        If a skin, clip or pose does not match; the message names the files and counts.
+        If a skin, clip or pose does not match; the message gives the files and counts.
 
     >>> scene = load()
     >>> scene.actors[0].figure.name

@@ -49,7 +49,7 @@ class Builder:
     path : Path or None
         Its file or folder, for messages.
     model : Figure
-        The figure that its bodies are drawn with.
+        The figure with which its bodies are drawn.
     called : str
         Base name of all people; the capture's name if empty.
     keeps_shape : bool
@@ -77,7 +77,7 @@ class Builder:
     has_shape: bool = False
     has_expression: bool = False
     path: Path | None = None
-    _names_shapes: bool = False  # whether any person has shapes, including all-zero ones
+    _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -132,7 +132,7 @@ class Builder:
         return new, [*reversed(fresh.values())]
 
     def _shape_notes(self) -> list[Diagnostic]:
-        """Return, at the end, a message if bodies have the mean shape because none was given."""
+        """At the end, return a message if bodies have the mean shape because none was given."""
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         if not (self.is_done and self.keeps_shape and lacks):
             return []
@@ -191,7 +191,7 @@ class Builder:
         return [*self._bodies.values(), *self._points.values()]
 
     def place(self, up: str) -> None:
-        """Rotate all people, including later ones, upright if an axis points down in the world.
+        """Rotate all people upright, including later ones, if the up axis is negative.
 
         Parameters
         ----------

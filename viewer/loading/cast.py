@@ -24,17 +24,19 @@ class Cast:
     Attributes
     ----------
     actors : list of Actor
-        Those of opened figures first.
+        Actors of opened figures come first.
     ups : list of "y" or "z"
         The up axis of each actor.
     placed : list of bool
         Whether each actor's motion determines its position.
+    origins : list of Path or None
+        File of each actor; several actors of one file keep their places relative to each other.
     builders : list of Builder
         Captures that are still being read.
     views : list of CameraView
         Calibrated cameras, in scene space.
     images : CameraImages or None
-        Their images: those of the first capture that has some.
+        Images of the cameras: those of the first capture that has any.
     diagnostics : list of Diagnostic
         Messages from assembling the scene.
     """
@@ -42,21 +44,23 @@ class Cast:
     actors: list[Actor]
     ups: list[str] = field(default_factory=list)
     placed: list[bool] = field(default_factory=list)
+    origins: list[Path | None] = field(default_factory=list)
     builders: list[Builder] = field(default_factory=list)
     views: list[CameraView] = field(default_factory=list)
     images: CameraImages | None = None
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
-        """Record a message about a file, or about none; ``values`` are those of its wording."""
+        """Record a message, with the values of its template, about a file if ``path`` is given."""
         self.diagnostics.append(Diagnostic(key, path, values=values))
 
     def free_title(self, title: str) -> str:
         """Return an unused title for a new actor, or for all people of a new capture."""
         return free_title(self.actors, title)
 
-    def add(self, actor: Actor, up: str, placed: bool) -> None:
-        """Append one actor."""
+    def add(self, actor: Actor, up: str, placed: bool, origin: Path | None = None) -> None:
+        """Append one actor, and its file if it may hold several figures."""
         self.actors.append(actor)
         self.ups.append(up)
         self.placed.append(placed)
+        self.origins.append(origin)

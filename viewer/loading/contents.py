@@ -27,7 +27,9 @@ from viewer.rig.figure import Figure
 if TYPE_CHECKING:
     from viewer.formats import Content
     from viewer.formats.rig import NamedFiles
+    from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.captures.capture import Capture
+    from viewer.rig.figure_group import FigureGroup
     from viewer.rig.morph_target import MorphTarget
     from viewer.rig.motion.body_motion import BodyMotion
     from viewer.rig.motion.clip import Clip
@@ -46,8 +48,12 @@ class Contents:
 
     Attributes
     ----------
+    figures : list of (Path, Figure)
+        Several of one path keep their places relative to each other.
+    views : list of (Path, CameraView)
+        Cameras of files with figures, in the space of these.
     called : dict
-        Figure names by resolved file, where another file specifies one.
+        Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic
         Messages from the readers.
     files : tuple of Path
@@ -55,6 +61,7 @@ class Contents:
     """
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
+    views: list[tuple[Path, CameraView]] = field(default_factory=list)
     clips: list[tuple[Path, Clip]] = field(default_factory=list)
     poses: list[tuple[Path, PoseRecord]] = field(default_factory=list)
     pictures: list[tuple[Path, Bytes]] = field(default_factory=list)
@@ -102,9 +109,9 @@ def read_files(
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
     known = {source.path.resolve() for source in sources}
-    for source in sources:  # grows during iteration: a .rig names files
+    for source in sources:  # grows during iteration: a .rig refers to files
         for path in read_source(source, contents, settings or MotionSettings()):
-            if path.resolve() not in known:  # a .rig may name another, or itself
+            if path.resolve() not in known:  # a .rig may refer to another, or to itself
                 known.add(path.resolve())
                 called = contents.called.get(source.path.resolve(), source.path.stem)
                 contents.called[path.resolve()] = called
@@ -118,7 +125,7 @@ def read_files(
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read one file and add its contents, without its warnings; see the formats for errors.
+    """Read one file and add its contents, except its warnings; see the formats for errors.
 
     Parameters
     ----------
@@ -132,7 +139,7 @@ def read_source(source: Source, contents: Contents, settings: MotionSettings) ->
     Returns
     -------
     tuple of Path
-        Further files that it names.
+        Other files that it refers to.
     """
     if _is_picture(source):
         contents.pictures.append((source.path, read_picture(source)))
@@ -149,15 +156,20 @@ _LISTS = {
     "MorphTarget": "morphs",
     "Figure": "figures",
 }
-"""The field for each class, by name: only readers that create a class import its module."""
+"""Field for each class name: only readers that create a class import its module."""
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
-    """Read a file and add its contents by type; return files that it names."""
+    """Read a file and add its contents by type; return the files that it refers to."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind == "NamedFiles":
         return cast("NamedFiles", content).paths
+    if kind == "FigureGroup":
+        group = cast("FigureGroup", content)
+        contents.figures += [(source.path, figure) for figure in group.figures]
+        contents.views += [(source.path, view) for view in group.views]
+        return ()
     if isinstance(content, Figure) and source.is_folder:
         content = _with_own_picture(source, content)
     getattr(contents, _LISTS[kind]).append((source.path, content))

@@ -33,7 +33,7 @@ _ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
 
 
 def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
-    """Assign every motion to an actor, new ones where needed.
+    """Assign every motion to an actor, or to a new one if none matches.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
 
 
 def _is_bundled(figure: Figure) -> bool:
-    # Only the bundled body names its shapes after their effects.
+    # Only the bundled body has shapes named after their effects.
     return figure.blend_shapes is not None and "stature" in figure.blend_shapes.names
 
 
@@ -178,7 +178,7 @@ def _give_body_motion(
 
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
-    """Return the up axis estimated from the people, and record it unless it is the usual one."""
+    """Return the up axis estimated from the people, and record it if it is unusual."""
     from viewer.rig.motion.up_axis import guess_up
 
     up = guess_up(actors)
@@ -196,7 +196,7 @@ def _begin_capture(
     model: Figure,
     is_bundled: bool,
 ) -> None:
-    """Read a capture until a person appears; the rest is read later."""
+    """Read a capture until the first person appears; the rest is read later."""
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
     cast.diagnostics += capture.warnings

@@ -15,8 +15,8 @@ class MotionSettings:
     Attributes
     ----------
     model : Path or None
-        The figure that captured bodies are drawn with, and that a BVH drives; None for one among
-        the files, or the bundled body for captures.
+        The figure for captured bodies, which BVH motions also drive; None for a figure among the
+        files, or the bundled body for captures.
     frame_rate : float or None
         Frames per second; None for the file's own, or 30 if it has none.
     up : "y", "z", "-y", "-z" or ""
@@ -27,14 +27,15 @@ class MotionSettings:
     flat_hands : bool or None
         Whether hand components are relative to the flat hand; None for the model's convention.
     layout : str
-        Layout of captured keypoints, a title of ``viewer.rig.captures.keypoint_layouts``; empty to
-        choose it by their number.
+        Layout of captured keypoints, a title of ``viewer.rig.captures.keypoint_layouts``; if empty,
+        determined by their number.
     legacy_expression : bool
         Whether expressions drive SMPL-X columns 10 to 19, as in EasyMocap.
     drives : bool
         Whether a BVH drives a figure opened with it, instead of being shown beside it.
     images : Path or None
-        Folder of the image folders of a capture's cameras; None for ``images`` beside it.
+        Folder with an image folder for each camera of a capture; None for ``images`` beside the
+        capture.
     """
 
     model: Path | None = None

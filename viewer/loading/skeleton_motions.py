@@ -32,7 +32,7 @@ class Lone:
     path : Path
         Its file.
     motion : SkeletonMotion
-        With the requested settings applied.
+        The motion, with the requested settings applied.
     actor : Actor
         The motion's skeleton in the scene.
     """
@@ -49,25 +49,25 @@ def give_skeleton_motion(
     settings: MotionSettings,
     model: Figure | None,
 ) -> Lone | None:
-    """Apply a motion to the model, else to the first figure whose joints it names, else to none.
+    """Apply a motion to the model, or else to the first figure that has its joint names, if any.
 
     Parameters
     ----------
     path : Path
-        Its file, for messages.
+        File of the motion, for messages.
     motion : SkeletonMotion
-        As read from the file.
+        Motion as read from the file.
     cast : Cast
         Receives a clip, or an actor.
     settings : MotionSettings
         Unit, up axis, frame rate, and whether it drives a figure.
     model : Figure or None
-        The figure that it must drive, a separate copy for each motion.
+        The figure to drive, a separate copy for each motion.
 
     Returns
     -------
     Lone or None
-        The separate skeleton, if it drives no figure.
+        The separate skeleton, if the motion drives no figure.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def give_skeleton_motion(
 
 
 def _as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion:
-    """Return a motion in the requested unit, world and rate; nothing else is guessed."""
+    """Return a motion in the requested unit, up axis and rate; others are estimated."""
     if settings.unit:
         motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as requested")
     if settings.up:
@@ -147,9 +147,9 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
     Parameters
     ----------
     cast : Cast
-        Complete except for people who appear later; actors of scaled skeletons are replaced.
+        The scene, without people who appear later; actors of scaled skeletons are replaced.
     lone : list of Lone
-        The separate skeletons in it.
+        The separate skeletons in the scene.
     """
     chosen = [one for one in lone if _is_odd(one, cast.actors)]
     for one in lone:
@@ -166,7 +166,7 @@ def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
 
 
 def _is_odd(one: Lone, actors: list[Actor]) -> bool:
-    """Return whether a unit is known, not metres, and not that of all other actors."""
+    """Return whether a unit is known, not metres, and different from that of any other actor."""
     unit = one.motion.figure.unit
     if unit == "m" or unit not in METRES:
         return False

@@ -9,7 +9,7 @@ __all__ = ["file_stem", "folder_name", "opened_text"]
 
 _LONGEST = 100  # characters of a stem
 _INSIDE = ("smpl_full", "smplfull", "smpl", "keypoints3d", "core_txt_files")
-"""Names of folders that every EasyMocap recording or copy of the PIG model has."""
+"""Names of folders that exist in every EasyMocap recording or copy of the PIG model."""
 
 
 def folder_name(path: Path) -> str:

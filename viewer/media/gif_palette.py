@@ -59,7 +59,7 @@ class PaletteChooser:
 
 
 class PaletteUser:
-    """Gives each pixel a colour of a palette (FFmpeg's ``paletteuse``).
+    """Assigns a colour of a palette to each pixel (FFmpeg's ``paletteuse``).
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins like this is an image in a supported format."""
+    """Return whether a file that begins with these bytes is an image in a supported format."""
     return head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"BM", b"GIF8", b"II*\0", b"MM\0*")) or (
         head[:4] == b"RIFF" and head[8:12] == b"WEBP"
     )
@@ -58,7 +58,7 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
                 if picture.width * picture.height > _MAX_PIXELS:
                     raise ValueError(f"{picture.width} x {picture.height} pixels are too many")
                 pixels = np.array(picture.convert("RGBA"))
-                pixels.flags.writeable = False  # materials may share it
+                pixels.flags.writeable = False  # materials may share the array
                 return pixels
     except UnidentifiedImageError:
         raise FormatError(Diagnostic("F002.picture", path)) from None

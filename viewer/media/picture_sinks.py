@@ -31,7 +31,7 @@ class PictureSink:
     Parameters
     ----------
     paths : sequence of Path
-        One for each frame; their suffix chooses the format.
+        One path for each frame; the suffix selects the format.
 
     Attributes
     ----------
@@ -75,12 +75,12 @@ class PictureSink:
 class SheetSink:
     """Writes one image of all frames, row by row, with gutters and a number in each cell.
 
-    Gutters and unused cells are white, or transparent if the frames are.
+    Gutters and unused cells are white, or transparent if the frames are transparent.
 
     Parameters
     ----------
     path : Path
-        Its suffix chooses the format.
+        The suffix selects the format.
     size : (int, int)
         Largest width and height of the image, in pixels.
     numbers : sequence of int
@@ -93,7 +93,7 @@ class SheetSink:
     columns, rows : int
         Number of cells across and down.
     gutter : int
-        Pixels between cells; none around them.
+        Pixels between cells; there is no border.
     cell : (int, int)
         Width and height of a cell: the size of the frames.
     size : (int, int)
@@ -104,7 +104,7 @@ class SheetSink:
     Raises
     ------
     ViewerError
-        If there are so many frames that the cells would be too small.
+        If there are too many frames for the size of the image.
     """
 
     n_samples = 0
@@ -164,7 +164,7 @@ def sheet_layout(
 ) -> tuple[int, int]:
     """Return the best number of columns and rows for a number of frames.
 
-    Cells with an aspect ratio near ``wanted`` are preferred, and few empty ones.
+    Layouts with cells of an aspect ratio near ``wanted`` and few empty cells are preferred.
 
     >>> sheet_layout((1280, 720), 12), sheet_layout((1280, 720), 12, 0.5)
     ((4, 3), (6, 2))

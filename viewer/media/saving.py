@@ -114,8 +114,8 @@ def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 def save_bytes(path: str | Path, data: bytes) -> None:
     """Replace a file's content atomically, or leave it unchanged.
 
-    A link is followed. A device or pipe is written to directly, never replaced, and so is
-    standard output, even if redirected to a file. The new file keeps the old permissions.
+    A link is followed. A device or pipe is written to directly and never replaced, as is standard
+    output, even if redirected to a file. The new file keeps the old permissions.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ class Replacement:
             self.temporary = None
 
 
-_Copies = dict[Path, Path | None]  # by resolved path; None where no file existed
+_Copies = dict[Path, Path | None]  # by resolved path; None if no file existed
 _outer: ContextVar[_Copies | None] = ContextVar("copies of the innermost all_or_none", default=None)
 
 
@@ -307,8 +307,8 @@ def _mode(target: Path) -> int:
 
 
 def _write_through(target: Path, data: bytes) -> None:
-    # Closing may fail too: /dev/full reports its error only then. A pipe without a reader
-    # blocks forever, so signals must raise.
+    # Closing may fail too: /dev/full reports its error only then. A pipe without a reader blocks
+    # forever, so signals must be able to interrupt it.
     with raising(), target.open("wb") as stream:
         stream.write(data)
 

@@ -54,19 +54,19 @@ def check_targets(
 
 
 def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> None:
-    """Refuse to write a folder that already exists or that input was read from.
+    """Refuse to write a folder that already exists or from which input was read.
 
     Parameters
     ----------
     folder : Path
-        Folder that is replaced as a whole; missing parent folders are created.
+        Folder to replace as a whole; missing parent folders are created.
     inputs, force
         As for ``check_targets``.
 
     Raises
     ------
     OutputError
-        For the folder, or for a file in its place.
+        If the folder must not be written, or is a file.
     """
     try:
         place = folder.resolve()
@@ -117,7 +117,7 @@ def _check_folder(file: Path, folder: Path, known: set[Path]) -> None:
     if not folder.is_dir():
         raise _refusal(file, f"the folder {printable(folder, 300)} does not exist")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise _refusal(file, f"the folder {printable(folder, 300)} cannot be written to")
+        raise _refusal(file, f"the folder {printable(folder, 300)} is not writable")
     known.add(folder)
 
 

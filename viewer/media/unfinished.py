@@ -8,7 +8,7 @@ from pathlib import Path
 
 __all__ = ["note_unfinished", "remove_unfinished"]
 
-_MOST = 64  # maximum number at a time, in all threads; far fewer are written at once
+_MOST = 64  # maximum number of files at a time, in all threads; far fewer are written at once
 
 _unfinished: deque[Path] = deque(maxlen=_MOST)
 

@@ -1,6 +1,6 @@
 """Video output with PyAV (FFmpeg's libraries), which is imported only when needed.
 
-``.mp4`` holds H.264, ``.webm`` VP9, ``.gif`` 256-colour images. Colours of the first two are
+``.mp4`` contains H.264, ``.webm`` VP9, ``.gif`` 256-colour images. Colours of the first two are
 those of BT.709 in limited range, converted and tagged as such (ITU-T H.273, tables 2 to 4, code
 point 1), so that players show the rendered colours.
 """
@@ -46,7 +46,7 @@ class VideoSink:
     path : Path
         Output file; its suffix determines the format.
     size : (int, int)
-        Width and height of the frames. If they must be even and are not, the last column or row is
+        Width and height of the frames. If an odd size is not supported, the last column or row is
         repeated.
     rate : float
         Frames per second. GIF frame delays are multiples of 1/100 s; they are rounded so that their
@@ -136,7 +136,8 @@ class VideoSink:
         Raises
         ------
         OutputError
-            If the encoder refuses it or the file cannot be written, and for every later frame.
+            If the encoder rejects the frame or the file cannot be written, and for every later
+            frame.
         """
         with self._errors():
             if self._container is None:
@@ -178,7 +179,7 @@ class VideoSink:
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:
-        """Convert the first error to one line, and re-raise it instead of calling the encoder."""
+        """Convert the first error to one line, and raise it again in later calls."""
         if self._problem is not None:
             raise self._problem
         try:

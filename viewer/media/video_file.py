@@ -84,7 +84,7 @@ class VideoFile:
         Raises
         ------
         OSError
-            The first error, which may be that of closing.
+            The first error, possibly from closing the file.
         """
         self.closed = True
         try:

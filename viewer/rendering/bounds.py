@@ -103,7 +103,7 @@ def stretch(matrices: Floats) -> Floats:
 
 
 def _reaches(centers: Floats, skin: Skin, positions: Floats) -> Floats:
-    """Return the distance of each joint's farthest vertex at bind time; -1 without any: (J,)."""
+    """Return the distance of each joint's farthest vertex at bind time, -1 if it has none: (J,)."""
     used = skin.weights != 0.0
     joints = skin.joints[used]
     away = np.linalg.norm(positions[owners(skin)[used]] - centers[joints], axis=1)
@@ -129,6 +129,6 @@ def _of_joints(actor: Actor) -> Floats:
 
 
 def _of_box(box: Floats) -> Floats:
-    """Return the corners of a box as spheres without extent: (8, 4)."""
+    """Return the corners of a box as spheres of radius 0: (8, 4)."""
     corners = np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, -1).T
     return np.pad(corners, ((0, 0), (0, 1)))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import moderngl
 import numpy as np
 
 from viewer.rendering.bounds import Bounds
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
-from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.index_sets import MeshRun
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
@@ -39,7 +41,8 @@ class Casters:
         Display options.
     threshold : float
         Actors with at most this opacity are omitted, 0 to 1. Averaged over passes with evenly
-        spread thresholds, the strength of an actor's shadow equals its opacity.
+        spread thresholds, the strength of an actor's shadow equals its opacity. Blended materials
+        cover a part of each pass's shadow map.
     """
 
     programs: Programs
@@ -52,15 +55,16 @@ class Casters:
     threshold: float = 0.5
 
     def draw(self, view: View, fragment: str) -> None:
-        """Draw all solid parts with a fragment shader that needs no material."""
+        """Draw all shapes with a fragment shader that shows no colours."""
         options = self.options
         for actor, mesh in self.meshes.singles:
             if actor.opacity <= self.threshold:
                 continue
             placement = placement_of(actor, options)
-            self.mesh_pass.draw_shape(mesh, placement, view, options, fragment)
+            self.mesh_pass.draw_shape(mesh, placement, view, options, fragment, self._prepare)
         for actors, instances in self.meshes.instanced:
-            draw_instance_shapes(self.programs, instances, actors, view, options, fragment)
+            how = view, options, fragment, self._prepare
+            draw_instance_shapes(self.programs, instances, actors, *how)
         for actor in self.actors:
             if actor.opacity <= self.threshold:
                 continue
@@ -72,6 +76,11 @@ class Casters:
             if has_points(actor):
                 points = self.buffers.points_of(actor)
                 self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)
+
+    def _prepare(self, program: moderngl.Program, run: MeshRun) -> None:
+        """Set the phase of the pattern by which blended surfaces block part of the light."""
+        if run.surface.is_blended:
+            set_uniforms(program, {"u_threshold": self.threshold})
 
     def spheres(self, bounds: Bounds) -> list[Floats]:
         """Return bounding spheres of each drawn actor: (N, 4) centres and radii, scene space."""

@@ -218,7 +218,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
     Parameters
     ----------
     scene : Scene
-        With any number of actors.
+        Scene with any number of actors.
     name : str
         Name of an actor, for its root joint or the centre of its points; of a joint or captured
         point; a person's number; or the joint of an actor, such as ``fox/head`` or ``1:pelvis``.

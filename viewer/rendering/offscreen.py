@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
+from collections.abc import Callable
+from functools import partial
 
 from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera, facing_camera, fit
@@ -11,6 +14,7 @@ from viewer.rendering.gpu.context import headless_context, is_software, unreadab
 from viewer.rendering.gpu.target import Target, check_size
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
+from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points
@@ -68,11 +72,26 @@ class Offscreen:
         camera: Camera,
         options: DisplayOptions,
         box: Floats,
+        on_time: Callable[[float, int], object] | None = None,
     ) -> Bytes:
-        """Draw a scene and return its pixels; see ``render``."""
+        """Draw a scene and return its pixels; see ``render``.
+
+        ``on_time`` is called after the second of several passes with the time that it took, in
+        seconds, and their number. The first one also compiles shaders and uploads buffers.
+        """
         with self.context:
             target = self.target(size, options.samples)
-            self.renderer.draw(scene, camera, options, target, box)
+            draw = partial(self.renderer.draw, scene, camera, options, target, box)
+            count, first = n_passes(options), 0
+            if on_time is not None and count > 2:
+                draw(passes=range(1))
+                self.context.finish()
+                started = time.perf_counter()
+                draw(passes=range(1, 2))
+                self.context.finish()
+                on_time(time.perf_counter() - started, count)
+                first = 2
+            draw(passes=range(first, count))
             target.resolve()
             return target.read()
 

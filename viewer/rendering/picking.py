@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.joint_marks import joint_at, marks_of
+from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_boxes, draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
@@ -165,41 +167,46 @@ class PickPass:
     def _draw_meshes(self, scene: Scene, view: View, options: DisplayOptions) -> None:
         meshes = update_meshes(self.passes.buffers, scene.actors, options)
         index = {id(actor): number for number, actor in enumerate(scene.actors)}
-        if options.cull:
-            self.context.enable(moderngl.CULL_FACE)
         for actor, mesh in meshes.singles:
             self._draw_mesh(index[id(actor)], mesh, placement_of(actor, options), view, options)
         for actors, instances in meshes.instanced:
-            instances.place(actors, view)
-            self._draw_instances([index[id(actor)] for actor in actors], instances, view, options)
-        self.context.disable(moderngl.CULL_FACE)
+            self._draw_instances(
+                [index[id(actor)] for actor in actors], actors, instances, view, options
+            )
 
     def _draw_mesh(
         self, index: int, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> None:
-        program = self.passes.programs.drawing("mesh", fragment="pick")
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        set_model(program, view, placement, mesh.center)
-        order = indices.order
-        self._number(program, lambda _, t, point: Pick(index, -1, int(order[t]), -1, point))
-        array = self.passes.meshes.array(mesh, program, indices)
-        array.render(moderngl.TRIANGLES, vertices=indices.n_indices)
+        order = mesh.index_set(options).order
+
+        def prepare(program: moderngl.Program, run: MeshRun) -> None:
+            def found(_: int, triangle: int, point: Floats) -> Pick:
+                return Pick(index, -1, int(order[run.first // 3 + triangle]), -1, point)
+
+            self._number(program, found)
+
+        self.passes.meshes.draw_shape(mesh, placement, view, options, "pick", prepare)
 
     def _draw_instances(
-        self, numbers: list[int], instances: InstanceBuffers, view: View, options: DisplayOptions
+        self,
+        numbers: list[int],
+        actors: list[Actor],
+        instances: InstanceBuffers,
+        view: View,
+        options: DisplayOptions,
     ) -> None:
-        program = self.passes.programs.drawing("instance", fragment="pick", skin=instances.method)
-        indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
-        instances.use(program, view)
-        order = indices.order
+        order = instances.mesh.index_set(options.reduced, options.hidden_parts).order
 
-        def found(instance: int, triangle: int, point: Floats) -> Pick:
-            # Some drivers continue gl_PrimitiveID across instances.
-            return Pick(numbers[instance], -1, int(order[triangle % len(order)]), -1, point)
+        def prepare(program: moderngl.Program, run: MeshRun) -> None:
+            def found(instance: int, triangle: int, point: Floats) -> Pick:
+                # Some drivers continue gl_PrimitiveID across instances.
+                place = (run.first + 3 * triangle % run.count) // 3
+                return Pick(numbers[instance], -1, int(order[place]), -1, point)
 
-        self._number(program, found)
-        array = instances.array(program, indices)
-        array.render(moderngl.TRIANGLES, vertices=indices.n_indices, instances=instances.count)
+            self._number(program, found)
+
+        how = view, options, "pick", prepare
+        draw_instance_shapes(self.passes.programs, instances, actors, *how)
 
     def _draw_skeleton(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         skeleton = self.passes.buffers.skeleton(actor)

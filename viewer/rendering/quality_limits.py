@@ -1,4 +1,4 @@
-"""Limits of final quality: the time of software rendering, and graphics memory."""
+"""Limits of final quality: the work of software rendering, and graphics memory."""
 
 from __future__ import annotations
 
@@ -10,29 +10,21 @@ from viewer.rendering.gpu.context import is_software
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.scene import Scene
 
-__all__ = ["limit_passes", "seconds_per_pass"]
+__all__ = ["limit_passes", "time_note"]
 
-_PATIENCE = 2.0  # seconds for a still image
+_MOST_WORK = 2.0  # of a still image
 _FEWEST = 3  # passes; fewer look no better than normal quality
 _BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9  # of the sum of passes, and occlusion at half resolution
-_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # seconds on two cores, measured
-
-
-def seconds_per_pass(size: tuple[int, int], n_triangles: int) -> float:
-    """Return roughly how long llvmpipe takes to draw a pass of final quality on two cores.
-
-    >>> round(seconds_per_pass((1280, 720), 12000), 2)
-    0.13
-    """
-    return _PER_PASS + _PER_PIXEL * math.prod(size) + _PER_TRIANGLE * n_triangles
+_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # about seconds on two cores
+_PATIENCE = 5.0  # seconds after which the time is stated
 
 
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower a quality that would take over two seconds in software, or over 1 GB of memory.
+    """Lower a quality that would be much work for software, or need over 1 GB of memory.
 
-    The time is estimated, not measured, so that the image does not depend on the machine's load.
+    The work is counted, not timed, so that an image does not depend on the machine or its load.
 
     Parameters
     ----------
@@ -62,8 +54,9 @@ def limit_passes(
     if not is_software(context):
         return []
     meshes = [actor.figure.mesh for actor in scene.actors if actor.is_drawn]
-    seconds = seconds_per_pass(size, sum(mesh.n_triangles for mesh in meshes if mesh))
-    passes, wanted = int(_PATIENCE / seconds), options.passes
+    n_triangles = sum(mesh.n_triangles for mesh in meshes if mesh)
+    work = _PER_PASS + _PER_PIXEL * math.prod(size) + _PER_TRIANGLE * n_triangles
+    passes, wanted = int(_MOST_WORK / work), options.passes
     if passes >= wanted:
         return []
     what = f"{passes} of {wanted} passes"
@@ -71,7 +64,25 @@ def limit_passes(
         options.quality, what = "normal", "normal quality"
     else:
         options.passes = passes
+    pixels = f"{math.prod(size) / 1e6:.1f} megapixels and {n_triangles} triangles"
     return [
-        f"drawn with {what}, as software rendering takes about {seconds:.1f} s for each of "
-        f"{wanted}; --quality final draws them all"
+        f"drawn with {what}, as {pixels} take long in software; --quality final draws all {wanted}"
+    ]
+
+
+def time_note(seconds: float, count: int) -> list[str]:
+    """Return a message about the time of an image that takes long.
+
+    Parameters
+    ----------
+    seconds : float
+        Measured time of one pass.
+    count : int
+        Number of passes.
+    """
+    if seconds * count <= _PATIENCE:
+        return []
+    return [
+        f"final quality takes about {seconds * count:.0f} s here: {count} passes of "
+        f"{seconds:.1f} s; --quality normal draws one"
     ]

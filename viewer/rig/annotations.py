@@ -48,7 +48,7 @@ class Keypoints:
     joints : (N,) int32
         Joint of each keypoint, -1 for a point on the mesh.
     vertices : (N, 3) int32
-        Corners of the triangle; ignored where a joint is given.
+        Corners of the triangle; ignored if there is a joint.
     weights : (N, 3)
         Barycentric coordinates in that triangle.
     """
@@ -129,7 +129,7 @@ class VertexField:
 
 
 def keypoint_positions(keypoints: Keypoints, vertices: Floats, joints: Floats) -> Floats:
-    """Return the positions of keypoints: of their joints, or sum_k b_k v_k of triangle corners.
+    """Return the positions of keypoints: their joints, or sum_k b_k v_k of triangle corners.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def keypoint_positions(keypoints: Keypoints, vertices: Floats, joints: Floats) -
     Returns
     -------
     (N, 3)
-        In that space.
+        Positions in that space.
     """
     placed = np.einsum("nk,nka->na", keypoints.weights, vertices[keypoints.vertices])
     at_joint = keypoints.joints >= 0

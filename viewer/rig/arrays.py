@@ -20,7 +20,7 @@ Bytes = NDArray[np.uint8]
 
 
 class Deferred:
-    """An array of a file that is read on first use and then kept.
+    """An array in a file, read on first use and then cached.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def frozen(
     name : str
         Name of the array in error messages.
     values : array-like of ``shape``
-        Copied unless nothing can write to its memory.
+        Copied if its memory can still be modified.
     shape : tuple
         Required shape; ``None`` leaves an axis free.
     dtype : dtype
@@ -84,7 +84,7 @@ def frozen(
     Raises
     ------
     RigError
-        If the shape differs, a number is not finite, or one that must be an integer is not.
+        If the shape differs, a number is not finite, or an integer type gets a fraction.
 
     >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
     False

@@ -1,4 +1,4 @@
-"""Weighted offsets of rest vertices: blend shapes, pose correctives, and the joint regressor."""
+"""Blend shapes, pose correctives and the joint regressor: weighted sums over rest vertices."""
 
 from __future__ import annotations
 
@@ -19,21 +19,24 @@ class BlendShapes:
     Attributes
     ----------
     names : tuple of S str
-        Labels; may repeat, as blend shapes are identified by index.
+        Labels, which may repeat: blend shapes are identified by index.
     offsets : (S, V, 3), or Deferred
         Figure units per unit of weight; read from the file when a weight first becomes non-zero.
     groups : tuple of S str
-        Group of each: ``"shape"`` (a weight of 1 is one standard deviation), ``"expression"``,
-        or ``"morph"`` (a weight of 1 is the target itself).
+        Group of each blend shape: ``"shape"`` (a weight of 1 is one standard deviation),
+        ``"expression"``, or ``"morph"`` (a weight of 1 is the target itself).
     normal_offsets : (S, V, 3), or Deferred, or None
         Offsets of the rest normals per unit of weight; None if the normals are recomputed from
         the changed surface.
+    rest_weights : (S,) or None
+        Weights of the file's own pose; None if all are 0.
     """
 
     names: tuple[str, ...]
     offsets: Floats | Deferred
     groups: tuple[str, ...] = ()
     normal_offsets: Floats | Deferred | None = None
+    rest_weights: Floats | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
@@ -48,6 +51,9 @@ class BlendShapes:
         _check_shape("offsets", self.offsets.shape, (len(self.names), self.n_vertices, 3))
         if given is not None:
             _check_shape("normal_offsets", given.shape, self.offsets.shape)
+        if self.rest_weights is not None:
+            weights = frozen("rest_weights", self.rest_weights, (len(self.names),))
+            object.__setattr__(self, "rest_weights", weights if weights.any() else None)
         if len(self.groups) != len(self.names):
             raise RigError(f"groups: expected {len(self.names)}, found {len(self.groups)}")
 
@@ -67,7 +73,7 @@ class BlendShapes:
         Parameters
         ----------
         weights : (N,)
-            N <= S; the others count as 0.
+            N <= S; missing weights count as 0.
 
         Returns
         -------
@@ -87,7 +93,7 @@ class BlendShapes:
         Parameters
         ----------
         weights : (N,)
-            N <= S; the others count as 0.
+            N <= S; missing weights count as 0.
 
         Returns
         -------
@@ -103,7 +109,7 @@ class BlendShapes:
         return None if offsets is None else self._weighted(offsets, weights)
 
     def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
-        """Return the weighted sum of offsets; without a non-zero weight nothing is read."""
+        """Return the weighted sum of offsets; if all weights are 0, nothing is read."""
         if len(weights) > self.n_shapes:
             raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
         active = np.flatnonzero(weights)
@@ -138,7 +144,7 @@ class Correctives:
             object.__setattr__(self, "offsets", frozen("offsets", self.offsets, (None, None, 3)))
         count = self.offsets.shape[0]
         if len(self.offsets.shape) != 3 or count % 9:
-            raise RigError(f"offsets: expected nine for each joint but the root, found {count}")
+            raise RigError(f"offsets: expected nine for each joint except the root, found {count}")
 
     @property
     def n_vertices(self) -> int:
@@ -186,7 +192,7 @@ def corrective_weights(rotations: Floats) -> Floats:
     Returns
     -------
     (9 (J - 1),)
-        Row by row, joints in order.
+        Nine entries per joint, row by row.
     """
     return (rotations[1:] - np.eye(3)).reshape(-1)
 
@@ -226,7 +232,7 @@ def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
     Parameters
     ----------
     regressor : JointRegressor
-        With J rows.
+        Joint regressor with J rows.
     positions : (V, 3)
         Rest vertices, figure units.
 

@@ -16,7 +16,7 @@ _MOST_SIGMA = 1e6  # standard deviations; larger coefficients are implausible
 
 
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
-    """Return a message about coefficients that a figure does not have; none if they are all 0.
+    """Return a message about coefficients that a figure does not have, unless they are all 0.
 
     Parameters
     ----------
@@ -56,11 +56,11 @@ def apply_coefficients(
     values : (N,) or None
         Coefficients of the group's first shapes; None changes nothing.
     figure : Figure
-        With or without blend shapes.
+        Figure with or without blend shapes.
     pose : Pose
-        Changed in place.
+        Modified in place.
     cut : bool
-        Ignore coefficients that the figure does not have instead of rejecting them.
+        Ignore coefficients that the figure does not have, instead of raising an error.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def apply_coefficients(
     if values is None or len(values) == 0:
         return []
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
-    # Records store all weights outside the shape group, morphs included, as expressions.
+    # Records store all weights outside the shape group as expressions, including morphs.
     rows = [index for index, name in enumerate(groups) if (name == "shape") == (group == "shape")]
     values = np.asarray(values, dtype=np.float64).ravel()
     notes = unused_coefficients(group, values, len(rows), figure.name)

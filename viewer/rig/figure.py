@@ -13,8 +13,10 @@ from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexFiel
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
 from viewer.rig.hands import Hand
+from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion.animation import Animation
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
@@ -45,16 +47,16 @@ class Figure:
     mesh : Mesh or None
         In bind pose.
     skeleton : Skeleton or None
-        Without one the mesh stays in the bind pose.
+        Without a skeleton, the mesh stays in the bind pose.
     skin : Skin or None
-        Without one the mesh does not follow the skeleton.
+        Without a skin, the mesh does not follow the skeleton.
     up : "y" or "z"
         Up axis of the file, which the camera follows.
     unit : str
-        Unit of length, a key of ``viewer.rig.units.METRES``, stated by the file or guessed;
-        empty if unknown.
+        Unit of length, a key of ``viewer.rig.units.METRES``, given by the file or estimated; empty
+        if unknown.
     blend_shapes : BlendShapes or None
-        Weighted offsets of the rest mesh; the joints follow.
+        Weighted offsets of the rest mesh, which the joints follow.
     correctives : Correctives or None
         Offsets that depend on the pose.
     joint_regressor : JointRegressor or None
@@ -64,7 +66,7 @@ class Figure:
     pose_layout : PoseLayout or None
         Order of the values in the model's own pose vectors; None if those are the DOFs.
     body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
-        Further annotations of the mesh.
+        Other annotations of the mesh.
     symmetry : (V,) int32 or None
         Mirror counterpart of each vertex.
     points : PointLayout or None
@@ -73,6 +75,10 @@ class Figure:
         Precomputed values per vertex, to be shown as colours.
     facts : tuple of (str, str or Diagnostic)
         Findings of the reader for ``viewer info``, each a heading and a text.
+    animations : tuple of Animation
+        Motions from the figure's own file, in file order.
+    humanoid : Humanoid or None
+        Joints by the standard name of the human bone that they are, if the file states it.
     """
 
     name: str
@@ -93,6 +99,8 @@ class Figure:
     points: PointLayout | None = None
     fields: tuple[VertexField, ...] = ()
     facts: tuple[tuple[str, str | Diagnostic], ...] = ()
+    animations: tuple[Animation, ...] = ()
+    humanoid: Humanoid | None = None
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None and self.points is None:
@@ -146,6 +154,14 @@ class Figure:
     def n_shapes(self) -> int:
         """Number of blend shapes, S."""
         return 0 if self.blend_shapes is None else self.blend_shapes.n_shapes
+
+    @property
+    def rest_shape_weights(self) -> Floats:
+        """Shape weights of the file's own pose: (S,)."""
+        shapes = self.blend_shapes
+        if shapes is None or shapes.rest_weights is None:
+            return np.zeros(self.n_shapes)
+        return shapes.rest_weights
 
     @property
     def is_attached(self) -> bool:
@@ -205,7 +221,7 @@ def skeleton_points(skeleton: Skeleton, pose: Pose) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        With or without boxes.
+        Skeleton with or without boxes.
     pose : Pose
         DOFs in lengths and radians.
 

@@ -23,7 +23,7 @@ class Hand:
     joints : (H,) int32
         Finger joints, in the order of the components.
     components : (C, 3 H)
-        Concatenated rotation vectors, radians per unit of coefficient.
+        Concatenated rotation vectors, radians per unit of a coefficient.
     mean : (3 H,)
         Rotation vectors of the mean hand; zeros are the flat hand.
     """
@@ -47,9 +47,9 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
     Parameters
     ----------
     hand : Hand
-        Its components and mean.
+        Provides the components and mean.
     coefficients : (N,)
-        N <= C; the others count as 0.
+        N <= C; missing coefficients count as 0.
     flat : bool
         Whether to omit the mean.
 
@@ -77,9 +77,9 @@ def hand_coefficients(hand: Hand, vectors: Floats, flat: bool, count: int) -> Fl
     Parameters
     ----------
     hand : Hand
-        Its components and mean.
+        Provides the components and mean.
     vectors : (H, 3)
-        Rotation vectors of its joints, radians.
+        Rotation vectors of the hand's joints, radians.
     flat : bool
         As for ``hand_vectors``.
     count : int

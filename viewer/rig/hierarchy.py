@@ -12,14 +12,14 @@ __all__ = ["cycle_members", "depth_first"]
 def cycle_members(parents: Floats | Ints) -> Bools:
     """Return a mask of the joints that are their own ancestors.
 
-    Pointer doubling: every pass doubles the distance from each joint to the ancestor that it
-    points to. Joints that still point to an ancestor after log2(J) passes are in a cycle or below
-    one, and the ancestor is in the cycle.
+    Pointer doubling: every pass doubles the distance from each joint to the ancestor to which it
+    points. Joints that still point to an ancestor after log2(J) passes are in or below a cycle, and
+    that ancestor is in the cycle.
 
     Parameters
     ----------
     parents : (J,)
-        As listed in a file; a value that is not a joint index counts as no parent.
+        Parents as listed in a file; a value that is not a joint index means no parent.
 
     Returns
     -------

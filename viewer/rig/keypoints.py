@@ -29,7 +29,7 @@ def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None
     Parameters
     ----------
     figure : Figure
-        With keypoints, mesh and skeleton.
+        Figure with keypoints, mesh and skeleton.
     pose : Pose
         DOFs in lengths and radians.
     skinning : Skinning, optional
@@ -48,7 +48,7 @@ def posed_keypoints(figure: Figure, pose: Pose, skinning: Skinning | None = None
     if figure.keypoints is None or figure.mesh is None:
         raise RigError(f"figure {figure.name} has no keypoints")
     part, keypoints = _parts.get(figure, None, lambda: _part(figure))
-    # Joints are taken from the whole shaped figure, as the partial one has no joint regressor.
+    # Joints are taken from the whole shaped figure, as the partial figure has no joint regressor.
     whole = shaped(figure, pose.shape_weights)
     part = replace(part, skeleton=whole.skeleton, skin=_with_binds(part.skin, whole.skin))
     vertices = deform(part, pose, skinning or Skinning())[0]
@@ -60,7 +60,7 @@ def _with_binds(skin: Skin | None, whole: Skin | None) -> Skin | None:
 
 
 def _part(figure: Figure) -> tuple[Figure, Keypoints]:
-    """Return a figure of the vertices that keypoints use, and the keypoints on that figure."""
+    """Return a figure with the vertices that keypoints use, and the keypoints of that figure."""
     keypoints = figure.keypoints
     assert keypoints is not None  # checked by the caller
     vertices, index = np.unique(keypoints.vertices, return_inverse=True)
@@ -69,19 +69,19 @@ def _part(figure: Figure) -> tuple[Figure, Keypoints]:
 
 
 def some_vertices(figure: Figure, vertices: Ints) -> Figure:
-    """Return a figure of a few vertices, without triangles, that deforms like the whole one.
+    """Return a figure with a few vertices and no triangles that deforms like the whole figure.
 
     Parameters
     ----------
     figure : Figure
-        With a mesh.
+        Figure with a mesh.
     vertices : (N,)
         Their indices.
 
     Returns
     -------
     Figure
-        Without a joint regressor, so its joints do not follow its shape.
+        It has no joint regressor, so its joints do not follow its shape.
     """
     mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives

@@ -18,17 +18,17 @@ __all__ = [
     "world_matrices",
 ]
 
-# Relative tolerance of A^T A = s^2 I. Treating a matrix within it as rigid rotates normals by at
-# most half as many radians.
+# Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
+# normals by at most half of it, in radians.
 _RIGID = 1e-5
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
     """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Pointer doubling: every pass multiplies each joint's matrix by that of the ancestor it points
-    to and then adopts that ancestor's pointer, so a chain of n joints takes log2(n) passes
-    (Hillis and Steele 1986).
+    Pointer doubling: every pass multiplies each joint's matrix by that of the ancestor to which it
+    points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n) passes (Hillis
+    and Steele 1986).
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        Its hierarchy and DOF table.
+        Provides the hierarchy and DOF table.
     pose : Pose
         DOFs in lengths and radians.
 
@@ -81,19 +81,19 @@ def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 def posed_skeleton(skeleton: Skeleton, pose: Pose) -> PosedSkeleton:
     """Return the world and skinning matrices of a pose, cached until the pose changes.
 
-    The pose stores the result, so forward kinematics runs once a frame for all passes and panels.
+    The pose stores the result, so forward kinematics runs once per frame for all passes and panels.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Of the shaped figure; compared by identity.
+        Skeleton of the shaped figure; compared by identity.
     pose : Pose
         DOFs in lengths and radians.
 
     Returns
     -------
     PosedSkeleton
-        Its matrices are read-only.
+        Read-only matrices.
     """
     known, key = pose.posed, pose.skinning_key
     if known is None or known.skeleton is not skeleton or known.key is not key:
@@ -149,5 +149,5 @@ def is_rigid(palette: Floats) -> Bools:
     is_uniform = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
     first, second, third = np.moveaxis(linear, -1, 0)
     volumes = np.einsum("...a,...a->...", np.cross(first, second), third)
-    # A reflection has orthogonal columns too, but a negative determinant.
+    # A reflection also has orthogonal columns, but a negative determinant.
     return is_uniform & (volumes > 0.0).all(axis=-1)

@@ -27,16 +27,16 @@ class Texture:
     name : str
         File name of the image, relative to the figure's folder.
     image : (H, W, 4) uint8 or None
-        Pixels with alpha, first row at v = 1; sRGB in textures of colours, linear in others;
+        Pixels with alpha, first row at v = 1; sRGB in colour textures, linear in others;
         None if it could not be read.
     channel : int
-        Column of ``image`` that single-channel textures are read from.
+        Channel of ``image`` from which single-channel textures are read.
     uv_set : int
         0 for ``Mesh.uvs``, 1 for ``Mesh.second_uvs``.
     transform : (2, 3)
-        From texture coordinates to those of the image, v = 0 at its bottom row.
+        Maps texture coordinates to image coordinates, whose v is 0 at the bottom row.
     wrap : (str, str)
-        Entry of ``WRAPS`` along u and v.
+        Entries of ``WRAPS`` along u and v.
     is_smooth : bool
         Whether pixels are interpolated.
     """
@@ -83,22 +83,22 @@ class Material:
     Attributes
     ----------
     name : str
-        As in the file; triangles refer to materials by index.
+        Name in the file; triangles refer to materials by index.
     base_texture : Texture or None
         Colour and opacity, sRGB.
     base_color : (r, g, b, a) or None
-        Linear, 0 to 1; None for a material without a colour of its own: white under a texture,
-        else the figure's.
+        Linear, 0 to 1; None for a material without a colour of its own, which is white under a
+        texture and otherwise has the figure's colour.
     metallic, roughness : float
         0 to 1; roughness is perceptual, the square root of the GGX width.
     metallic_texture, roughness_texture : Texture or None
-        One channel each, often two channels of one image.
+        One channel each, often of the same image.
     normal_texture : Texture or None
         Tangent space normals: red along u, green along v, blue outwards, 0 to 255 for -1 to 1.
     normal_scale : float
         Multiplier for the red and green components of the normals.
     occlusion_texture : Texture or None
-        Fraction of the ambient light that arrives: one channel.
+        Fraction of the ambient light that arrives; one channel.
     occlusion_strength : float
         0 to 1.
     emissive : (r, g, b)
@@ -114,7 +114,7 @@ class Material:
     unlit : bool
         Whether the base colour is shown without lighting.
     is_physical : bool
-        Whether the file describes the surface by metallic and roughness, or as unlit.
+        Whether the file describes the surface by metalness and roughness, or as unlit.
     """
 
     name: str = ""
@@ -181,7 +181,7 @@ TEXTURES = (
     *("base_texture", "metallic_texture", "roughness_texture"),
     *("normal_texture", "occlusion_texture", "emissive_texture"),
 )
-"""Fields of a material that hold textures."""
+"""Fields of a material that contain textures."""
 
 
 def _check_choice(name: str, value: object, choices: range | tuple[str, ...]) -> None:

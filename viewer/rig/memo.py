@@ -38,7 +38,7 @@ class Memo(Generic[_Owner, _Value]):
         key : hashable
             Everything else that the result depends on.
         make : callable
-            Without arguments.
+            Called without arguments.
         """
         known = self._values.setdefault(owner, {})
         if key in known:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,10 @@ __all__ = [
     "split_seams",
     "triangle_areas",
     "vertex_normals",
+    "visible_triangles",
+    "visible_vertices",
     "volume",
+    "without_seams",
 ]
 
 _ROW = 64  # points per row of a reduction, see bounding_box
@@ -32,18 +36,24 @@ class Mesh:
     positions, normals : (V, 3)
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, never relied upon.
+        Vertex indices; counter-clockwise from outside in most files, which is not relied upon.
     uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None
-        Indices into ``uvs`` where they differ from ``triangles``: along a seam one vertex has
-        several texture coordinates. None if every vertex has one, and U = V.
+        Indices into ``uvs`` if they differ from ``triangles``: along a seam, one vertex has several
+        texture coordinates. None if every vertex has exactly one; then U = V.
     materials : tuple of Material
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
     second_uvs : (U, 2) or None
-        A second texture coordinate for each row of ``uvs``, for textures that name this set.
+        A second texture coordinate for each row of ``uvs``, for textures that refer to this set.
+    colors : (V, 4) or None
+        Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
+    parts : tuple of P str
+        Names of the parts that can be hidden; may repeat or be empty.
+    triangle_parts : (T,) int32
+        Index into ``parts``, -1 for none.
     """
 
     positions: Floats
@@ -54,6 +64,9 @@ class Mesh:
     triangle_materials: Ints | None = None
     uv_triangles: Ints | None = None
     second_uvs: Floats | None = None
+    colors: Floats | None = None
+    parts: tuple[str, ...] = ()
+    triangle_parts: Ints | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -71,12 +84,12 @@ class Mesh:
         if self.uv_triangles is not None:
             shape = (self.n_triangles, 3)
             put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))
-        if self.triangle_materials is None:
-            put("triangle_materials", np.full(self.n_triangles, -1, dtype=np.int32))
-        put(
-            "triangle_materials",
-            frozen("triangle_materials", self.triangle_materials, (self.n_triangles,), np.int32),
-        )
+        if self.colors is not None:
+            put("colors", frozen("colors", self.colors, (self.n_vertices, 4)))
+        for name in ("triangle_materials", "triangle_parts"):
+            given = getattr(self, name)
+            values = np.full(self.n_triangles, -1, dtype=np.int32) if given is None else given
+            put(name, frozen(name, values, (self.n_triangles,), np.int32))
         self._check_indices()
 
     def _check_indices(self) -> None:
@@ -87,11 +100,14 @@ class Mesh:
             _check_range(
                 "uv_triangles", self.uv_triangles, 0 if self.uvs is None else len(self.uvs)
             )
-        if self.material_indices.min() < -1 or self.material_indices.max() >= len(self.materials):
-            raise RigError(
-                f"triangle_materials: expected -1 to {len(self.materials) - 1}, "
-                f"found {self.material_indices.min()} to {self.material_indices.max()}"
-            )
+        for name, indices, count in (
+            ("triangle_materials", self.material_indices, len(self.materials)),
+            ("triangle_parts", self.part_indices, len(self.parts)),
+        ):
+            if indices.min() < -1 or indices.max() >= count:
+                raise RigError(
+                    f"{name}: expected -1 to {count - 1}, found {indices.min()} to {indices.max()}"
+                )
 
     @property
     def n_vertices(self) -> int:
@@ -109,6 +125,12 @@ class Mesh:
         assert self.triangle_materials is not None  # set by __post_init__
         return self.triangle_materials
 
+    @property
+    def part_indices(self) -> Ints:
+        """``triangle_parts``, never None: (T,) int32."""
+        assert self.triangle_parts is not None  # set by __post_init__
+        return self.triangle_parts
+
 
 def _check_range(name: str, indices: Ints, end: int) -> None:
     """Raise RigError unless all indices are from 0 to ``end`` - 1."""
@@ -125,7 +147,7 @@ def bounding_box(points: Floats) -> Floats:
     Parameters
     ----------
     points : (N, 3)
-        Any points; an empty array gives a box of size 0 at the origin.
+        Points; an empty array gives a box of size 0 at the origin.
 
     Returns
     -------
@@ -148,7 +170,7 @@ def bounding_box(points: Floats) -> Floats:
 
 
 def box_size(box: Floats) -> float:
-    """Return the length of a box's diagonal, the "size" that tolerances refer to.
+    """Return the length of a box's diagonal, the "size" to which tolerances refer.
 
     >>> box_size(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.0]]))
     3.0
@@ -228,6 +250,34 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     return sources, uv_indices, inverse.reshape(-1, 3).astype(np.int32)
 
 
+def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
+    """Return a mesh with one texture coordinate per vertex, for formats without others.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        V vertices.
+
+    Returns
+    -------
+    mesh : Mesh
+        R vertices, split along texture seams.
+    sources : (R,) int32
+        Vertex that each of them is a copy of.
+    """
+    sources, uv_indices, triangles = split_seams(mesh)
+    second = mesh.second_uvs
+    return Mesh(
+        positions=mesh.positions[sources],
+        normals=mesh.normals[sources],
+        triangles=triangles,
+        uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
+        materials=mesh.materials,
+        triangle_materials=mesh.triangle_materials,
+        second_uvs=None if second is None else second[uv_indices],
+    ), sources
+
+
 def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     """Return unit normals averaged over each vertex's triangles, weighted by area.
 
@@ -241,7 +291,7 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     Returns
     -------
     (V, 3)
-        Unit normals; +y for a vertex without triangles or with degenerate ones only.
+        Unit normals; +y for a vertex that has no triangles or only degenerate ones.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()
@@ -258,6 +308,29 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     flat: Bools = lengths == 0.0
     normals[flat] = 0.0, 1.0, 0.0
     return normals / np.where(flat, 1.0, lengths)[:, None]
+
+
+def visible_triangles(mesh: Mesh, hidden: Collection[int]) -> Bools:
+    """Return which triangles are in no hidden part: (T,) bool.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With or without parts.
+    hidden : collection of int
+        Indices of the hidden parts; others than those of the mesh are ignored.
+    """
+    shown: Bools = ~np.isin(mesh.part_indices, list(hidden))
+    return shown
+
+
+def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
+    """Return which vertices are not those of hidden triangles only: (V,) bool."""
+    shown = visible_triangles(mesh, hidden)
+    visible = np.ones(mesh.n_vertices, dtype=np.bool_)
+    visible[mesh.triangles[~shown]] = False
+    visible[mesh.triangles[shown]] = True
+    return visible
 
 
 def _area_vectors(positions: Floats, triangles: Ints) -> Floats:

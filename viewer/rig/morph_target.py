@@ -35,7 +35,7 @@ class MorphTarget:
     positions : (N, 3)
         In the mesh's own space and unit.
     normals : (N, 3) or None
-        As stored; None keeps the normals of the mesh.
+        Normals as stored; None keeps the normals of the mesh.
     """
 
     name: str
@@ -62,9 +62,9 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     Parameters
     ----------
     figure : Figure
-        With a mesh; its own blend shapes, if any, come first and must be morphs too.
+        Figure with a mesh; its own blend shapes, if any, come first and must be morphs too.
     targets : sequence of MorphTarget
-        Any number.
+        Any number of targets.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def on_one_joint(figure: Figure) -> Figure:
     Parameters
     ----------
     figure : Figure
-        With a mesh; a skin without a skeleton is replaced.
+        Figure with a mesh; a skin without a skeleton is replaced.
     """
     mesh = figure.require_mesh()
     empty = np.zeros(0, dtype=np.int32)

@@ -17,7 +17,7 @@ class NumberKey:
     Parameters
     ----------
     *arrays : (...)
-        Of any shapes.
+        Arrays of any shapes.
 
     >>> angles = np.zeros(3)
     >>> key = NumberKey(angles)
@@ -32,7 +32,7 @@ class NumberKey:
         self._parts = tuple(map(bytearray, arrays))
 
     def updated(self, *arrays: Floats) -> NumberKey:
-        """Return the key of the arrays' present contents: this one if they are bitwise equal.
+        """Return the key of the arrays' current contents: this key if they are bitwise equal.
 
         Arrays are compared without copying, and only those that changed are copied.
         """
@@ -54,7 +54,7 @@ class NumberKey:
         return key
 
     def array(self, index: int) -> Floats:
-        """Return a copy of the contents of one of the arrays, flat: (N,)."""
+        """Return a flat copy of the contents of one of the arrays: (N,)."""
         return np.array(np.frombuffer(self._parts[index]))
 
     def __eq__(self, other: object) -> bool:

@@ -6,11 +6,11 @@ import math
 
 __all__ = ["angle_text", "number_text", "short_number"]
 
-_NOT_ZERO = set("123456789n")  # "inf" and "nan" have an n
+_NOT_ZERO = set("123456789n")  # "inf" and "nan" contain an n
 
 
 def number_text(value: float, spec: str = "g") -> str:
-    """Format a number; one that rounds to 0 has no minus sign.
+    """Format a number; if it rounds to 0, it has no minus sign.
 
     Parameters
     ----------

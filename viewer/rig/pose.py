@@ -48,7 +48,7 @@ class Pose:
     figure_translation : (3,)
         Translation of the whole skinned figure, applied after its scale.
     posed : PosedSkeleton or None
-        Cached matrices; up to date if they have the key of the present values.
+        Cached matrices; up to date if they have the key of the current values.
     """
 
     dofs: Floats
@@ -63,7 +63,7 @@ class Pose:
 
     @property
     def skinning_key(self) -> NumberKey:
-        """Key of all values but the figure's placement, the same object until one of them changes.
+        """Key of all values except the figure's placement; the same object until a value changes.
 
         Poses with equal keys have the same joints and need no second skinning.
         """
@@ -92,9 +92,9 @@ class PoseKey(NamedTuple):
     numbers : NumberKey
         The pose's ``skinning_key``.
     scale : float
-        Its ``figure_scale``.
+        The pose's ``figure_scale``.
     translation : tuple of 3 floats
-        Its ``figure_translation``.
+        The pose's ``figure_translation``.
     """
 
     numbers: NumberKey
@@ -135,12 +135,12 @@ def rest_pose(skeleton: Skeleton) -> Pose:
     Parameters
     ----------
     skeleton : Skeleton
-        Its rest transforms and DOF values.
+        Provides the rest transforms and DOF values.
 
     Returns
     -------
     Pose
-        Shares no array with the skeleton.
+        Pose that shares no array with the skeleton.
     """
     return Pose(
         dofs=clamp_dofs(skeleton, skeleton.rest_dofs),
@@ -153,13 +153,13 @@ def rest_pose(skeleton: Skeleton) -> Pose:
 def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     """Build each joint's matrix: L = T(rest + translation + DOFs) R(quaternion) R(DOFs) S(scale).
 
-    The rows of the DOF table multiply so that the first is applied first: rows x, y, z give
-    R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
+    The rotations of the DOF table are multiplied so that the first row is applied first: rows x, y,
+    z give R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
 
     Parameters
     ----------
     skeleton : Skeleton
-        Its DOF table.
+        Provides the DOF table.
     pose : Pose
         DOFs in lengths and radians.
 
@@ -185,12 +185,12 @@ def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
 
 
 def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
-    """Multiply the rotation DOFs of every joint, the k-th rows of all joints at once.
+    """Multiply the rotation DOFs of every joint, one row of all joints at a time.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Its DOF table.
+        Provides the DOF table.
     dofs : (..., D)
         Lengths and radians, of any number of poses.
 
@@ -207,7 +207,7 @@ def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
         axes = skeleton.dof_kinds[rank_rows] - _FIRST_ROTATION
         for axis in range(3):
             chosen = axes == axis
-            # From the left: a later row is applied after the earlier ones.
+            # Rows are multiplied from the left: a later row is applied after the earlier ones.
             rotation = axis_rotations(axis, dofs[..., rank_rows[chosen]])
             rotations[..., joints[chosen], :, :] = rotation @ rotations[..., joints[chosen], :, :]
     return rotations

@@ -13,12 +13,12 @@ __all__ = ["PosedSkeleton"]
 class PosedSkeleton:
     """Read-only world and skinning matrices of one pose, each computed once.
 
-    A pose caches its latest instance, see ``viewer.rig.kinematics.posed_skeleton``.
+    A pose caches its latest instance; see ``viewer.rig.kinematics.posed_skeleton``.
 
     Parameters
     ----------
     skeleton : Skeleton
-        Of the shaped figure.
+        Skeleton of the shaped figure.
     key : NumberKey
         The pose's ``skinning_key``.
     world : (J, 4, 4)
@@ -39,7 +39,7 @@ class PosedSkeleton:
         Parameters
         ----------
         skin : Skin
-            Of the shaped figure.
+            Skin of the shaped figure.
 
         Returns
         -------

@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
@@ -71,13 +71,15 @@ class Actor:
     color : (r, g, b) or None
         Linear, 0 to 1; None for the default colour.
     opacity : float
-        Below 1 it is drawn translucently, as one layer: nothing inside it shows.
+        Below 1, it is drawn translucently as one layer: nothing inside it is visible.
     points : (K, 4) or None
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
         Whether its clip covers the current time.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
+    hidden_parts : frozenset of int
+        Parts of the mesh that are not drawn, by index.
     """
 
     figure: Figure
@@ -92,22 +94,23 @@ class Actor:
     points: Floats | None = None
     is_present: bool = True
     called: str = ""
+    hidden_parts: frozenset[int] = frozenset()
 
     @property
     def title(self) -> str:
-        """Name of its recording, or else of its figure; the same for all people of a recording."""
+        """Name of the recording, or else of the figure; the same for all people of a recording."""
         return self.called or self.figure.name
 
     @property
     def name(self) -> str:
-        """Label in menus and files: the title, and which part of the recording it is."""
+        """Label in menus and files: the title, and the person or figure in the recording."""
         is_part = self.called and self.figure.points is not None
         name = f"{self.title} {self.figure.name}" if is_part else self.title
         return name if self.person is None else f"{name} {person_name(self.person)}"
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is drawn: visible, and present at the current time."""
+        """Whether it is drawn, being visible and present at the current time."""
         return self.visible and self.is_present
 
     def __post_init__(self) -> None:
@@ -120,7 +123,7 @@ class Actor:
         Raises
         ------
         RigError
-            If there is none, as its figure has no skeleton.
+            If there is no pose because the figure has no skeleton.
         """
         if self.pose is None:
             raise RigError(f"{self.name} has no pose, as it has no skeleton")
@@ -158,9 +161,9 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
 
 
 def figure_pose(figure: Figure) -> Pose:
-    """Return a new pose of a figure with a skeleton: the file's own, all shape weights 0."""
+    """Return a new pose of a figure with a skeleton: the file's own, with its shape weights."""
     pose = rest_pose(figure.require_skeleton())
-    pose.shape_weights = np.zeros(figure.n_shapes)
+    pose.shape_weights = figure.rest_shape_weights.copy()
     return pose
 
 
@@ -175,7 +178,7 @@ class Scene:
     diagnostics : tuple of Diagnostic
         Findings of the readers.
     world_up : "y", "z" or None
-        Up axis; None for that of the first figure.
+        Up axis; None for the up axis of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
     images : CameraImages or None
@@ -183,7 +186,7 @@ class Scene:
     time : float or None
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
-        All files that it was read from, images included; no output may overwrite them.
+        All files from which it was read, including images; no output may overwrite them.
     """
 
     actors: list[Actor]
@@ -213,14 +216,14 @@ class Scene:
 
 
 def scene_points(scene: Scene, show: str = "skin") -> Floats:
-    """Return the points that a camera should frame: posed meshes and skeletons of visible actors.
+    """Return the points to fit into the view: posed meshes and skeletons of visible actors.
 
     A few outliers far away are clamped to the bounding box of the other 99.9 % of the points.
 
     Parameters
     ----------
     scene : Scene
-        With any number of actors.
+        Scene with any number of actors.
     show : "skin", "skeleton", "both" or "binding"
         Parts that are drawn.
 
@@ -253,7 +256,7 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     Parameters
     ----------
     actor : Actor
-        Placed and posed.
+        A placed and posed actor.
     show : "skin", "skeleton", "both" or "binding"
         Parts that are drawn; a part that the figure lacks is replaced by one that it has.
 
@@ -271,5 +274,8 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
         parts.append(apply_transform(placement, skeleton_points(shape, actor.pose)))
     if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):
         is_bound = show == "binding"
-        parts.append(figure.mesh.positions if is_bound else deform(figure, actor.pose)[0])
+        points = figure.mesh.positions if is_bound else deform(figure, actor.pose)[0]
+        if actor.hidden_parts:
+            points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
+        parts.append(points)
     return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))

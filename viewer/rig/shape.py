@@ -1,4 +1,4 @@
-"""Changes of a figure's rest mesh, which its joints and inverse bind matrices follow."""
+"""Changes of a figure's rest mesh that its joints and inverse bind matrices follow."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = [
     "with_rest_mesh",
 ]
 
-_shaped: Memo[Figure, Figure] = Memo(kept=32)  # shapes in use at a time
+_shaped: Memo[Figure, Figure] = Memo(kept=32)  # number of shapes in use at a time
 
 
 def shaped(figure: Figure, weights: Floats) -> Figure:
@@ -37,7 +37,7 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
     Parameters
     ----------
     figure : Figure
-        With or without blend shapes.
+        Figure with or without blend shapes.
     weights : (N,)
         N <= S; the others count as 0.
 
@@ -68,12 +68,12 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
 def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = None) -> Figure:
     """Return the figure with a new rest mesh and the joints regressed from it.
 
-    Without a joint regressor the joints keep their positions. Rest rotations never change.
+    Without a joint regressor, the joints keep their positions. Rest rotations never change.
 
     Parameters
     ----------
     figure : Figure
-        With a mesh.
+        Figure with a mesh.
     positions : (V, 3)
         New rest vertices, figure units.
     normals : (V, 3), optional
@@ -108,14 +108,14 @@ def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        Its rest rotations and scales.
+        Provides the rest rotations and scales.
     joints : (..., J, 3)
         New rest positions, figure units.
 
     Returns
     -------
     (..., J, 3)
-        Relative to the parent joint.
+        Translations relative to the parent joint.
     """
     linear = world_matrices(skeleton, _zero_pose(skeleton))[:, :3, :3]
     parents = skeleton.parents
@@ -154,7 +154,7 @@ def joint_directions(figure: Figure) -> Floats:
     Parameters
     ----------
     figure : Figure
-        With or without blend shapes and joint regressor.
+        Figure with or without blend shapes and joint regressor.
 
     Returns
     -------
@@ -183,9 +183,9 @@ def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True)
     Parameters
     ----------
     figure : Figure
-        Already shaped.
+        Figure with its shape applied.
     mesh : Mesh
-        Its mesh.
+        The rest mesh.
     pose : Pose
         DOFs in lengths and radians.
     correct : bool

@@ -35,7 +35,7 @@ class Skeleton:
     Attributes
     ----------
     names : tuple of J str
-        May repeat or be empty: joints are identified by index.
+        Names, which may repeat or be empty: joints are identified by index.
     parents : (J,) int32
         Index of the parent, smaller than the joint's own; -1 for a root.
     rest_translations, rest_rotations, rest_scales : (J, 3), (J, 4), (J, 3)
@@ -46,9 +46,12 @@ class Skeleton:
     rest_dofs : (D,)
         Values of the file's own pose: lengths or radians, within the limits.
     dof_limits : (D, 2)
-        Smallest and largest value; -inf and inf without a limit.
+        Smallest and largest value; -inf and inf if unlimited.
     boxes : (J, 2, 3) or None
         Lowest and highest corner of the box drawn for each joint, in joint space.
+    auxiliary : (J,) bool or None
+        Joints that the file does not have: a reader added them to express a transform or a second
+        binding exactly. They have no DOFs, and are not shown as joints. None if there are none.
     """
 
     names: tuple[str, ...]
@@ -61,6 +64,7 @@ class Skeleton:
     rest_dofs: Floats
     dof_limits: Floats
     boxes: Floats | None = None
+    auxiliary: Bools | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -76,6 +80,8 @@ class Skeleton:
         put("rest_dofs", (self.n_dofs,))
         if self.boxes is not None:
             put("boxes", (joints, 2, 3))
+        if self.auxiliary is not None:
+            put("auxiliary", (joints,), np.bool_)
         limits = np.array(self.dof_limits, dtype=np.float64)
         if limits.shape != (self.n_dofs, 2) or np.isnan(limits).any():
             raise RigError(f"dof_limits: expected shape {self.n_dofs} x 2 without NaN")
@@ -134,7 +140,7 @@ class Skeleton:
 
 
 def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skeleton:
-    """Return a skeleton of ball joints without limits, at rest without rotation.
+    """Return a skeleton of unlimited ball joints without rest rotations.
 
     Parameters
     ----------
@@ -148,7 +154,7 @@ def ball_skeleton(names: tuple[str, ...], parents: Ints, joints: Floats) -> Skel
     Returns
     -------
     Skeleton
-        With three rotation DOFs, about x, y and z, for every joint.
+        Skeleton with three rotation DOFs for every joint, about x, y and z.
     """
     count = len(parents)
     above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
@@ -171,7 +177,7 @@ def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        Its limits.
+        Provides the limits.
     dofs : (..., D)
         Lengths or radians.
 
@@ -189,12 +195,12 @@ def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
     Parameters
     ----------
     skeleton : Skeleton
-        Its joint names.
+        Provides the joint names.
 
     Returns
     -------
     tuple of J str
-        ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` without a name.
+        ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` if unnamed.
     """
     counts = Counter(skeleton.names)
     return tuple(
@@ -217,7 +223,7 @@ def dof_label(skeleton: Skeleton, dof: int) -> str:
     Parameters
     ----------
     skeleton : Skeleton
-        Its DOF table.
+        Provides the DOF table.
     dof : int
         Row of the DOF.
 
@@ -230,7 +236,7 @@ def dof_label(skeleton: Skeleton, dof: int) -> str:
 
 
 def dof_labels(skeleton: Skeleton) -> list[str]:
-    """Return the labels of all DOFs, as ``dof_label``, in linear time."""
+    """Return the labels of all DOFs, as from ``dof_label``, in linear time."""
     joints = joint_labels(skeleton)
     owners, kinds = skeleton.dof_joints.tolist(), skeleton.dof_kinds.tolist()
     return [f"{joints[joint]}.{DOF_KINDS[kind]}" for joint, kind in zip(owners, kinds, strict=True)]
@@ -242,14 +248,14 @@ def find_dof(skeleton: Skeleton, label: str) -> int:
     Parameters
     ----------
     skeleton : Skeleton
-        Its DOF table.
+        Provides the DOF table.
     label : str
         ``"NAME.KIND"``, or ``"#INDEX.KIND"`` with a joint's index; case-insensitive.
 
     Raises
     ------
     RigError
-        If there is none, or if several joints have that name.
+        If there is no such DOF, or several joints have that name.
     """
     joint_text, dot, kind = label.rpartition(".")
     if not dot or kind.lower() not in DOF_KINDS:
@@ -270,14 +276,14 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
     Parameters
     ----------
     skeleton : Skeleton
-        Its joint names.
+        Provides the joint names.
     text : str
         A joint's name, ``"NAME#INDEX"`` or ``"#INDEX"``; case-insensitive.
 
     Raises
     ------
     RigError
-        If there is none, or if several joints have that name.
+        If there is no such DOF, or several joints have that name.
     """
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:
@@ -290,5 +296,5 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
         return found[0]
     if found:
         labels = ", ".join(joint_label(skeleton, joint) for joint in found[:4])
-        raise RigError(f'"{text}" names {len(found)} joints: use one of {labels}')
+        raise RigError(f'"{text}" is the name of {len(found)} joints: use one of {labels}')
     raise RigError(f'no joint is called "{text}"; {name_hint(text, joint_labels(skeleton))}')

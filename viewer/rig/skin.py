@@ -35,16 +35,17 @@ class Skin:
     """The influences of all vertices in one flat list, as stored in the file.
 
     A padded (V, K) table would need V times the largest K: one vertex with a thousand
-    influences would multiply the memory of all others. A flat list holds any count exactly.
+    influences would multiply the memory of all others. A flat list represents any number of
+    influences exactly.
 
     Attributes
     ----------
     starts : (V + 1,) int32
         Vertex v has the influences from ``starts[v]`` up to, not including, ``starts[v + 1]``.
     joints : (N,) int32
-        Joint of each influence; if a vertex lists a joint twice, the weights add up.
+        Joint of each influence; if a vertex lists a joint twice, the weights are summed.
     weights : (N,)
-        As stored: not sorted, not normalised, may be 0.
+        Weights as stored: not sorted, not normalised, possibly 0.
     inverse_bind : (J, 4, 4)
         Bind-space-to-joint matrices.
     """
@@ -96,14 +97,14 @@ def skin_from_lists(
     Parameters
     ----------
     influences : V lists of pairs
-        In vertex order.
+        Pairs in vertex order.
     inverse_bind : (J, 4, 4)
         Bind-space-to-joint matrices.
 
     Returns
     -------
     Skin
-        With the same pairs in the same order.
+        Skin with the same pairs in the same order.
 
     >>> skin_from_lists([[(0, 1.0)], []], np.eye(4)[None]).starts.tolist()
     [0, 1, 1]
@@ -119,8 +120,10 @@ def skin_from_lists(
 
 
 def bind_positions(skin: Skin) -> Floats:
-    """Return the bind positions of the joints: (J, 3), bind pose."""
-    positions: Floats = np.linalg.inv(skin.inverse_bind)[:, :3, 3].astype(np.float64, copy=False)
+    """Return the positions of the joints in the bind pose: (J, 3); the origin if there is none."""
+    singular = np.linalg.det(skin.inverse_bind) == 0.0
+    matrices = np.where(singular[:, None, None], np.eye(4), skin.inverse_bind)
+    positions: Floats = np.linalg.inv(matrices)[:, :3, 3].astype(np.float64, copy=False)
     return positions
 
 
@@ -166,7 +169,7 @@ def skin_from_entries(
     Returns
     -------
     Skin
-        With the same entries, vertex by vertex.
+        Skin with the same entries, vertex by vertex.
     """
     order = np.argsort(vertices, kind="stable")
     counts = np.bincount(vertices, minlength=n_vertices)
@@ -189,7 +192,7 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
 def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
     """Return each vertex's sum over joints of |weight|, after adding up entries of the same joint.
 
-    For the entries of one skin and the negated entries of another this is the L1 distance of their
+    For the entries of one skin and the negated entries of another, this is the L1 distance of their
     rows, regardless of the order of influences and of duplicate joints.
 
     Parameters
@@ -199,7 +202,7 @@ def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) ->
     vertices, joints : (N,)
         Row and column of each entry.
     weights : (N,)
-        Signed.
+        Signed weights.
 
     Returns
     -------
@@ -214,13 +217,13 @@ def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) ->
 
 
 def strongest_first(skin: Skin) -> Skin:
-    """Return the skin with each vertex's influences by decreasing weight; ties keep their order."""
+    """Return the skin with each vertex's influences stably sorted by decreasing weight."""
     order = np.lexsort((-skin.weights, owners(skin)))
     return replace(skin, joints=skin.joints[order], weights=skin.weights[order])
 
 
 def limit_influences(skin: Skin, count: int) -> Skin:
-    """Prune the influences of each vertex, as an engine with a limit of ``count`` does.
+    """Prune the influences of each vertex, as an engine limited to ``count`` influences does.
 
     Parameters
     ----------

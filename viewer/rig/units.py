@@ -1,10 +1,10 @@
-"""Units of length of figures and files: factors, names, and guesses from sizes."""
+"""Units of length of figures and files: factors, names, and estimates from sizes."""
 
 from __future__ import annotations
 
 __all__ = ["METRES", "SIZES", "UNIT_NAMES", "is_metres", "unit_of_scaled"]
 
-_ALIKE = 2.5  # largest plausible ratio of the sizes of two similar figures: a giant and a child
+_ALIKE = 2.5  # largest plausible ratio of the sizes of similar figures, as of adult and child
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres per unit, for every known ``Figure.unit``.
@@ -46,7 +46,7 @@ def unit_of_scaled(unit: str, scale: float) -> str:
     Returns
     -------
     str
-        Empty if the other's unit is unknown, or no unit makes the two about equally large.
+        Unit; empty if the other unit is unknown, or no unit gives similar sizes.
 
     >>> unit_of_scaled("m", 1.04), unit_of_scaled("m", 950.0), unit_of_scaled("m", 7.0)
     ('m', 'mm', '')

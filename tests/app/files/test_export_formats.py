@@ -9,8 +9,9 @@ from viewer.app.files.state import Files
 def test_chosen_format_changes_the_suffix_of_the_name(hand, monkeypatch):
     hand.menu("menu File", "Export…")
     dialog = hand.state.of(Files).dialog
-    dialog.name = "my.figure.obj"
-    hand.step(2)
+    hand.key("a", "ctrl")
+    hand.type("my.figure.obj")
+    hand.click("Folder")
     offered = {}
 
     def choose(state, label, value, texts):

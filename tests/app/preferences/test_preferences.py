@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 import pytest
 from imgui_bundle import imgui
 
+from viewer.app.core.key_names import key_name
 from viewer.app.features import KEYS
 from viewer.app.preferences.key_map import chord_name, conflicts, parse_chord
 from viewer.app.preferences.state import Appearance, Preferences
@@ -117,10 +118,18 @@ def test_key_is_chosen_by_pressing_it(shown):
     assert not shown.state.options.wireframe
     shown.key("p", "shift")
     assert shown.state.options.wireframe
-    assert shown.state.key_labels["W"] == "Shift+P"
+    assert key_name(shown.state, "W") == "Shift+P"
     shown.click(f"Reset###reset key {WIREFRAME}")
     shown.key("w")
     assert not shown.state.options.wireframe
+
+
+def test_buttons_name_the_key_that_was_chosen(shown):
+    reset = next(key.name for key in KEYS if key.label == "R")
+    shown.state.put(Preferences(keys={reset: "Ctrl+R"}))
+    shown.step(2)
+    assert "Reset (Ctrl+R)" in shown.state.item_rects
+    assert "Reset (R)" not in shown.state.item_rects
 
 
 def test_key_that_is_taken_is_reported_and_does_not_act_while_it_is_chosen(shown):

@@ -258,7 +258,7 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand.step()
     hand.click("Save###Save")
     hand.finish_job()
-    assert hand.state.error.startswith('a rigged mesh cannot be written as ".glb"; there are: ')
+    assert hand.state.error.startswith('a rigged mesh cannot be written as ".glb"; supported: ')
 
 
 def test_report_is_copied(rigging, texts):

@@ -147,7 +147,7 @@ def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
     with pytest.raises(RigError) as caught:
         run(sparse.csr_array(dense), areas, weights, unknown)
     assert str(caught.value) == (
-        "the weights of unmatched vertices could not be solved for: mesh too irregular"
+        "the weights of unmatched vertices could not be computed: the mesh is too irregular"
     )
 
 

@@ -234,10 +234,12 @@ def test_contact_sheet_of_few_frames_has_no_more(draw, walk, tmp_path):
     said = draw(walk, "sheet.png", "--contact-sheet", "9", "--frames", "0:3", size="240x180")
     assert ": 3 frames of " in said.out
     assert said.err == (
-        "warning: --contact-sheet: there are 3 frames, not 9; none is shown twice\n"
+        "warning: --contact-sheet: there are 3 frames, not 9; no frame is shown twice\n"
     )
     said = draw(walk, "one.png", "--contact-sheet", "2", "--frames", "0:1", size="240x180")
-    assert said.err == ("warning: --contact-sheet: there is 1 frame, not 2; none is shown twice\n")
+    assert said.err == (
+        "warning: --contact-sheet: there is 1 frame, not 2; no frame is shown twice\n"
+    )
 
 
 def test_contact_sheet_of_a_turntable(draw, tmp_path):

@@ -33,7 +33,7 @@ def build(ctx, name: str):
         if name.startswith("point"):
             return programs.drawing("point", "phong", "mesh")
         if name.startswith("pick"):
-            return programs.drawing("instance", fragment="pick", skin="dqs")
+            return programs.drawing("instance", fragment="pick", skin="dqs", materials=True)
         if name.startswith("motion_path"):
             return programs.drawing("motion_path")
         if name.startswith(("skin", "include")):

@@ -254,7 +254,7 @@ def test_text_mentions_special_cases():
     pose = bent(both, np.deg2rad(170), np.deg2rad(170))
     mixed = explanation_text(explain(both, pose, Skinning("mix", 0.25), 0))
     assert any(
-        line == "q2: normalised weight 0.5000, negated to the hemisphere of q1" for line in mixed
+        line == "q2: normalised weight 0.5000, negated into the hemisphere of q1" for line in mixed
     )
     assert any(line.startswith("0.2500 of the way   (") for line in mixed)
 

@@ -227,7 +227,7 @@ def test_joint_is_found_by_name_or_index(text, joint):
             'no joint is called "tail"; there are 6: a, b, c, d, e, f',
         ),
         (("a", "b"), "#2", 'no joint is called "#2"; there are 2: a, b'),
-        (("a", "a"), "a", '"a" names 2 joints: use one of a#0, a#1'),
+        (("a", "a"), "a", '"a" is the name of 2 joints: use one of a#0, a#1'),
     ],
 )  # fmt: skip
 def test_unknown_joint_is_refused_with_names_that_are_close(names, text, message):
@@ -246,7 +246,7 @@ def test_joints_without_a_skeleton_have_indices():
     assert quantity_title("weight:1", figure, Skinning()) == "Weight of #1"
     with pytest.raises(RigError) as caught:
         joint_of(figure, "knee")
-    assert str(caught.value) == 'no joint "knee"; without a skeleton there are #0 to #1'
+    assert str(caught.value) == 'no joint "knee"; without a skeleton, joints are #0 to #1'
 
 
 def test_missing_data_for_the_joint_weight_view():

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
-from viewer.app.core.fields import begin_field
+from viewer.app.core.fields import begin_field, drag_float, in_row
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -25,6 +24,7 @@ from viewer.rig.scene import Actor
 __all__ = ["draw"]
 
 _PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without their own colour
+_LONGEST_WINDOW = 1e4  # seconds
 _LOOK = (
     imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.float
 )
@@ -70,7 +70,7 @@ def _draw_actor(state: AppState, index: int, actor: Actor) -> None:
     elif changed:
         actor.color = (color[0], color[1], color[2])
     if imgui.is_item_hovered(imgui.HoveredFlags_.delay_normal):
-        imgui.set_tooltip("colour; right-click restores the default")
+        imgui.set_tooltip("colour; right-click to restore the default")
     imgui.same_line()
     absent = "" if actor.is_present else "  (absent)"
     text = f"{printable(actor.name, 60)}{absent}"
@@ -83,24 +83,23 @@ def _draw_place(state: AppState, actor: Actor) -> None:
     """Draw the start time and position of the chosen actor."""
     if actor.clip is not None:
         shown = plain_zero(actor.offset, "%.3f s")
-        changed, value = imgui.drag_float(
-            begin_field("Start time"), shown, 0.01, 0.0, 0.0, "%.3f s"
-        )
+        changed, value = drag_float(state, begin_field("Start time"), shown, 0.01, "%.3f s")
         note_item(state, "Start time")
         if changed and abs(value) < 1e6:
             actor.offset = value
         explain("time of the scene at which the actor's motion starts, seconds")
     size = box_size(state.box) or 1.0
-    place = [plain_zero(part, "%.3f") for part in actor.placement[:3, 3].tolist()]
-    changed, moved = imgui.drag_float3(
-        begin_field("Position"), place, 0.002 * size, 0.0, 0.0, "%.3f"
-    )
+
+    def draw_axis(hidden: str, axis: int) -> None:
+        shown = plain_zero(float(actor.placement[axis, 3]), "%.3f")
+        changed, moved = drag_float(state, hidden, shown, 0.002 * size, "%.3f")
+        if changed and abs(moved) < 1e6 * size:
+            placement = actor.placement.copy()
+            placement[axis, 3] = moved
+            actor.placement = placement
+
+    in_row(begin_field("Position"), range(3), draw_axis)
     note_item(state, "Position")
-    if changed and all(abs(value) < 1e6 * size for value in moved):
-        placement = actor.placement.copy()
-        kept = np.array(place, dtype=np.float32) == np.array(moved, dtype=np.float32)
-        placement[:3, 3] = np.where(kept, placement[:3, 3], moved)
-        actor.placement = placement
 
 
 def _draw_following(state: AppState) -> None:
@@ -134,13 +133,13 @@ def _draw_motion_paths(state: AppState, actor: Actor) -> None:
     if options.path_joints:
         if button(state, "Clear motion paths"):
             options.path_joints = ()
-        changed, value = imgui.drag_float(
-            begin_field("Time window"), options.path_seconds, 0.02, 0.0, 1e4, "%.2f s"
+        changed, value = drag_float(
+            state, begin_field("Time window"), options.path_seconds, 0.02, "%.2f s", low=0.0
         )
         note_item(state, "Time window")
-        explain("seconds of the path before and after the current time; 0 shows all of the motion")
+        explain("seconds of the path before and after the current time; 0 shows the whole motion")
         if changed:
-            options.path_seconds = max(value, 0.0)
+            options.path_seconds = min(value, _LONGEST_WINDOW)
 
 
 def _draw_fit(state: AppState, actor: Actor) -> None:

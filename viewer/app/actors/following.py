@@ -34,7 +34,7 @@ class Following:
 def follow_actor(state: AppState) -> None:
     """Keep the camera's target on the followed actor or joint at the same distance.
 
-    Only the clock moves the camera: it stands still while a pose is edited by hand.
+    The camera moves only with the clock: it stays still while a pose is edited by hand.
     """
     following, n_posed = state.of(Following), state.clock.n_posed
     if following.target is None or following.n_posed == n_posed:
@@ -51,7 +51,7 @@ def follow_actor(state: AppState) -> None:
 
 
 def start_following(state: AppState, actor: int, joint: int) -> None:
-    """Let the camera follow an actor's joint, or its centre (-1), from its current position."""
+    """Let the camera follow an actor's joint, or its centre (-1), from the current viewpoint."""
     following = state.of(Following)
     state.framing.is_fitting = False
     following.target = actor, joint

@@ -35,7 +35,7 @@ class PosedFor(NamedTuple):
     interpolate_gaps : bool
         Whether captures are interpolated in their gaps.
     clips : tuple
-        Clip and offset of each actor; clips are replaced, never changed.
+        Clip and offset of each actor; clips are replaced, never modified.
     """
 
     time: float
@@ -45,7 +45,7 @@ class PosedFor(NamedTuple):
 
 @dataclass(slots=True)
 class Clock:
-    """Advances the time of a scene, ``Scene.time``, and poses the actors for it.
+    """Clock that advances the time of a scene, ``Scene.time``, and poses the actors for it.
 
     Playback follows the wall clock: a slow machine drops frames but stays in sync.
 
@@ -114,7 +114,7 @@ class Clock:
         self.scene.time = time
 
     def show(self, scene: Scene) -> None:
-        """Attach a scene: use the range of its clips, and go to its time, or else to the start."""
+        """Attach a scene: use the range of its clips, and go to its time, or to the start."""
         self.scene, self.posed_for = scene, None
         self.playing, self.mode, self.speed = False, "loop", 1.0
         self.keyed_rate, self.has_frames = DEFAULT_RATE, False
@@ -146,7 +146,7 @@ class Clock:
             self.set_range(self.start, self.end)
 
     def _count(self, actor: Actor | None) -> None:
-        """Use the frames of an actor's capture; for None, frames at the rate of keyed clips."""
+        """Count the frames of an actor's capture; for None, frames at the rate of keyed clips."""
         clip = None if actor is None else actor.clip
         old_rate, old_origin, old_grid = self.frame_rate, self.origin, self._grid
         if actor is None or clip is None or isinstance(clip, Clip):
@@ -184,7 +184,7 @@ class Clock:
 
     @property
     def frame(self) -> int:
-        """Index of the shown frame, 0 at the origin."""
+        """Index of the current frame, 0 at the origin."""
         return math.floor((self.time - self.origin) * self.frame_rate + 1e-6)
 
     def frame_time(self, frame: int) -> float:
@@ -254,7 +254,7 @@ class Clock:
             self._run(step)
 
     def _run(self, step: float) -> None:
-        """Move within the range; at its end wrap around or stop."""
+        """Move within the range; at its end, wrap around or stop."""
         # The last frame is shown for as long as every other frame.
         hold = 1.0 / self.frame_rate if self.has_frames and self.end > self.start else 0.0
         period = self.end - self.start + hold
@@ -283,14 +283,14 @@ class Clock:
         self.time = self.start + (2.0 * length - place if self._is_returning else place)
 
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
-        """Pose all actors for the time shown if it or their clips changed; return whether they did.
+        """Pose all actors for the current time if it or a clip has changed; return whether it has.
 
         Parameters
         ----------
         chosen : Actor, optional
             As for ``follow``, which runs first if clips changed.
         again : bool
-            Pose them even if nothing changed.
+            Pose the actors even if nothing has changed.
         """
         actors, before = self.scene.actors, self.posed_for
         clips = tuple((actor.clip, actor.offset) for actor in actors)
@@ -305,7 +305,7 @@ class Clock:
         return True
 
     def go_back(self, time: float, chosen: Actor | None = None) -> None:
-        """Go to a time with restored actors and clips, and pose them for it.
+        """Go to a time with restored actors and clips, and pose the actors for it.
 
         Parameters
         ----------

@@ -7,16 +7,34 @@ number.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from imgui_bundle import imgui
 
-__all__ = ["begin_field", "field_width", "slider_float", "slider_int"]
+from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import is_typed_in_place, number_field
+from viewer.app.core.typed_numbers import unit_of
+from viewer.rig.number_text import number_text
+
+__all__ = [
+    "begin_field",
+    "drag_float",
+    "drag_int",
+    "field_width",
+    "in_row",
+    "slider_float",
+    "slider_int",
+]
+
+Number = TypeVar("Number", int, float)
 
 _COLUMN, _WIDEST = 0.4, 8.5
 """Width of the labels: fraction of the panel's width, and maximum in font sizes."""
 _TRACK, _KNOB = 0.14, (0.4, 0.3)
 """Height of the track, width and height of the knob, in font sizes."""
 _CLEAR = (0.0, 0.0, 0.0, 0.0)
+_CLAMP = imgui.SliderFlags_.always_clamp
 
 
 def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: float = 0.0) -> str:
@@ -25,12 +43,12 @@ def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: floa
     Parameters
     ----------
     label : str
-        Text, and an ID after ``##`` or ``###`` to distinguish equal labels, as in ImGui.
+        Text, and optionally an ID after ``##`` or ``###`` to distinguish equal labels, as in ImGui.
     width : float
-        Width of the widget in font sizes; it then follows its label directly. 0 aligns it with
-        the widgets above and below and lets it fill the line.
+        Width of the widget in font sizes; the widget then directly follows its label. 0 aligns it
+        with the widgets above and below and lets it fill the line.
     column : float
-        Width for the label in window coordinates, for rows of one line. By default it depends on
+        Width of the label in window coordinates, for rows of one line. By default, it depends on
         the panel's width, and a longer label is placed above its widget.
     needs : float
         Minimum width of the widget in window coordinates; the label shrinks to allow for it.
@@ -61,28 +79,38 @@ def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: floa
 
 
 def field_width(label: str, width: float) -> float:
-    """Return the width of a label with a widget of some font sizes, in window coordinates."""
+    """Return the width of a label and its widget, given in font sizes, in window coordinates."""
     text = label.partition("##")[0]
     gap = imgui.get_style().item_inner_spacing.x
     return imgui.calc_text_size(text).x + gap + width * imgui.get_font_size()
 
 
 def slider_float(
-    label: str, value: float, low: float, high: float, text: str = "%.2f", flags: int = 0
+    state: AppState,
+    label: str,
+    value: float,
+    low: float,
+    high: float,
+    text: str = "%.2f",
+    flags: int = 0,
 ) -> tuple[bool, float]:
     """Draw a slider without a visible label; return whether it was moved, and its value.
 
     Parameters
     ----------
+    state : AppState
+        Receives messages about typed numbers.
     label : str
         Hidden label, as from ``begin_field``.
     value, low, high : float
-        Number shown, and the ends of the track.
+        Value, and the ends of the track.
     text : str
         Format of the number.
     flags : int
         ImGui's ``SliderFlags_``.
     """
+    if is_typed_in_place(label):
+        return _typed(state, label, value, (low, high), text, flags)
     with _Track(bool(flags & imgui.SliderFlags_.logarithmic)) as track:
         changed, moved = imgui.slider_float(label, value, low, high, text, flags)
         track.draw(moved, low, high)
@@ -90,13 +118,99 @@ def slider_float(
 
 
 def slider_int(
-    label: str, value: int, low: int, high: int, text: str = "%d", flags: int = 0
+    state: AppState, label: str, value: int, low: int, high: int, text: str = "%d", flags: int = 0
 ) -> tuple[bool, int]:
     """Draw a slider of whole numbers; as ``slider_float``."""
+    if is_typed_in_place(label):
+        changed, typed = _typed(state, label, value, (low, high), text, flags, is_whole=True)
+        return changed, round(typed)
     with _Track(False) as track:
         changed, moved = imgui.slider_int(label, value, low, high, text, flags)
         track.draw(moved, low, high)
     return changed, moved
+
+
+def drag_float(
+    state: AppState, label: str, value: float, speed: float, text: str, low: float = -math.inf
+) -> tuple[bool, float]:
+    """Draw a number that is changed by dragging it, or typed after a click; as ``slider_float``.
+
+    Parameters
+    ----------
+    state, label, value, text
+        As for ``slider_float``.
+    speed : float
+        Change per pixel.
+    low : float
+        Smallest value.
+    """
+    if is_typed_in_place(label):
+        return _typed(state, label, value, (low, math.inf), text, _CLAMP)
+    changed, moved = imgui.drag_float(label, value, speed, 0.0, 0.0, text)
+    _show_that_it_drags()
+    return changed, max(moved, low)
+
+
+def drag_int(
+    state: AppState, label: str, value: int, limits: tuple[int, int], speed: float = 0.3
+) -> tuple[bool, int]:
+    """Draw a whole number that is changed by dragging it; as ``drag_float``."""
+    if is_typed_in_place(label):
+        changed, typed = _typed(state, label, value, limits, "%d", _CLAMP, is_whole=True)
+        return changed, round(typed)
+    changed, moved = imgui.drag_int(label, value, speed, *limits, "%d", _CLAMP)
+    _show_that_it_drags()
+    return changed, moved
+
+
+def in_row(hidden: str, values: Sequence[Number], draw: Callable[[str, Number], None]) -> None:
+    """Draw several fields of equal widths in the room of one; they count as one item.
+
+    Parameters
+    ----------
+    hidden : str
+        Hidden label, as from ``begin_field``.
+    values : sequence
+        Values of the fields.
+    draw : callable
+        Draws a field, given its own hidden label and its value.
+    """
+    gap = imgui.get_style().item_inner_spacing.x
+    room = imgui.calc_item_width() - (len(values) - 1) * gap
+    imgui.begin_group()
+    for number, value in enumerate(values):
+        if number:
+            imgui.same_line(0.0, gap)
+        imgui.set_next_item_width(room / len(values))
+        draw(f"{hidden} {number}", value)
+    imgui.end_group()
+
+
+def _typed(
+    state: AppState,
+    label: str,
+    value: float,
+    limits: tuple[float, float],
+    text: str,
+    flags: int,
+    is_whole: bool = False,
+) -> tuple[bool, float]:
+    """Draw the number of a slider as a text field; return whether another was entered, and it."""
+    number = number_field(state, label, value, text, is_whole)
+    if number is None:
+        return False, value
+    low, high = limits
+    if not flags & _CLAMP or low <= number <= high:
+        return True, number
+    limit = min(max(number, low), high)
+    state.say_status(f"limited to {number_text(limit)}{unit_of(text)}")
+    return True, limit
+
+
+def _show_that_it_drags() -> None:
+    """Show the cursor for dragging sideways over the item drawn last."""
+    if imgui.is_item_hovered() or imgui.is_item_active():
+        imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
 
 
 class _Track:
@@ -118,7 +232,7 @@ class _Track:
         imgui.pop_style_color(2)
 
     def draw(self, value: float, low: float, high: float) -> None:
-        """Draw the track of the slider drawn last: filled from 0, or else from its left end."""
+        """Draw the track of the last slider, filled from 0 if possible, or else from the left."""
         if imgui.internal.temp_input_is_active(imgui.get_item_id()) or low == high:
             return
         start, end = imgui.get_item_rect_min(), imgui.get_item_rect_max()

@@ -1,4 +1,4 @@
-"""Camera fitting state: the points it is fitted to, and whether it is still fitted."""
+"""Camera fitting state: the points to which the camera is fitted, and whether it still is."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Framing:
     extent : MotionExtent
         Extent of the scene over its motion.
     points : (N, 3) or None
-        Points that the camera is fitted to; None for those of the extent.
+        Points to which the camera is fitted; None for those of the extent.
     """
 
     is_fitting: bool = False
@@ -44,7 +44,7 @@ class Framing:
         Parameters
         ----------
         fits : bool
-            False leaves the camera where it is.
+            Whether to fit the camera; False leaves it unchanged.
         """
         self.extent.restart()
         self.is_fitting, self.points = fits, None
@@ -65,11 +65,11 @@ class Framing:
         self._placed = _place(camera)
 
     def has_placed(self, camera: Camera) -> bool:
-        """Return whether a fitted camera stands where it was placed last."""
+        """Return whether a fitted camera is still where it was last placed."""
         return self.is_fitting and self._placed == _place(camera)
 
     def is_due(self, view: tuple[object, ...]) -> bool:
-        """Return whether the camera must be fitted to a view now, and mark that as done."""
+        """Return whether the camera must be fitted to a view now, and record that it was."""
         is_due = self._fitted != view or (self._is_stale and self.points is None)
         if is_due:
             self._fitted, self._is_stale = view, False
@@ -77,7 +77,7 @@ class Framing:
 
     @property
     def fitted_points(self) -> Floats:
-        """Points that the camera is fitted to: (N, 3), scene space."""
+        """Points to which the camera is fitted: (N, 3), scene space."""
         return self.extent.points if self.points is None else self.points
 
 

@@ -1,4 +1,4 @@
-"""Colours of text and lines on panels, legible on dark and on light ones."""
+"""Colours of text and lines on panels, legible on dark and light panels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Color = tuple[float, float, float, float]
 
 WARNING: Color = (1.0, 0.77, 0.30, 1.0)
 ERROR: Color = (1.0, 0.50, 0.42, 1.0)
-_DARKER = 0.58  # factor on the channels: contrast of 4 or more on a light panel
+_DARKER = 0.58  # factor on the channels: gives a contrast of 4 or more on a light panel
 
 
 def ink(color: Color) -> Color:

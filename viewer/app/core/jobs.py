@@ -11,7 +11,7 @@ from viewer.errors import ViewerError
 __all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
 
 Report = Callable[[int, int, str], None]
-"""Called with the steps done, the number of steps and the next step's name; raises to cancel."""
+"""Called with the completed steps, their total and the next step's name; raises to cancel."""
 
 
 class Job(Protocol):
@@ -22,9 +22,9 @@ class Job(Protocol):
     title : str
         Description of the job.
     error : str
-        Why the job failed; empty if it did not.
+        Reason why the job failed; empty if it did not.
     lines : list of str
-        Messages at the end.
+        Messages when the job ends.
     can_cancel : bool
         Whether it can be cancelled.
     """
@@ -40,24 +40,24 @@ class Job(Protocol):
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Steps done and number of steps; (0, 0) if unknown."""
+        """Completed steps and number of steps; (0, 0) if unknown."""
 
     def step(self) -> None:
-        """Do the next step if the job runs between frames."""
+        """Perform the next step if the job runs between frames."""
 
     def cancel(self) -> None:
         """Cancel the job; no partial file remains."""
 
 
 class ThreadJob:
-    """Job without OpenGL in its own thread.
+    """Job in its own thread that does not use OpenGL.
 
     Parameters
     ----------
     title : str
         Description of the job.
     act : callable
-        Returns messages about the result; raises ViewerError.
+        Returns messages about the result; may raise ViewerError.
     wake : callable
         Called from the thread when it ends.
     """
@@ -87,7 +87,7 @@ class ThreadJob:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Unknown: (0, 0)."""
+        """Always unknown: (0, 0)."""
         return 0, 0
 
     def step(self) -> None:
@@ -113,7 +113,7 @@ class CountedJob:
     title : str
         Description of the job until it reports its first step.
     act : callable
-        Gets a ``Report``; returns messages about the result; raises ViewerError.
+        Gets a ``Report`` and returns messages about the result; may raise ViewerError.
     """
 
     def __init__(self, title: str, act: Callable[[Report], list[str]]) -> None:
@@ -147,7 +147,7 @@ class CountedJob:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Steps done and number of steps; (0, 0) before the first."""
+        """Completed steps and number of steps; (0, 0) before the first."""
         return self._progress
 
     def step(self) -> None:
@@ -187,11 +187,11 @@ class FrameJob:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Steps done and number of steps."""
+        """Completed steps and number of steps."""
         return self._progress
 
     def step(self) -> None:
-        """Do the next step."""
+        """Perform the next step."""
         if self._is_done:
             return
         try:

@@ -1,4 +1,4 @@
-"""Messages of the window: those shown over the view, and the log of all."""
+"""Messages of the window: those shown over the view, and the log of all messages."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class MessageLog:
     _messages: dict[tuple[str, str], Message] = field(default_factory=dict)
 
     def add(self, text: str, kind: str = "note") -> None:
-        """Add a message; a repeated one is counted and moves to the end.
+        """Add a message; a repeated message is counted and moves to the end.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class Note:
 
 @dataclass(slots=True)
 class Messages:
-    """All messages, and those shown now.
+    """All messages, and those that are currently shown.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Messages:
     is_open : bool
         Whether the window "Messages" is open.
     lists_status : bool
-        Whether it lists messages of kind ``status`` too.
+        Whether it also lists messages of kind ``status``.
     """
 
     notes: list[Note] = field(default_factory=list)
@@ -119,7 +119,7 @@ class Messages:
         self.log.add(text, "status" if is_status else "note")
 
     def log_error(self, error: str) -> None:
-        """Log the error that is shown, once while it is shown; empty if there is none."""
+        """Log the displayed error once; empty if there is none."""
         if error and error != self._logged_error:
             self.log.add(error, "error")
         self._logged_error = error

@@ -32,7 +32,7 @@ class MotionExtent:
     """Outermost points of a scene in sampled frames of its motion, or in its initial pose.
 
     A capture is sampled while it is being read: the step between sampled frames doubles whenever
-    there are too many. Once reading is complete, they are the frames that a recording is fitted to.
+    there are too many. Once reading is complete, the same frames are sampled as for a recording.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class MotionExtent:
             for known in (self._clouds, self._kept):
                 for time in known.keys() - wanted:
                     del known[time]
-        # The frame that was lowest comes first: the ground must not lag behind a shape's slider.
+        # The frame that was lowest comes first: the ground must follow a shape slider immediately.
         up = "xyz".index(scene.up)
         lowest = {time: cloud[:, up].min() for time, cloud in self._kept.items() if len(cloud)}
         left = wanted - self._clouds.keys()

@@ -34,6 +34,7 @@ class Look:
     visible: bool
     color: tuple[float, float, float] | None
     placement: bytes
+    hidden_parts: frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,7 @@ class Snapshot:
     time : float
         Time of the scene's clock, seconds.
     kept : object or None
-        A feature's value that is undone with the scene; compared by identity.
+        Value of a feature that undo restores with the scene; compared by identity.
     """
 
     actors: tuple[Actor, ...]
@@ -80,17 +81,19 @@ def restored_pose(key: PoseKey | None) -> Pose | None:
 def look_of(actor: Actor) -> Look:
     """Return an actor's motion and display settings."""
     placement = actor.placement.tobytes()
-    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement)
+    hidden = actor.hidden_parts
+    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement, hidden)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
-    """Return whether ``look_of`` would return the same, without creating an object per frame."""
+    """Return whether ``look_of`` would return an equal look, without creating objects."""
     # Clips are compared by identity: they are replaced and never mutated.
     return (
         actor.clip is look.clip
         and actor.visible == look.visible
         and actor.offset == look.offset
         and actor.color == look.color
+        and actor.hidden_parts == look.hidden_parts
         and actor.placement.tobytes() == look.placement
     )
 
@@ -137,6 +140,7 @@ def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:
     """Restore the display settings and placements of a snapshot's actors and scene."""
     for actor, look in zip(snapshot.actors, snapshot.looks, strict=True):
         actor.visible, actor.color = look.visible, look.color
+        actor.hidden_parts = look.hidden_parts
         actor.placement = np.frombuffer(look.placement).reshape(4, 4).copy()
     kept = copy.deepcopy(snapshot.options)
     for name in DisplayOptions.__slots__:

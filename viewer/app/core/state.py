@@ -46,37 +46,35 @@ class AppState:
     paths : tuple of Path
         The files of the scene; empty for the bundled figure.
     opened_at : float
-        When the scene was opened, seconds since the epoch.
+        Time at which the scene was opened, seconds since the epoch.
     motion_settings : MotionSettings or None
         Settings with which its motions were read, if any were given.
     chosen_actor : int
-        Index of the actor that panels act on.
+        Index of the actor to which panels apply.
     is_actor_selected : bool
-        Whether the user selected that actor, so that it has an outline among several.
+        Whether the user selected that actor: it then has an outline if there are several actors.
     n_choices : int
-        Number of times that an actor was chosen: features compare it to detect outdated state.
+        Number of times an actor was chosen; features compare it to detect outdated state.
     selected_joint : int
         Selected joint of the chosen actor; -1 for none.
     in_degrees : bool
         Whether rotations are shown in degrees instead of radians.
     panels_visible : bool
         Whether panels and menus are drawn.
-    key_labels : dict
-        Keys changed by the user: default label to current label.
     view_rect : (x, y, width, height)
         The part of the window that panels leave free, in window coordinates.
     item_rects : dict
-        Last rectangle of each labelled widget: (x0, y0, x1, y1). Tests click there.
+        Last rectangle of each labelled widget: (x0, y0, x1, y1), which tests click.
     wants : set of str
         Requests to the window, served after the frame: "screenshot", "quit", "open dialog".
     error : str
-        Error message shown over everything; empty if there is none.
+        Error message shown above everything else; empty if there is none.
     messages : Messages
         All messages, and those shown now.
     stats : Stats
         Statistics of the last frame.
     history : History
-        Steps to undo.
+        Undo history.
     framing : Framing
         State of the camera's fitting.
     clock : Clock
@@ -98,7 +96,6 @@ class AppState:
     selected_joint: int = -1
     in_degrees: bool = True
     panels_visible: bool = True
-    key_labels: dict[str, str] = field(default_factory=dict)
     view_rect: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     item_rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
     wants: set[str] = field(default_factory=set)
@@ -134,28 +131,24 @@ class AppState:
 
     @property
     def actor(self) -> Actor:
-        """The actor that panels act on."""
+        """The actor to which panels apply."""
         return self.scene.actors[self.chosen_actor]
 
     def choose_actor(self, index: int) -> None:
-        """Choose the actor that panels act on."""
+        """Choose the actor to which panels apply."""
         self.chosen_actor, self.is_actor_selected = index, False
         self.n_choices += 1
-        self.clock.follow(self.actor)  # stepping uses its frames
+        self.clock.follow(self.actor)  # stepping uses the frames of this actor
         self.selected_joint = -1
 
     def select_actor(self, index: int) -> None:
-        """Choose an actor as the user's selection, which has an outline among several."""
+        """Choose an actor as the user's selection, which is outlined if there are several."""
         self.choose_actor(index)
         self.is_actor_selected = True
 
     def deselect(self) -> None:
         """Deselect the joint and the actor; the actor remains the chosen one."""
         self.selected_joint, self.is_actor_selected = -1, False
-
-    def key_label(self, usual: str) -> str:
-        """Return the current label of a key, given its default label."""
-        return self.key_labels.get(usual, usual)
 
     @property
     def aspect(self) -> float:
@@ -212,7 +205,7 @@ class AppState:
             camera.target = center + away * (_FARTHEST * size / length)
 
     def say(self, *messages: str | Diagnostic) -> None:
-        """Show messages that time out, longer ones later."""
+        """Show messages that time out; longer ones stay longer."""
         for message in messages:
             self.messages.show(str(message))
 

@@ -1,4 +1,4 @@
-"""Undo and redo as actions of the window, which keep the chosen actor."""
+"""Undo and redo as actions of the window; the same actor stays chosen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Undo and redo: every change of pose, clip or display is a step, and so is a slider drag."""
+"""Undo and redo: every change of pose, clip or display is one step, as is a slider drag."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ __all__ = ["History", "Undoable"]
 _MOST = 500  # number of steps kept
 
 PoseAt = Callable[[float], None]
-"""Callable that goes to a time and poses the scene for it."""
+"""Function that goes to a time and poses the scene for it."""
 
 
 class Undoable(Protocol):
     """State of a feature, with one value that undo restores together with the scene."""
 
     def kept(self) -> object | None:
-        """Return the value, which is replaced and never mutated; None if there is none."""
+        """Return the value, which is replaced but never mutated; None if there is none."""
 
     def restore(self, kept: object | None) -> None:
         """Restore a value."""
@@ -61,7 +61,7 @@ class History:
 
     Undo and redo of an edit of actors, poses or clips go to the time of the edit. The clock then
     poses all actors by their restored clips, and poses edited by hand are restored on top of that.
-    Undo of an edit of the display alone changes neither time nor poses.
+    Undoing a change of the display alone changes neither time nor poses.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class History:
             self._seen = self._take(scene, options)
 
     def exchange(self, old: object, new: object) -> None:
-        """Replace a feature's value by one with more information, without a step."""
+        """Replace a feature's value by one with more information, without recording a step."""
 
         def exchanged(one: Snapshot) -> Snapshot:
             return replace(one, kept=new) if one.kept is old else one
@@ -116,9 +116,9 @@ class History:
         self._replace(exchanged)
 
     def follow(self, time: float) -> None:
-        """Adopt poses set by the clock, without a step; edits keep their steps.
+        """Adopt poses set by the clock without recording a step; edits keep their steps.
 
-        Edits of the same frame must be observed before the clock poses the scene.
+        Edits made in the same frame must be observed before the clock poses the scene.
         """
         if self._seen is None:
             return
@@ -175,7 +175,7 @@ class History:
         Parameters
         ----------
         scene, options : Scene, DisplayOptions
-            Restored to their previous state.
+            The objects to restore to their previous state.
         pose_at : callable
             Goes to a time and poses the actors for it by their restored clips.
         """
@@ -219,7 +219,7 @@ class History:
             self._seen = replace(self._seen, looks=looks, options=shown, kept=self._kept())
 
     def _settle(self, restored: Snapshot, time: float) -> None:
-        """Restore the poses that were edited by hand over those that the clock has set."""
+        """Restore the poses that were edited by hand in place of those set by the clock."""
         self._seen = restored
         self.follow(time)
         rows = zip(restored.actors, restored.poses, restored.by_hand, strict=True)
@@ -266,7 +266,7 @@ class History:
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:
-    """Return an earlier step's clip, extended by the frames that were read since."""
+    """Return an earlier step's clip, extended by the frames read since then."""
     if isinstance(old, SampledClip) and isinstance(new, SampledClip):
         return with_rate(new, old.timing.frame_rate)
     if isinstance(old, PointClip) and isinstance(new, PointClip):

@@ -13,9 +13,9 @@ from viewer.rig.geometry.vectors import unit
 __all__ = ["ViewFrame", "view_frame"]
 
 Place = tuple[float, float]
-"""A point of the window, window coordinates."""
+"""A position in the window, in window coordinates."""
 
-_NEAREST = 1e-9  # smallest w in clip space: points with a smaller w are beside or behind the eye
+_NEAREST = 1e-9  # smallest w in clip space: points with a smaller w are at or behind the eye
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +44,7 @@ class ViewFrame:
         )
 
     def place(self, point: Floats) -> Place | None:
-        """Return the projection of a point, None if it is behind the eye."""
+        """Return the projection of a point, or None if it is behind the eye."""
         seen = self.project(point)
         return (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
 
@@ -61,7 +61,7 @@ class ViewFrame:
         Returns
         -------
         (3,)
-            On the plane through the point that is parallel to the image plane.
+            Point on the plane through the other point that is parallel to the image plane.
         """
         clip = self.matrix @ np.append(point, 1.0)
         found = np.linalg.solve(self.matrix, self._clip(place, clip[2], clip[3]))
@@ -75,7 +75,7 @@ class ViewFrame:
         return near, unit(far - near)
 
     def unit_length(self, point: Floats) -> float:
-        """Return the length of a window unit at a point's depth, scene units."""
+        """Return the length of one window unit at a point's depth, in scene units."""
         seen = self.place(point)
         if seen is None:
             return 0.0

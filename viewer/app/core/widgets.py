@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
+from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
 from viewer.rig.number_text import number_text
 
@@ -29,6 +30,7 @@ __all__ = [
     "overlay_rect",
     "plain_zero",
     "same_line_if_room",
+    "show_tooltip",
     "slider",
 ]
 
@@ -39,7 +41,7 @@ Rect = tuple[float, float, float, float]
 
 
 def note_item(state: AppState, label: str) -> None:
-    """Record the rectangle of the last widget under a label that tests can aim at."""
+    """Record the rectangle of the last widget under a label, for tests."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     state.item_rects[label] = (low.x, low.y, high.x, high.y)
 
@@ -55,7 +57,7 @@ def disabled(why: str) -> Iterator[None]:
 
 
 def explain(text: str, why: str = "") -> None:
-    """Give the last widget a tooltip: its effect, or why it is disabled.
+    """Give the last widget a tooltip with its effect, or the reason why it is disabled.
 
     Parameters
     ----------
@@ -67,7 +69,13 @@ def explain(text: str, why: str = "") -> None:
     flags = imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled
     tooltip = "\n".join(filter(None, (text, why)))
     if tooltip and imgui.is_item_hovered(flags):
-        imgui.set_tooltip(tooltip)
+        show_tooltip(tooltip)
+
+
+def show_tooltip(text: str) -> None:
+    """Show a tooltip, unless it would cover what is being typed or dragged in the last widget."""
+    if not imgui.is_item_active():
+        imgui.set_tooltip(text)
 
 
 def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> bool:
@@ -92,7 +100,7 @@ def begin_overlay(name: str, x: float, y: float, pivot: tuple[float, float]) -> 
 
 
 def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
-    """Begin a separate window, which opens in the centre; ``imgui.end`` ends it.
+    """Begin a separate window, which opens in the centre; ``imgui.end`` must follow.
 
     Parameters
     ----------
@@ -141,7 +149,7 @@ def slider(
     ``width`` is that of ``begin_field``.
     """
     shown = plain_zero(value, unit)
-    changed, moved = slider_float(begin_field(label, width), shown, low, high, unit, flags)
+    changed, moved = slider_float(state, begin_field(label, width), shown, low, high, unit, flags)
     note_item(state, label)
     # "nan" and "1e99" can be typed into a slider.
     return moved if changed and math.isfinite(moved) else value
@@ -156,7 +164,7 @@ def count_slider(
     flags: int = 0,
 ) -> int:
     """Draw a slider of whole numbers and return its number."""
-    changed, moved = slider_int(begin_field(label), value, *limits, text, flags)
+    changed, moved = slider_int(state, begin_field(label), value, *limits, text, flags)
     note_item(state, label)
     return moved if changed else value
 
@@ -191,7 +199,7 @@ def menu_item(
     state: AppState, text: str, key: str = "", checked: bool = False, why: str = ""
 ) -> bool:
     """Draw a menu item and return whether it was chosen; disabled if there is a reason."""
-    shown = state.key_label(key)
+    shown = key_name(state, key)
     chosen = imgui.menu_item(text, shown, checked, not why)[0]
     note_item(state, text)
     explain("", why)
@@ -199,7 +207,7 @@ def menu_item(
 
 
 def same_line_if_room(text: str) -> None:
-    """Place the next check box or button with this text next to the last widget if it fits."""
+    """Place the next check box or button, with this text, next to the last widget if it fits."""
     style = imgui.get_style()
     width = imgui.calc_text_size(text).x + imgui.get_frame_height() + style.item_inner_spacing.x
     end = imgui.get_item_rect_max().x + style.item_spacing.x + width

@@ -55,14 +55,14 @@ class Plot:
         return curve_color(self.view, self.curves, row)
 
     def note(self, label: str, time: float, value: float, reach: float = 4.0) -> None:
-        """Record the position of a point of the plot under a label that tests can aim at."""
+        """Record the position of a point of the plot under a label, for tests."""
         place = implot.plot_to_pixels(time, value)
         rect = (place.x - reach, place.y - reach, place.x + reach, place.y + reach)
         self.state.item_rects[label] = rect
 
 
 def measured(state: AppState, curves: tuple[Curve, ...]) -> Plot:
-    """Return the current plot, once its axes are set up."""
+    """Return the current plot, after its axes have been set up."""
     box, place, size = implot.get_plot_limits(), implot.get_plot_pos(), implot.get_plot_size()
     limits = (box.x.min, box.x.max, box.y.min, box.y.max)
     state.item_rects["plot"] = (place.x, place.y, place.x + size.x, place.y + size.y)

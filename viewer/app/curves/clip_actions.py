@@ -24,7 +24,7 @@ def can_have_keys(state: AppState) -> bool:
 
 
 def new_clip(state: AppState) -> None:
-    """Create a clip that holds the chosen actor's pose, with one key per DOF."""
+    """Create a clip of the chosen actor's constant pose, with one key per DOF."""
     actor = state.actor
     if actor.pose is None or actor.figure.skeleton is None or actor.clip is not None:
         return

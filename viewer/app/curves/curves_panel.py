@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import number_field, search_field
 from viewer.app.core.widgets import (
     button,
     choice,
@@ -56,7 +55,8 @@ def draw(state: AppState) -> None:
         _draw_list(state, curves)
     imgui.end_child()
     imgui.same_line()
-    # Next to the plot, not above it: widgets that appear must not move a key away from the mouse.
+    # The fields are next to the plot, not above it: widgets that appear must not move a key away
+    # from the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
     if clip_of(state) is not None:
         side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.35 * room)
@@ -99,7 +99,7 @@ def _rows_of(curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
 def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
     view = state.of(Curves)
     imgui.set_next_item_width(-1.0)
-    view.filter = imgui.input_text_with_hint("##curve filter", "Filter", view.filter)[1]
+    view.filter = search_field("##curve filter", view.filter, "Filter channels")
     note_item(state, "Curve filter")
     if not imgui.begin_child("##curve rows"):
         imgui.end_child()
@@ -124,7 +124,7 @@ def _draw_list(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _listed(curves: tuple[Curve, ...], wanted: str) -> list[int | str]:
-    """Return the rows of listed curves, with each joint's number as text before its curves."""
+    """Return the rows of listed curves; each joint's number, as text, precedes its curves."""
     listed: list[int | str] = []
     last: int | None = None
     for row, curve in enumerate(curves):
@@ -250,13 +250,9 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 def _field(state: AppState, label: str, value: float) -> float | None:
     """Draw a number field; return the number that was entered."""
-    flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-    entered, typed = imgui.input_double(
-        begin_field(label), plain_zero(value, "%.5g"), 0.0, 0.0, "%.5g", flags
-    )
+    typed = number_field(state, begin_field(label), plain_zero(value, "%.5g"), "%.5g")
     note_item(state, label)
-    # "nan" and "1e999" can be typed.
-    return typed if entered and math.isfinite(typed) and abs(typed) < _FARTHEST else None
+    return typed if typed is not None and abs(typed) < _FARTHEST else None
 
 
 def _draw_numbers(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:

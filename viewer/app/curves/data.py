@@ -109,14 +109,14 @@ def _point_curves(points: PointLayout) -> tuple[Curve, ...]:
 
 def channel_of(clip: Clip, row: int) -> Channel | None:
     """Return the channel that drives a DOF, None if there is none."""
-    # Usually files list a channel for every DOF, in the same order.
+    # Files usually list a channel for every DOF, in the same order.
     if row < len(clip.channels) and clip.channels[row].target == row:
         return clip.channels[row]
     return next((channel for channel in clip.channels if channel.target == row), None)
 
 
 def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
-    """Return some curves of a clip at many times: (T, C); those without a channel are 0."""
+    """Return some curves of a clip at many times: (T, C); curves without a channel are 0."""
 
     def chosen() -> Clip:
         channels = (channel_of(clip, row) for row in rows)
@@ -130,14 +130,14 @@ def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
 
 
 def sampled_points(clip: SampledClip | PointClip, row: int, low: float, high: float) -> Points:
-    """Return a curve of a sampled animation: at most 2000 points, each exactly on a frame.
+    """Return a curve of a sampled animation: at most 2000 points, each exactly at a frame.
 
     Parameters
     ----------
     clip : SampledClip or PointClip
         The motion.
     row : int
-        See ``curves_of``.
+        Row, see ``curves_of``.
     low, high : float
         Visible range, seconds; only as many frames are skipped as this range requires.
 

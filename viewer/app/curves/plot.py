@@ -105,7 +105,7 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     values = values[np.isfinite(values)]
     bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
     pad = 2.0 * _MARGIN * (top - bottom)
-    # A constant curve must not be magnified to its rounding errors.
+    # A constant curve must not be magnified until its rounding errors show.
     pad = pad if pad > 1e-6 * max(abs(top), 1e-6) else max(0.5 * abs(top), 0.5)
     return low, high, bottom - pad, top + pad
 
@@ -141,7 +141,7 @@ def _draw_line(plot: Plot, row: int) -> None:
 def _inner_times(keys: Floats, low: float, high: float) -> Floats:
     """Return sample times: evenly over the visible range, and at the keys."""
     seen = keys[(keys >= low) & (keys <= high)][:_MOST_SAMPLES]
-    # Times just before the keys are included, because two keys at one time make a jump.
+    # Times just before the keys are included, because two keys at the same time create a jump.
     times = np.concatenate([np.linspace(low, high, _MOST_SAMPLES), seen, np.nextafter(seen, low)])
     return np.sort(np.clip(times, low, high))
 
@@ -193,7 +193,7 @@ def _draw_range(plot: Plot) -> None:
 
 
 def _draw_time(plot: Plot) -> None:
-    """Draw the current time; dragging it moves the clock by whole frames, with Alt freely."""
+    """Draw the current time; dragging it moves the clock by whole frames, with Alt continuously."""
     state, offset = plot.state, plot.state.actor.offset
     time = state.clock.time - offset
     moved, time, *_ = implot.drag_line_x(_TIME_ID, time, _TIME, 1.5, implot.DragToolFlags_.no_fit)

@@ -37,10 +37,10 @@ _FIXED = implot.DragToolFlags_.no_fit
 
 
 def draw_keys(plot: Plot) -> bool:
-    """Draw keys and tangents; return whether the mouse is at one of them.
+    """Draw keys and tangents; return whether the mouse is over one of them.
 
-    Of several overlapping items, the one drawn first gets the mouse. So selected keys are drawn
-    first, then tangents, then other keys.
+    Of several overlapping items, the one drawn first gets the mouse. Selected keys are therefore
+    drawn first, then tangents, then other keys.
     """
     clip = clip_of(plot.state)
     if clip is None:
@@ -84,7 +84,7 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
 
 
 def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
-    """Draw keys as plain dots, which cannot be dragged, because there are too many."""
+    """Draw keys as plain dots, which cannot be dragged; for too many keys."""
     for row, times, values, keys in seen:
         if keys:
             color = plot.color(row)
@@ -124,7 +124,7 @@ def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
 
 
 def _draw_handles(plot: Plot) -> bool:
-    """Draw the tangents of a single selected key; return whether the mouse is at one."""
+    """Draw the tangents of a single selected key; return whether the mouse is over one."""
     clip, view = clip_of(plot.state), plot.view
     if clip is None or len(view.keys) != 1:
         return False
@@ -154,7 +154,7 @@ def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bo
     )
     plot.note(f"tangent {side}", end, height)
     if moved:
-        # The knob stays at least a pixel away on its side of the key: no tangent is vertical.
+        # The knob stays at least a pixel away from the key on its side, so no tangent is vertical.
         run = sign * max(sign * (x - time), 1.0 / across)
         for each in (0, 1) if imgui.get_io().key_shift else (side,):
             change_tangent(plot.state, [place], each, (y - value) / run / factor)
@@ -169,7 +169,7 @@ def edit(plot: Plot, touched: bool) -> None:
     plot : Plot
         Current plot.
     touched : bool
-        Whether the mouse is at a key or tangent, which then handles clicks.
+        Whether the mouse is over a key or tangent, which then handles clicks.
     """
     state, view, clip = plot.state, plot.view, clip_of(plot.state)
     if clip is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():

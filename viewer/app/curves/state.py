@@ -29,7 +29,7 @@ class Curves:
     owner : (int, str, int)
         Key of the actor, kind of motion and number of curves for which ``rows`` are valid.
     joint : int
-        Joint whose curves were selected last.
+        Joint whose curves were last selected.
     """
 
     rows: tuple[int, ...] = ()

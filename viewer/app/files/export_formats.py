@@ -1,4 +1,4 @@
-"""Choice of the format of an exported pose, with what each format keeps."""
+"""Choice of the format of an exported pose, and the data that each format keeps."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 from viewer.app.core.state import AppState
 from viewer.formats import FORMATS
@@ -32,11 +33,11 @@ class FileDialog:
     suffixes : tuple of str
         Suffixes of the listed files; if empty, those of all formats that can be opened.
     name : str
-        Suggested name of the file to write; its suffix is added to names without one.
+        Suggested name of the file to write; its suffix is added to names without a suffix.
     more : callable, optional
-        Draws further options, given the state and the dialog.
+        Draws additional options, given the state and the dialog.
     written : callable, optional
-        Returns all files that are written for a name; only that file if omitted.
+        Returns all files that are written for a name; if omitted, only the named file is written.
     """
 
     def __init__(
@@ -53,29 +54,33 @@ class FileDialog:
         self.more, self.written = more, written
         self.done, self.purpose, self.title, self.name = done, purpose, title, name
         self.suffixes = set(suffixes or opened_suffixes())
-        self.suffix = Path(name).suffix
+        self.suffix, self.suggested = Path(name).suffix, name
         self.folder = folder
         self.chosen: set[Path] = set()
+        self.current: Path | None = None
         self.shows_all = False
         self.problem = ""
         self.entries: list[Path] = []
+        self.folders: set[Path] = set()
         self.is_new = True
         self.enter(folder)
 
     def enter(self, folder: Path) -> None:
         """Open a folder; if it cannot be read, the dialog stays in the current one."""
         try:
-            found = sorted(
-                folder.iterdir(), key=lambda path: (not path.is_dir(), path.name.lower())
-            )
+            paths = list(folder.iterdir())
+            folders = {path for path in paths if path.is_dir()}
         except OSError as problem:
             self.problem = f"{printable(folder)}: {problem.strerror}"
             return
-        self.folder, self.entries, self.problem = folder, found, ""
+        self.entries = sorted(paths, key=lambda path: (path not in folders, path.name.lower()))
+        self.folder, self.folders, self.problem = folder, folders, ""
+        self.current = None
         self.chosen.clear()
 
     def typed(self, text: str) -> Path | None:
-        """Return the file at a typed path, or open the folder at that path."""
+        """Return the file at a typed or pasted path, or open the folder at that path."""
+        text = plain_path(text)
         try:
             path = Path(text).expanduser()
             if path.is_file():
@@ -86,6 +91,20 @@ class FileDialog:
         self.enter(path)
         return None
 
+    def follow_name(self) -> bool:
+        """Open the folder whose name was entered in place of a file's; return whether it is one."""
+        name = plain_path(self.name)
+        folder = self.folder / name
+        try:
+            # A capture is written to a folder, which may exist.
+            is_folder = bool(name and self.suffix) and folder.is_dir()
+        except OSError:  # the name is too long
+            return False
+        if is_folder:
+            self.enter(folder.resolve())
+            self.name = self.suggested
+        return is_folder
+
     def target(self) -> Path | None:
         """Return the file to write, with a suffix; None if it has no name."""
         name = Path(self.name.strip())
@@ -94,14 +113,39 @@ class FileDialog:
         path = self.folder / name
         return path if path.suffix else path.with_name(path.name + self.suffix)
 
+    def move(self, step: int) -> None:
+        """Move the highlight in the list, and choose the file that it reaches."""
+        listed = self.listed()
+        if not listed:
+            return
+        row = listed.index(self.current) + step if self.current in listed else min(step, 0)
+        self.current = listed[min(max(row, 0), len(listed) - 1)]
+        self.chosen.clear()
+        if self.purpose == "save" and self.current not in self.folders:
+            self.name = self.current.name
+        elif self.purpose == "open" and self.current not in self.folders:
+            self.chosen = {self.current}
+
     def listed(self) -> list[Path]:
         """Return the folders and the files to list: those that can be opened, or all."""
         return [
             path
             for path in self.entries
             if not path.name.startswith(".")
-            and (path.is_dir() or self.shows_all or path.suffix.lower() in self.suffixes)
+            and (path in self.folders or self.shows_all or path.suffix.lower() in self.suffixes)
         ]
+
+
+def plain_path(text: str) -> str:
+    """Return a pasted path without the quotes or the scheme that other programs add.
+
+    >>> plain_path('"/tmp/a b.skel" '), plain_path("file:///tmp/a%20b.skel")
+    ('/tmp/a b.skel', '/tmp/a b.skel')
+    """
+    text = text.strip()
+    if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"":
+        text = text[1:-1]
+    return unquote(urlsplit(text).path) if text.startswith("file://") else text
 
 
 def opened_suffixes() -> set[str]:
@@ -112,7 +156,7 @@ def opened_suffixes() -> set[str]:
 
 
 def folder_of(paths: Sequence[Path]) -> Path:
-    """Return a dialog's initial folder: that of the first file, the current one, or home."""
+    """Return a dialog's initial folder: that of the first file, the current folder, or home."""
     try:
         return paths[0].resolve().parent if paths else Path.cwd()
     except (OSError, RuntimeError):  # the current folder no longer exists

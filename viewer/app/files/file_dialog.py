@@ -11,14 +11,16 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import name_field, text_field
 from viewer.app.core.widgets import button, note_item
 from viewer.app.files.file_choice import FileDialog
+from viewer.app.files.file_list import draw_file_list, is_confirmed_by_key
 from viewer.app.files.state import Files
-from viewer.formats import FORMATS
 from viewer.phrases import printable
 
 __all__ = ["draw_file_dialog"]
 
+_SIZE = (44.0, 32.0)  # in font sizes
 _HINTS = {
     "open": "Ctrl+click selects several: a .skel and its .skin",
     "folder": "",
@@ -35,8 +37,8 @@ def draw_file_dialog(state: AppState) -> None:
     if dialog.is_new:
         imgui.open_popup(dialog.title)
         dialog.is_new = False
-    size = imgui.get_main_viewport().size
-    room = (min(620.0, 0.95 * size.x), min(460.0, 0.92 * size.y))
+    size, letter = imgui.get_main_viewport().size, imgui.get_font_size()
+    room = (min(_SIZE[0] * letter, 0.95 * size.x), min(_SIZE[1] * letter, 0.92 * size.y))
     imgui.set_next_window_size(room, imgui.Cond_.appearing)
     center = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.appearing, (0.5, 0.5))
@@ -55,9 +57,8 @@ def draw_file_dialog(state: AppState) -> None:
 
 def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     imgui.set_next_item_width(-1.0)
-    entered, text = imgui.input_text(
-        "##folder", str(dialog.folder), imgui.InputTextFlags_.enter_returns_true
-    )
+    flags = imgui.InputTextFlags_.enter_returns_true
+    entered, text = text_field("##folder", str(dialog.folder), "Path of a folder or file", flags)
     note_item(state, "Folder")
     if entered:
         path = dialog.typed(text)
@@ -72,7 +73,7 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
     dialog.shows_all = imgui.checkbox("All files", dialog.shows_all)[1]
     if dialog.problem:
         imgui.text_wrapped(dialog.problem)
-    result = _draw_list(state, dialog)
+    result = draw_file_list(state, dialog, _foot_height(dialog))
     return result or _draw_buttons(state, dialog)
 
 
@@ -81,16 +82,13 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
     result: list[Path] = []
     if dialog.more is not None:
         dialog.more(state, dialog)
-    if dialog.purpose == "save":
-        imgui.set_next_item_width(0.5 * imgui.get_content_region_avail().x)
-        dialog.name = imgui.input_text("##name", dialog.name)[1]
-        note_item(state, "Name")
-        imgui.same_line()
+    entered = dialog.purpose == "save" and _draw_name(state, dialog)
     count, label = _confirmation(dialog)
     missing = "enter a name" if dialog.purpose == "save" else "choose a file"
-    pressed = button(state, label, "" if count else missing)
-    by_key = count and dialog.purpose == "open" and imgui.is_key_pressed(imgui.Key.enter, False)
-    if pressed or by_key:
+    pressed = button(state, label, "" if count else missing) or is_confirmed_by_key(dialog)
+    if entered and label.startswith("Replace"):
+        dialog.problem = f"{printable(dialog.name.strip(), 90)} exists: press Replace to replace it"
+    elif count and (pressed or entered):
         result = _confirmed(dialog)
     imgui.same_line()
     if button(state, "Cancel"):
@@ -98,6 +96,21 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
     imgui.same_line()
     imgui.text_disabled(_HINTS[dialog.purpose])
     return result
+
+
+def _draw_name(state: AppState, dialog: FileDialog) -> bool:
+    """Draw the field of the name; return whether Enter confirmed the name of a file."""
+    imgui.set_next_item_width(0.5 * imgui.get_content_region_avail().x)
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    entered, dialog.name = name_field("##name", dialog.name, "Name of the file")
+    note_item(state, "Name")
+    # Escape restores an edited name; the dialog is closed only if there is nothing to restore.
+    is_left = imgui.is_item_deactivated() and not imgui.is_item_deactivated_after_edit()
+    if is_left and imgui.is_key_pressed(imgui.Key.escape, False):
+        state.of(Files).dialog = None
+    imgui.same_line()
+    return entered and not dialog.follow_name()
 
 
 def _confirmation(dialog: FileDialog) -> tuple[int, str]:
@@ -124,50 +137,7 @@ def _confirmed(dialog: FileDialog) -> list[Path]:
     return sorted(dialog.chosen)
 
 
-def _draw_list(state: AppState, dialog: FileDialog) -> list[Path]:
-    """Draw the list of files; return a file that was double-clicked."""
-    result: list[Path] = []
-    if imgui.begin_child("files", (0.0, -_foot_height(dialog)), imgui.ChildFlags_.borders):
-        for number, path in enumerate(dialog.listed()):
-            is_folder = path.is_dir()
-            name = printable(path.name, 90) + ("/" if is_folder else "")
-            flags = imgui.SelectableFlags_.allow_double_click
-            flags |= imgui.SelectableFlags_.no_auto_close_popups
-            # The name is drawn as text: "##" in a label would hide the rest.
-            pressed, _ = imgui.selectable(f"##file{number}", path in dialog.chosen, flags)
-            note_item(state, f"file {path.name}")
-            imgui.same_line(0.0, 0.0)
-            imgui.text_unformatted(name)
-            if not pressed:
-                continue
-            if is_folder and _is_model_folder(dialog, path):
-                dialog.chosen = {path}
-            elif is_folder:
-                dialog.enter(path)
-                break
-            elif dialog.purpose == "save":
-                dialog.name = path.name
-            elif dialog.purpose == "folder":
-                continue
-            elif imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-                result = [path]
-            elif imgui.get_io().key_ctrl:
-                dialog.chosen ^= {path}
-            else:
-                dialog.chosen = {path}
-    imgui.end_child()
-    return result
-
-
 def _foot_height(dialog: FileDialog) -> float:
     """Return the height of the widgets below the list."""
     more = 0.0 if dialog.more is None else imgui.get_frame_height_with_spacing()
     return 1.5 * imgui.get_frame_height() + more
-
-
-def _is_model_folder(dialog: FileDialog, path: Path) -> bool:
-    """Return whether a folder can itself be opened like a file; a double click enters it."""
-    if dialog.purpose != "open" or imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-        return False
-    names = {name for kind in FORMATS.values() for name in kind.files}
-    return path.name in names or any((path / name).exists() for name in names)

@@ -29,9 +29,9 @@ class Loader:
     paths : sequence of Path
         Files to open.
     attempts : sequence of sequences of Path
-        Tried in order; the first that loads is used, or the error of the last one.
+        Tried in order until one loads; if all fail, the last error is reported.
     wake : callable
-        Called from the thread when it is done.
+        Called from the thread when loading ends.
     settings : MotionSettings, optional
         Settings for reading motions.
     opened : sequence of Path
@@ -44,9 +44,9 @@ class Loader:
     builders : list of Builder
         Builders of captures whose first frames are in the scene.
     addition : Contents or None
-        Poses and images for the open figure, if there was nothing else.
+        Poses and images for the open figure, if the files contain nothing else.
     error : str
-        Why nothing was read; empty if there is no error.
+        Reason why nothing was read; empty if there is no error.
     """
 
     def __init__(
@@ -119,5 +119,5 @@ class Loader:
         return time.monotonic() - self._started
 
     def wait(self) -> None:
-        """Wait until it is done."""
+        """Wait until loading ends."""
         self._thread.join()

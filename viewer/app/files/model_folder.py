@@ -1,4 +1,4 @@
-"""Choice of the folder that holds body models."""
+"""Choice of the folder of body models."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["set_model_folder"]
 
 
 def set_model_folder(state: AppState, paths: list[Path]) -> None:
-    """Remember the first path as the folder of body models, and show how many it holds."""
+    """Remember the first path as the folder of body models, and show how many it contains."""
     try:
         folder = save_model_folder(paths[0])
     except ViewerError as problem:

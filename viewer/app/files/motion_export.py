@@ -25,7 +25,7 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 
-_MANY = (".obj",)  # one file per frame: exported by the command line only
+_MANY = (".obj",)  # one file per frame: only exported by the command line
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = ["FOLDER", "motion_files", "motion_suffixes", "moving_actors", "save_motion"]
@@ -40,7 +40,7 @@ def moving_actors(state: AppState) -> list[Actor]:
 
 
 def motion_suffixes() -> tuple[str, ...]:
-    """Return the suffixes of files that contain one actor's motion, the default first."""
+    """Return the suffixes of files that contain one actor's motion; the default is first."""
     kinds = [kind for kind in EXPORTERS.values() if kind.writes_motion]
     found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
     others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
@@ -48,12 +48,12 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
-    """Return all files that are written for one name.
+    """Return all files that are written for a name.
 
     Parameters
     ----------
     state : AppState
-        Holds the scene and the chosen actor.
+        State with the scene and the chosen actor.
     path : Path
         A file, or a folder: a name without suffix.
     everyone : bool
@@ -90,10 +90,10 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
     Parameters
     ----------
     state : AppState
-        Holds the actors; receives the job, or an error.
+        State with the actors; receives the job, or an error.
     path : Path
-        Its suffix selects the format; without one it is an EasyMocap folder. Either all files
-        are written or none.
+        Target, whose suffix selects the format; without a suffix, it is an EasyMocap folder. Either
+        all files are written or none.
     everyone : bool
         Whether all actors are written, one file each (or one folder for all), or only the chosen
         one.

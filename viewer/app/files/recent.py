@@ -26,7 +26,7 @@ _MOST = 12
 
 
 def state_folder() -> Path:
-    """Return the folder where layout and recent files are kept."""
+    """Return the folder in which layout and recent files are stored."""
     return Path(platformdirs.user_state_dir("viewer", appauthor=False))
 
 
@@ -41,12 +41,12 @@ def load_recent() -> list[tuple[str, ...]]:
 
 
 def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
-    """Put files first in the list and save it; return an error message, empty if saved.
+    """Move files to the front of the list and save it; return an error message, empty if saved.
 
     Parameters
     ----------
     recent : list
-        Groups of files, changed in place.
+        Groups of files, modified in place.
     paths : sequence of Path
         Files that were opened together.
     """

@@ -13,7 +13,7 @@ from viewer.phrases import printable
 __all__ = ["save_files"]
 
 
-def save_files(state: AppState, act: Callable[[], None], files: list[Path]) -> None:
+def save_files(state: AppState, act: Callable[[], object], files: list[Path]) -> None:
     """Write files unless the scene was read from one of them, and show the result."""
     try:
         # The dialog has already asked whether to replace existing files.

@@ -34,7 +34,7 @@ class Stream:
     Attributes
     ----------
     error : str
-        Why reading ended early; empty if there is no error.
+        Reason why reading ended early; empty if there is no error.
     """
 
     def __init__(self, builders: Sequence[Builder], wake: Callable[[], None]) -> None:
@@ -59,7 +59,7 @@ class Stream:
         self._wake()
 
     def _hand_over(self, builder: Builder, part: CapturePart) -> bool:
-        """Put a part into the queue once it has room; return False if reading was cancelled."""
+        """Put a part into the queue when it has room; return False if reading was cancelled."""
         while not self._stop.is_set():
             try:
                 self._parts.put((builder, part), timeout=0.1)
@@ -109,7 +109,7 @@ class Stream:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Frames in the scene, and frames in all."""
+        """Number of frames in the scene, and their total."""
         read = sum(builder.n_read for builder in self.builders)
         return read, sum(builder.capture.n_frames for builder in self.builders)
 

@@ -62,7 +62,7 @@ def start_check(state: AppState) -> None:
     settings, since = state.motion_settings, state.opened_at
 
     def check(report: Report) -> list[str]:
-        # The bundled figure is read from files too.
+        # The bundled figure is also read from files.
         files, is_likely = paths or bundled_files(), not paths
         again = lint_again(copy, files, options, settings, since, report, is_likely)
         findings = tuple(worst_first(again.findings))
@@ -84,7 +84,7 @@ def _copied(scene: Scene) -> Scene:
 
 
 def take_findings(state: AppState) -> None:
-    """Show the findings of a finished check; those of another scene are dropped."""
+    """Show the findings of a finished check; findings about another scene are discarded."""
     view = state.of(Linting)
     running = view.running
     if running is not None and running.job is not state.job:
@@ -135,12 +135,12 @@ def _differs(actor: Actor, old: Actor) -> bool:
 
 
 def choose_finding(state: AppState, index: int) -> None:
-    """Show a finding: its actor, joint and time; -1 or the same index again clears the choice.
+    """Show a finding: its actor, joint and time; -1 or the same index again clears the selection.
 
     Parameters
     ----------
     state : AppState
-        Holds the camera, which moves to the finding in the next frame.
+        State with the camera, which moves to the finding in the next frame.
     index : int
         Index into ``state.of(Linting).checked.findings``.
     """
@@ -176,7 +176,7 @@ def is_known_there(state: AppState, finding: Finding) -> bool:
     Parameters
     ----------
     state : AppState
-        Holds the last check.
+        State with the last check.
     finding : Finding
         A finding of that check.
     """
@@ -195,7 +195,7 @@ def file_place(finding: Finding) -> str:
 
 
 def copy_place(state: AppState, finding: Finding) -> None:
-    """Copy path and line of a finding that is not about an actor, and clear the choice."""
+    """Copy path and line of a finding that is not about an actor, and clear the selection."""
     choose_finding(state, -1)
     place = file_place(finding)
     if place:

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import search_field
 from viewer.app.core.widgets import button, choice, explain, note_item, same_line_if_room, slider
 from viewer.app.linting.actions import (
     choose_finding,
@@ -48,7 +49,7 @@ _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 
 
 def draw(state: AppState) -> None:
-    """Draw the panel; the first time it is shown it starts a check."""
+    """Draw the panel; when it is first shown, it starts a check."""
     view = state.of(Linting)
     take_findings(state)
     if not view.was_shown:
@@ -174,7 +175,7 @@ def _draw_filters(state: AppState, known: Checked) -> None:
         if changed:
             view.severities ^= {severity}
     imgui.set_next_item_width(-1.0)
-    view.text = imgui.input_text_with_hint("##lint filter", "Filter findings", view.text)[1]
+    view.text = search_field("##lint filter", view.text, "Filter findings")
     note_item(state, "Filter findings")
 
 
@@ -208,7 +209,7 @@ def _searched_text(finding: Finding) -> str:
 
 
 def _place(finding: Finding) -> str:
-    """Return the file's name and the line, empty if there is none."""
+    """Return the file's name and the line; empty if there is none."""
     if finding.file is None or finding.file == Path():
         return ""
     line = "" if finding.line is None else f":{finding.line}"
@@ -263,7 +264,7 @@ def _draw_tooltip(state: AppState, finding: Finding) -> None:
 
 
 def _click_text(state: AppState, finding: Finding) -> str:
-    """Return the tooltip about a click on a finding."""
+    """Return the tooltip about the effect of a click on a finding."""
     if is_known_there(state, finding):
         return "click to show it in the view; click again or press Esc to stop"
     if is_in_scene(state, finding):

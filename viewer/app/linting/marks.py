@@ -31,7 +31,7 @@ _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 
 
 def show_finding(state: AppState) -> Marks | None:
-    """Return the marks of the chosen finding in the current pose; move the camera if asked.
+    """Return the marks of the chosen finding in the current pose; move the camera if requested.
 
     Called in each frame after the scene is posed and before it is drawn.
     """
@@ -83,7 +83,7 @@ def _key(state: AppState) -> object:
 
 
 def marks_of(places: Places) -> tuple[Marks, str]:
-    """Return markers for locations, and a note if there are too many to mark all.
+    """Return markers for locations, and a note if there are too many to mark them all.
 
     Parameters
     ----------
@@ -131,12 +131,12 @@ def _radius(count: int) -> float:
 
 
 def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
-    """Aim the camera at some points, from their front if it saw them from behind.
+    """Aim the camera at some points, from the front if it would see them from behind.
 
     Parameters
     ----------
     state : AppState
-        Holds the camera, which moves at once.
+        State with the camera, which moves at once.
     points : (N, 3)
         Scene space.
     facing : (3,)

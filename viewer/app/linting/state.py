@@ -21,13 +21,13 @@ class Checked:
     source : Scene
         The scene that the window shows.
     scene : Scene
-        A copy of it as it was when the check began.
+        A copy of the scene, made when the check began.
     options : LintOptions
         Limits of the check.
     findings : tuple of Finding
         Findings, most severe first.
     n_files : int
-        Number of files of the scene, which were read again.
+        Number of files of the scene that were read again.
     notes : tuple of str
         Changes of these files since they were opened.
     """
@@ -57,13 +57,13 @@ class Linting:
     options : LintOptions
         Limits of the next check.
     checked : Checked or None
-        The last check that ended.
+        The last completed check.
     running : Running or None
         The check in progress.
     was_shown : bool
-        Whether the panel was ever shown: the first time it starts a check.
+        Whether the panel has been shown before: showing it for the first time starts a check.
     severities : set of str
-        Severities that are listed.
+        Severities to list.
     text : str
         Text that listed findings must contain.
     chosen : int

@@ -23,9 +23,9 @@ class Block:
     kind : str
         ``"title"``, ``"heading"``, ``"text"``, ``"item"``, ``"code"`` or ``"table"``.
     text : str
-        One line of text to wrap, or all lines of code; empty for tables.
+        One line of text to wrap, or all lines of a code block; empty for tables.
     rows : tuple of tuples of str
-        Cells of a table, the header first.
+        Cells of a table; the header comes first.
     """
 
     kind: str

@@ -8,6 +8,7 @@ from functools import partial
 
 from imgui_bundle import imgui
 
+from viewer.app.core.key_names import key_name
 from viewer.app.core.reasons import no_panel, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.features import ACTIONS, KEYS, PANELS
@@ -35,13 +36,13 @@ class Entry:
     text : str
         Name of the entry.
     kind : str
-        Category, in one word.
+        Category in one word.
     run : callable
         Called with the state.
     key : str
         Keyboard shortcut; empty for none.
     why : str
-        Why the entry cannot be run now; empty if it can.
+        Reason why the entry cannot be run now; empty if it can.
     """
 
     text: str
@@ -63,7 +64,7 @@ def _actions(state: AppState) -> Iterator[Entry]:
                 key.text[0].upper() + key.text[1:],
                 "action",
                 key.run,
-                state.key_label(key.label),
+                key_name(state, key.label),
             )
     for action in ACTIONS:
         yield Entry(action.text, "action", action.run, why=action.reason(state))

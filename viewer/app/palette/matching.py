@@ -1,4 +1,4 @@
-"""Fuzzy matching of typed words with names."""
+"""Fuzzy matching of typed words against names."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _BOUNDARIES = " _-.:/#("
 
 
 def score(query: str, name: str) -> float:
-    """Return how well a name matches a query: the higher the better, negative if not at all.
+    """Return how well a name matches a query: higher is better, negative for no match.
 
-    Every word of the query must match: best at the start of a word of the name, next best inside
-    one, otherwise as letters in this order. Ties go to the shorter name.
+    Every word of the query must match: best at the start of a word in the name, next best inside a
+    word, otherwise as a sequence of letters. For ties, the shorter name comes first.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def _score_word(word: str, name: str) -> float:
 
 
 def _score_letters(word: str, name: str) -> float:
-    """Return the score of letters in order; those at starts of words and in runs count more."""
+    """Return the score of a sequence of letters; starts of words and runs count more."""
     points = _walk(word, name, True)
     points = _walk(word, name, False) if points < 0 else points
     return -1.0 if points < 0 else _SCATTERED * points / (2.0 * len(word))

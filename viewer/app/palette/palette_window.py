@@ -91,7 +91,7 @@ def _is_closed() -> bool:
 
 
 def _draw_content(state: AppState, palette: Palette) -> Entry | None:
-    """Draw text box and rows; return the entry to run."""
+    """Draw the text box and the rows; return the entry to run."""
     if not palette.has_focus:
         imgui.set_keyboard_focus_here()
     imgui.set_next_item_width(-1.0)
@@ -125,7 +125,7 @@ def _draw_rows(state: AppState, palette: Palette, moved: bool) -> Entry | None:
     """Draw the rows in view; return the entry that was clicked."""
     chosen, count = None, len(palette.shown)
     if not count:
-        imgui.text_disabled("nothing has a name like this")
+        imgui.text_disabled("no entry matches")
         return None
     height = imgui.get_text_line_height_with_spacing()
     if imgui.begin_child("##rows", (0.0, min(count, _ROWS) * height + 4.0)):
@@ -152,7 +152,7 @@ def _reveal(top: float, height: float) -> None:
 
 
 def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
-    """Draw an entry with its kind, and its key or why it is disabled; return if it was clicked."""
+    """Draw an entry with its kind, and its key or reason; return whether it was clicked."""
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
     flags = imgui.SelectableFlags_.disabled if entry.why else imgui.SelectableFlags_.none
     clicked = imgui.selectable(f"{entry.text}##row{row}", is_chosen, flags)[0]

@@ -29,18 +29,18 @@ def foreign_rate(state: AppState) -> str:
     clock = state.clock
     if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
         return ""
-    return "the frames come from another motion: select its actor"
+    return "the frames are those of another motion: select its actor"
 
 
 def set_rate(state: AppState, rate: float) -> None:
     """Set the frame rate of the chosen actor and of all people of its capture.
 
-    Keyed clips have no frames: for them only the rate for stepping and frame numbers is set.
+    Keyed clips have no frames: only the rate for stepping and frame numbers is set for them.
 
     Parameters
     ----------
     state : AppState
-        Holds the actors; their clips are replaced, so that the edit can be undone.
+        State with the actors; their clips are replaced, so that the edit can be undone.
     rate : float
         Frames per second; a rate outside ``LIMITS`` is rejected with a message.
     """

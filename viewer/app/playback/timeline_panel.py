@@ -5,9 +5,11 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.clock import FASTEST, MODES
-from viewer.app.core.fields import begin_field
+from viewer.app.core.fields import begin_field, drag_int, in_row
+from viewer.app.core.key_names import key_name, with_key
 from viewer.app.core.reasons import no_motion
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import number_field, whole_field
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -27,7 +29,6 @@ from viewer.rig.number_text import number_text
 __all__ = ["draw"]
 
 _CLAMP = imgui.SliderFlags_.always_clamp
-_TYPED = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
 
 
 def draw(state: AppState) -> None:
@@ -48,35 +49,35 @@ def _draw_transport(state: AppState) -> None:
     clock = state.clock
     if button(state, "|<"):
         go_to_end(state, last=False)
-    explain("first frame (Home)")
+    explain(with_key(state, "first frame of the range", "Home"))
     imgui.same_line()
     if button(state, "<"):
         step(state, -1)
-    explain("one frame back (Left)")
+    explain(with_key(state, "one frame back", "Left"))
     imgui.same_line()
-    # Both labels get the same width, or the following buttons would move.
+    # Both labels have the same width, or the following buttons would move.
     width = imgui.calc_text_size("Pause").x + 2 * imgui.get_style().frame_padding.x
     if imgui.button("Pause###play" if clock.playing else "Play###play", (width, 0.0)):
         play(state)
     note_item(state, "Play")
-    explain("play or pause (Space)")
+    explain(with_key(state, "play or pause", "Space"))
     imgui.same_line()
     if button(state, ">"):
         step(state, 1)
-    explain("one frame forward (Right)")
+    explain(with_key(state, "one frame forward", "Right"))
     imgui.same_line()
     if button(state, ">|"):
         go_to_end(state, last=True)
-    explain("last frame (End)")
+    explain(with_key(state, "last frame of the range", "End"))
 
 
 def _draw_place(state: AppState) -> None:
     clock = state.clock
     shown = clock.frame + clock.first_frame
-    changed, frame = imgui.input_int(begin_field("Frame##frame", 4.5), shown, 0, 0)
+    frame = whole_field(state, begin_field("Frame##frame", 4.5), shown)
     note_item(state, "Frame")
     explain("current frame")
-    if changed and frame != shown:
+    if frame is not None and frame != shown:
         clock.playing = False
         clock.seek(clock.frame_time(frame - clock.first_frame))
     first, last = (clock.first_frame + number for number in clock.frame_range)
@@ -86,22 +87,20 @@ def _draw_place(state: AppState) -> None:
 
 
 def _draw_rate(state: AppState) -> None:
-    """Draw the field of the frame rate, which Enter applies."""
+    """Draw the field of the frame rate."""
     foreign = foreign_rate(state)
     with disabled(foreign):
-        entered, typed = imgui.input_double(
-            begin_field("Frames per second##rate", 4.0), rate_of(state), 0.0, 0.0, "%.6g", _TYPED
-        )
+        typed = number_field(state, begin_field("Frames per second##rate", 4.0), rate_of(state))
         note_item(state, "Frame rate")
-        explain("press Enter to play the same frames faster or slower", foreign)
-    if entered:
+        explain("play the same frames faster or slower", foreign)
+    if typed is not None:
         set_rate(state, typed)
 
 
 def _draw_settings(state: AppState) -> None:
     clock = state.clock
     clock.mode = choice(state, "Mode", clock.mode, MODES, width=7.0)
-    explain("what happens at the end of the range")
+    explain("behaviour at the end of the range")
     if clock.mode != "run on":
         clock.time = min(max(clock.time, clock.whole[0]), clock.whole[1])
     same_line_if_room("M" * 12)
@@ -110,7 +109,7 @@ def _draw_settings(state: AppState) -> None:
     )
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.speed = 1.0
-    explain("seconds of motion per second; right-click resets it to 1")
+    explain("seconds of motion per second; right-click to reset to 1")
     same_line_if_room("M" * 14)
     _draw_range(state)
     same_line_if_room("Interpolate gaps")
@@ -127,16 +126,26 @@ def _draw_range(state: AppState) -> None:
     first = round((clock.start - origin) * rate) + clock.first_frame
     last = round((clock.end - origin) * rate) + clock.first_frame
     lowest, highest = (clock.first_frame + number for number in clock.frame_range)
-    changed, low, high = imgui.drag_int_range2(
-        begin_field("Range", 9.0), first, last, 0.3, lowest, highest
-    )
+    moved: dict[bool, int] = {}
+
+    def draw_end(hidden: str, frame: int) -> None:
+        is_last = hidden.endswith("1")
+        limits = (first, highest) if is_last else (lowest, last)
+        changed, typed = drag_int(state, hidden, frame, limits)
+        if changed:
+            moved[is_last] = typed
+
+    in_row(begin_field("Range", 9.0), (first, last), draw_end)
     note_item(state, "Range")
-    text = "frames to play; I and O set them to the current frame, right-click resets them to all"
-    explain(text)
+    first_key, last_key = key_name(state, "I"), key_name(state, "O")
+    text = f"frames to play; {first_key} and {last_key} set them to the current frame"
+    explain(f"{text}\nright-click resets them to all frames")
     if imgui.is_item_clicked(imgui.MouseButton_.right):
         clock.set_range(*clock.whole)
-    elif changed:
+    elif moved:
         # An untouched end keeps its exact time.
-        start = clock.frame_time(low - clock.first_frame) if low != first else clock.start
-        end = clock.frame_time(high - clock.first_frame) if high != last else clock.end
+        start, end = (
+            clock.frame_time(moved[is_last] - clock.first_frame) if is_last in moved else kept
+            for is_last, kept in ((False, clock.start), (True, clock.end))
+        )
         clock.set_range(start, end)

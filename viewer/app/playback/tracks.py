@@ -33,7 +33,7 @@ _LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
 
 
 def draw_tracks(state: AppState) -> None:
-    """Draw the ruler and the tracks; dragging moves the time by whole frames, with Alt freely."""
+    """Draw the ruler and the tracks; dragging moves by whole frames, with Alt continuously."""
     size = imgui.get_font_size()
     moving = [index for index, actor in enumerate(state.scene.actors) if actor.clip is not None]
     height = imgui.get_text_line_height_with_spacing()
@@ -116,7 +116,7 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
     Parameters
     ----------
     places : sequence of float
-        Start and end of each bar in turn, in points.
+        Start and end of each bar, alternating, in points.
     narrowest : float
         Smallest width of a bar, unless its neighbours leave less room.
     end : float

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import note_item, plain_zero
+from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
 from viewer.app.posing.state import HeldVector, Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -27,7 +27,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
 
-_SAME = 1e-9  # tolerance within which rotations are equal
+_SAME = 1e-9  # tolerance within which rotations are considered equal
 _rotations: Memo[Skeleton, Floats] = Memo()
 _numbers: Memo[Skeleton, Floats] = Memo()
 
@@ -52,6 +52,7 @@ def draw_vector_component(
     text = "%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad"
     reach = math.pi * factor
     changed, moved = slider_float(
+        state,
         f"##vector{joint}.{axis}",
         plain_zero(float(vector[axis]) * factor, text),
         -reach,
@@ -61,7 +62,7 @@ def draw_vector_component(
     note_item(state, f"{label}.r{'xyz'[axis]}")
     is_reset = False
     if imgui.is_item_hovered():
-        imgui.set_tooltip(
+        show_tooltip(
             f"{label}: component of the rotation vector\n"
             "Ctrl+click to type a value, double-click to set it to 0"
         )
@@ -75,7 +76,7 @@ def draw_vector_component(
 
 
 def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Floats:
-    """Return a joint's rotation vector: the edited one as long as it matches the rotation."""
+    """Return a joint's rotation vector: the edited vector as long as it matches the rotation."""
     posing = state.of(Posing)
     assert figure.skeleton is not None  # checked by the caller
     rotation = _rotations_of(figure.skeleton, pose)[joint]
@@ -88,7 +89,7 @@ def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Fl
 
 
 def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) -> None:
-    """Draw the three values that the body model's pose vector holds for a joint."""
+    """Draw the three values of a joint in the body model's pose vector."""
     layout, skeleton = figure.pose_layout, figure.skeleton
     if layout is None or skeleton is None:
         return
@@ -100,9 +101,7 @@ def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) ->
     note_item(state, f"own {joint}")
     if imgui.is_item_hovered():
         start = int(layout.starts[joint])
-        imgui.set_tooltip(
-            f"numbers {start} to {start + 2} of the file's pose vector: {kind}, radians"
-        )
+        show_tooltip(f"numbers {start} to {start + 2} of the file's pose vector: {kind}, radians")
 
 
 def _rotations_of(skeleton: Skeleton, pose: Pose) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import search_field
 from viewer.app.core.widgets import note_item
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.phrases import printable
@@ -24,7 +25,7 @@ def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> 
     Parameters
     ----------
     state : AppState
-        Holds the filter and the smallest confidence that is drawn.
+        State with the filter and the smallest confidence that is drawn.
     actor : Actor
         Actor that consists of captured points.
     layout : PointLayout
@@ -39,9 +40,8 @@ def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> 
     imgui.text_disabled(_seen_text(state, points))
     imgui.pop_text_wrap_pos()
     imgui.set_next_item_width(-1.0)
-    joint_tree(state).filter = imgui.input_text_with_hint(
-        "##filter", "Filter points", joint_tree(state).filter
-    )[1]
+    tree = joint_tree(state)
+    tree.filter = search_field("##filter", tree.filter, "Filter points")
     note_item(state, "Filter")
     wanted = joint_tree(state).filter.lower()
     shown = [row for row, name in enumerate(layout.names) if wanted in name.lower()]

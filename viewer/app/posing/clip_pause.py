@@ -9,12 +9,12 @@ __all__ = ["pause_for_edit"]
 
 
 def pause_for_edit(state: AppState) -> None:
-    """Pause a clip that would overwrite the chosen actor's pose in the next frame, with a message.
+    """Pause a clip that would overwrite the chosen actor's pose in the next frame; show a message.
 
     Parameters
     ----------
     state : AppState
-        Holds the chosen actor, which is about to be posed. Nothing happens if no clip drives it.
+        State with the chosen actor, which is about to be posed; unchanged if no clip drives it.
     """
     clip, clock = state.actor.clip, state.clock
     if clip is None:

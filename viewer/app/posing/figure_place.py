@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import note_item, plain_zero
+from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
 from viewer.rig.mesh import box_size
 from viewer.rig.pose import Pose
 
@@ -36,10 +36,12 @@ def _row(state: AppState, name: str, value: float, low: float, high: float, rest
     imgui.text_disabled(name)
     imgui.same_line(4.2 * imgui.get_font_size())
     imgui.set_next_item_width(-1.0)
-    changed, moved = slider_float(f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f")
+    changed, moved = slider_float(
+        state, f"##figure {name}", plain_zero(value, "%.4f"), low, high, "%.4f"
+    )
     note_item(state, f"figure.{name}")
     if imgui.is_item_hovered():
-        imgui.set_tooltip(f"figure.{name}\nCtrl+click to type a value, double-click to reset")
+        show_tooltip(f"figure.{name}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             return rest
     return moved if changed and math.isfinite(moved) and abs(moved) < 1e9 else value

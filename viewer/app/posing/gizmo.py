@@ -1,7 +1,7 @@
 """Picking, dragging and releasing of handles in the view.
 
-ImGuizmo rotates matrices about three orthogonal axes; joints here have one, two or three DOFs
-about axes that may be oblique, with limits, so the rings and arrows are custom.
+ImGuizmo rotates matrices about three orthogonal axes; joints here have one, two or three DOFs with
+limits, about axes that may be oblique, so rings and arrows are custom.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     Parameters
     ----------
     state : AppState
-        Holds the tool, the actor and the selected joint.
+        State with the tool, the actor and the selected joint.
     frame : ViewFrame
         Projection of the scene.
     place : (float, float)
@@ -188,7 +188,7 @@ def _middle(state: AppState, posed: PosedJoint, place: Place) -> Handle | None:
 
 
 def joint_places(state: AppState) -> Floats:
-    """Return the projections of the chosen actor's joints: (J, 2), NaN for those behind the eye."""
+    """Return the projections of the chosen actor's joints: (J, 2), NaN if behind the eye."""
     posed = posed_joint(state.actor, 0)
     if posed is None:
         return np.zeros((0, 2))

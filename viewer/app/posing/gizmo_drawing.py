@@ -1,6 +1,6 @@
 """Drawing of the handles: joints, chain, limit arcs, rings, arrows, and their labels.
 
-Like the image of the scene they are drawn behind the panels, so they must be drawn after it.
+Like the image of the scene, they are drawn behind the panels, so they must be drawn after it.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def draw_gizmo(state: AppState) -> None:
 
 
 def _drag(state: AppState) -> Drag | None:
-    """Return the handle that is held, None once cancelled."""
+    """Return the handle that is held; None if the drag was cancelled."""
     drag = state.of(Posing).drag
     return None if drag is None or drag.is_over else drag
 
@@ -128,7 +128,7 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
     is_free = _drag(state) is None and not io.want_capture_mouse
     under = joint_at(state, (io.mouse_pos.x, io.mouse_pos.y)) if is_free else -1
     skeleton = state.actor.figure.skeleton
-    # A click selects a joint even under a handle, which is used by dragging only.
+    # A click selects a joint even under a handle, which is only used by dragging.
     if under >= 0 and skeleton is not None:
         x, y = places[under].tolist()
         pen.list.add_circle((x, y), 7.0, imgui.get_color_u32((*_HOT, 1.0)), 0, 2.0)
@@ -172,7 +172,7 @@ def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | Non
 
 
 def _draw_ring(pen: _Pen, center: Floats, ring: Ring, is_hot: bool) -> None:
-    """Draw a ring, its far side faintly."""
+    """Draw a ring, with a faint far side."""
     unit, eye = pen.frame.unit_length(center), toward_eye(pen.frame, center)
     points = circle(center, ring.axis, ring.size * unit)
     color, thickness = (_HOT, 4.0) if is_hot else (_AXES[ring.color], 2.5)
@@ -262,7 +262,7 @@ def _draw_arrow(pen: _Pen, center: Floats, arrow: Arrow, is_hot: bool) -> None:
 
 
 def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
-    """Draw the text with the result of the drag, and the limits that restrict it."""
+    """Draw the result of the drag as text, with the limits that restrict it."""
     center, drag = pen.frame.place(posed.center), _drag(state)
     if center is None or drag is None or not drag.outcome.text:
         return

@@ -35,6 +35,7 @@ def draw(state: AppState) -> None:
         return
     most = min(len(hand.components) for hand in figure.hands)
     changed, count = slider_int(
+        state,
         begin_field("Components##components"),
         min(posing.n_hand_components, most),
         1,
@@ -45,7 +46,7 @@ def draw(state: AppState) -> None:
     note_item(state, "components")
     if changed:
         posing.n_hand_components = count
-    if imgui.begin_child("hands", (0.0, 0.0)):
+    if imgui.begin_child("hands", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         for hand in figure.hands:
             _draw_hand(state, figure, pose, hand)
     imgui.end_child()
@@ -65,7 +66,7 @@ def _draw_hand(state: AppState, figure: Figure, pose: Pose, hand: Hand) -> None:
     for index in range(min(state.of(Posing).n_hand_components, len(hand.components))):
         field = begin_field(f"{side.capitalize()} {index}##{side} {index}")
         shown = plain_zero(float(values[index]), "%.2f")
-        changed, value = slider_float(field, shown, -_REACH, _REACH)
+        changed, value = slider_float(state, field, shown, -_REACH, _REACH)
         note_item(state, f"{side} component {index}")
         if changed and math.isfinite(value) and abs(value) < 1e3:
             # The other components, and the residual outside their span, stay unchanged.

@@ -10,7 +10,7 @@ from viewer.rig.skeleton import joint_label
 
 __all__ = ["JointTree", "joint_tree", "select_joint"]
 
-_MOST_OPENED = 128  # largest rig that is fully open at first
+_MOST_OPENED = 128  # maximum number of joints of a rig that is initially expanded
 
 
 @dataclass(slots=True)
@@ -24,7 +24,7 @@ class JointTree:
     opened : set of int
         Joints whose DOFs and children are listed.
     scrolls_to : int
-        Joint to scroll to, -1 for none.
+        Joint to which the list scrolls, -1 for none.
     n_choices : int
         The state's ``n_choices`` for which filter and open rows are valid.
     """
@@ -45,7 +45,7 @@ def joint_tree(state: AppState) -> JointTree:
 
 
 def _first_opened(actor: Actor) -> set[int]:
-    """Return the joints whose rows are open at first: all of a small rig, otherwise the roots."""
+    """Return the joints that are initially expanded: all of a small rig, otherwise the roots."""
     skeleton = actor.figure.skeleton
     if skeleton is None:
         return set()

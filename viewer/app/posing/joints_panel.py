@@ -10,7 +10,9 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
 from viewer.app.core.ink import ink
+from viewer.app.core.key_names import with_key
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import search_field
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -19,6 +21,7 @@ from viewer.app.core.widgets import (
     note_item,
     plain_zero,
     same_line_if_room,
+    show_tooltip,
 )
 from viewer.app.curves.state import Curves
 from viewer.app.posing.ball_joint import draw_own_numbers, draw_vector_component, is_ball
@@ -48,7 +51,7 @@ __all__ = ["draw", "rows"]
 Rows: TypeAlias = tuple[tuple[int, int, int], ...]
 
 OWN_NUMBERS = -2
-"""Value in place of a DOF for the row with the raw pose values of the body model."""
+"""Value used instead of a DOF for the row with the raw pose values of the body model."""
 
 _FIRST_ROTATION = 3
 _INDENT = 9.0  # points per level
@@ -77,7 +80,7 @@ def draw(state: AppState) -> None:
         return
     _draw_head(state)
     skeleton = actor.figure.skeleton
-    if not imgui.begin_child("joints", (0.0, 0.0)):
+    if not imgui.begin_child("joints", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         imgui.end_child()
         return
     draw_figure_place(state, actor.pose)
@@ -127,11 +130,10 @@ def _draw_actor_choice(state: AppState) -> None:
 def _draw_head(state: AppState) -> None:
     posing = state.of(Posing)
     imgui.set_next_item_width(-1.0)
-    joint_tree(state).filter = imgui.input_text_with_hint(
-        "##filter", "Filter joints", joint_tree(state).filter
-    )[1]
+    tree = joint_tree(state)
+    tree.filter = search_field("##filter", tree.filter, "Filter joints")
     note_item(state, "Filter")
-    if button(state, "Reset (R)"):
+    if button(state, with_key(state, "Reset", "R")):
         reset_pose(state)
     same_line_if_room("Pose…")
     if button(state, "Pose…"):
@@ -268,7 +270,7 @@ def _draw_dof(
     imgui.end_disabled()
     note_item(state, f"{label}.{name}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        imgui.set_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind, state.in_degrees)}")
+        show_tooltip(f"{label}.{name}\n{_limits_text(low, high, kind, state.in_degrees)}")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left) and not locked:
             value = float(skeleton.rest_dofs[dof])
     if imgui.begin_popup_context_item(f"menu of DOF {dof}"):
@@ -297,6 +299,7 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
         text += "  locked"
     bounded = math.isfinite(low) and math.isfinite(high)
     changed, moved = slider_float(
+        state,
         f"##dof{dof}",
         plain_zero(float(pose.dofs[dof]) * factor, text),
         (low if math.isfinite(low) else min(-unlimited, high - unlimited)) * factor,

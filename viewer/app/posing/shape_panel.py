@@ -8,7 +8,15 @@ from imgui_bundle import imgui
 from viewer.app.core.fields import begin_field, slider_float
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, checkbox, note_item, plain_zero, same_line_if_room
+from viewer.app.core.text_fields import whole_field
+from viewer.app.core.widgets import (
+    button,
+    checkbox,
+    note_item,
+    plain_zero,
+    same_line_if_room,
+    show_tooltip,
+)
 from viewer.app.posing.pose_actions import random_shape, reset_shape
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
@@ -48,15 +56,15 @@ def draw(state: AppState) -> None:
         skinning = state.options.skinning
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
     imgui.separator()
-    if imgui.begin_child("coefficients", (0.0, 0.0)):
+    if imgui.begin_child("coefficients", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         _draw_coefficients(state, figure, pose)
     imgui.end_child()
 
 
 def _draw_seed(state: AppState) -> None:
-    changed, seed = imgui.input_int(begin_field("Seed##seed"), state.of(Posing).shape_seed)
+    seed = whole_field(state, begin_field("Seed##seed"), state.of(Posing).shape_seed)
     note_item(state, "seed")
-    if changed and seed != state.of(Posing).shape_seed:
+    if seed is not None and seed != state.of(Posing).shape_seed:
         state.of(Posing).shape_seed = max(seed, 0)
         random_shape(state)
 
@@ -112,6 +120,7 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
     is_morph = shapes is not None and shapes.groups[index] == MORPH_GROUP
     low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
     changed, value = slider_float(
+        state,
         begin_field(f"{shown}##{index}", column=column),
         plain_zero(float(pose.shape_weights[index]), "%.2f"),
         low,
@@ -125,7 +134,7 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
         _draw_marks()
     if imgui.is_item_hovered():
         unit = "at 1 the full morph" if is_morph else "standard deviations"
-        imgui.set_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
+        show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             pose.shape_weights[index] = 0.0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from viewer.app.core.key_names import with_key
 from viewer.app.core.reasons import no_pose
 from viewer.app.core.state import AppState
 from viewer.app.curves.clip_actions import key_present_pose
@@ -116,7 +117,7 @@ def chain_length(state: AppState) -> int:
 def no_chain(state: AppState) -> str:
     """Return why the length of the chain cannot be chosen."""
     if state.of(Posing).tool != "move":
-        return "chains apply only to the Move tool (D)"
+        return with_key(state, "chains apply only to the Move tool", "D")
     skeleton = state.actor.figure.skeleton
     if skeleton is None or state.selected_joint < 0:
         return "select a joint"

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_int
 from viewer.app.core.ink import accent
+from viewer.app.core.key_names import with_key
 from viewer.app.core.reasons import no_pose
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect, choice, disabled, explain, note_item, overlay_rect
@@ -73,7 +74,7 @@ def _draw_tools(state: AppState) -> None:
         is_on = state.of(Posing).tool == tool
         if is_on:
             imgui.push_style_color(imgui.Col_.button, accent())
-        pressed = _button(state, name, width, f"{text} ({key})", why)
+        pressed = _button(state, name, width, with_key(state, text, key), why)
         if is_on:
             imgui.pop_style_color()
         if pressed:
@@ -101,7 +102,7 @@ def _draw_settings(state: AppState) -> None:
     with disabled(why):
         width = _item_width(2 if has_chain else 1) / imgui.get_font_size()
         posing.orientation = choice(state, "##axes", posing.orientation, ORIENTATIONS, width)
-        explain("orientation of the rings and arrows (X)", why)
+        explain(with_key(state, "orientation of the rings and arrows", "X"), why)
     if has_chain:
         imgui.same_line()
         _draw_chain(state)
@@ -113,7 +114,13 @@ def _draw_chain(state: AppState) -> None:
     with disabled(why):
         imgui.set_next_item_width(_item_width(2))
         changed, length = slider_int(
-            "##chain", chain_length(state), 1, longest, "chain %d", imgui.SliderFlags_.always_clamp
+            state,
+            "##chain",
+            chain_length(state),
+            1,
+            longest,
+            "chain %d",
+            imgui.SliderFlags_.always_clamp,
         )
         note_item(state, "Chain")
         explain("number of joints above the dragged joint that may rotate", why)
@@ -124,10 +131,11 @@ def _draw_chain(state: AppState) -> None:
 def _draw_actions(state: AppState) -> None:
     """Draw the buttons of actions on the whole pose."""
     why = no_pose(state)
+    paste = "paste a pose, also from another figure"
     rows = (
-        ("Mirror", mirror, "mirror the pose left to right (M)", why),
-        ("Copy", copy_pose, "copy the pose (Ctrl+C)", why),
-        ("Paste", paste_pose, "paste a pose, also from another figure (Ctrl+V)", why),
+        ("Mirror", mirror, with_key(state, "mirror the pose left to right", "M"), why),
+        ("Copy", copy_pose, with_key(state, "copy the pose", "Ctrl+C"), why),
+        ("Paste", paste_pose, with_key(state, paste, "Ctrl+V"), why),
         ("Key", key_pose_now, "key the pose at the current time", no_keys(state)),
     )
     for number, (name, action, text, reason) in enumerate(rows):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.core.key_names import KeyNames
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS
 from viewer.app.preferences.key_map import label_of
@@ -70,4 +71,5 @@ def follow_preferences(state: AppState) -> None:
         applied.font_size = preferences.font_size
     if preferences.keys != applied.keys:
         applied.keys = dict(preferences.keys)
-        state.key_labels = {key.label: label_of(key, preferences.keys) for key in KEYS}
+        names = {key.label: label_of(key, preferences.keys) for key in KEYS}
+        state.of(KeyNames).changed = {usual: name for usual, name in names.items() if name != usual}

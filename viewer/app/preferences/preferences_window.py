@@ -99,7 +99,7 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
         explain("automatic follows the scale of the monitor", why)
     preferences.scale = float(chosen)
     changed, size = slider_float(
-        begin_field("Font size"), preferences.font_size, *FONT_SIZES, "%.0f", _ALWAYS_CLAMP
+        state, begin_field("Font size"), preferences.font_size, *FONT_SIZES, "%.0f", _ALWAYS_CLAMP
     )
     note_item(state, "Font size")
     if changed:

@@ -7,9 +7,10 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following
-from viewer.app.core.fields import begin_field
+from viewer.app.core.fields import begin_field, in_row
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import number_field, whole_field
 from viewer.app.core.widgets import (
     begin_window,
     button,
@@ -115,9 +116,8 @@ def _draw_file(state: AppState, settings: RecordSettings) -> None:
 def _draw_picture(state: AppState, settings: RecordSettings) -> None:
     settings.size = choice(state, "Size", settings.size, _SIZES)
     if settings.size == "own":
-        changed, size = imgui.input_int2(begin_field("Pixels"), list(settings.own_size))
-        note_item(state, "Pixels")
-        if changed:
+        size = _pair_field(state, "Pixels", settings.own_size)
+        if size is not None:
             width, height = (min(max(side, LEAST_PIXELS), _MOST_PIXELS) for side in size)
             settings.own_size = width, height
     looks = {"": "as the view, at most Normal for motions", **QUALITIES}
@@ -144,20 +144,20 @@ def _draw_frames(state: AppState, settings: RecordSettings) -> None:
     else:
         shown = settings.rate or clock.frame_rate
         field = begin_field("Frames per second")
-        changed, rate = imgui.input_float(field, shown, 0.0, 0.0, "%.3f")
+        rate = number_field(state, field, shown)
         note_item(state, "Frames per second")
-        if changed and 0.01 <= rate <= 1000.0:
-            settings.rate = rate
+        if rate is not None:
+            settings.rate = _within(state, rate, 0.01, 1000.0)
     if clock.has_motion:
         _draw_range(state, settings)
     settings.turntable = checkbox(state, "Turntable", settings.turntable)
     explain("orbit once around the scene")
     if settings.turntable and not clock.has_motion:
         field = begin_field("Seconds")
-        changed, seconds = imgui.input_float(field, settings.seconds, 0.0, 0.0, "%.2f s")
+        seconds = number_field(state, field, settings.seconds, "%.2f s")
         note_item(state, "Seconds")
-        if changed and 0.05 <= seconds <= 3600.0:
-            settings.seconds = seconds
+        if seconds is not None:
+            settings.seconds = _within(state, seconds, 0.05, 3600.0)
     why = "" if state.of(Following).target is not None else "start it in the Actors panel"
     follows = settings.follows and not why
     chosen = checkbox(state, "Follow the followed actor###follow", follows, why)
@@ -171,12 +171,35 @@ def _draw_range(state: AppState, settings: RecordSettings) -> None:
     clock = state.clock
     lowest, highest = (clock.first_frame + frame for frame in clock.frame_range)
     shown = settings.frames or _playback_frames(state)
-    changed, found = imgui.input_int2(begin_field("First and last frame"), list(shown))
-    note_item(state, "First and last frame")
+    found = _pair_field(state, "First and last frame", shown)
     explain("the playback range, unless other frames are entered")
-    if changed:
+    if found is not None:
         first, last = sorted(min(max(frame, lowest), highest) for frame in found)
         settings.frames = first, last
+
+
+def _pair_field(state: AppState, label: str, values: tuple[int, int]) -> tuple[int, int] | None:
+    """Draw two fields for whole numbers; return both once one was entered."""
+    found = list(values)
+    entered = []
+
+    def draw(hidden: str, column: int) -> None:
+        number = whole_field(state, hidden, values[column])
+        if number is not None:
+            found[column] = number
+            entered.append(column)
+
+    in_row(begin_field(label), range(2), draw)
+    note_item(state, label)
+    return (found[0], found[1]) if entered else None
+
+
+def _within(state: AppState, value: float, low: float, high: float) -> float:
+    """Return a value limited to a range, and say so if it was not within it."""
+    limited = min(max(value, low), high)
+    if limited != value:
+        state.say_status(f"limited to {number_text(limited)}")
+    return limited
 
 
 def _playback_frames(state: AppState) -> tuple[int, int]:

@@ -25,7 +25,7 @@ class RecordedMarks:
     Parameters
     ----------
     state : AppState
-        Holds both; they are copied, so later changes have no effect.
+        State with the marks and the explanation; they are copied, so later changes have no effect.
     """
 
     def __init__(self, state: AppState) -> None:

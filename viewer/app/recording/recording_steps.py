@@ -41,7 +41,7 @@ def recording_steps(
     Parameters
     ----------
     state : AppState
-        Holds the scene, which is copied: later edits do not affect the recording.
+        State with the scene, which is copied: later edits do not affect the recording.
     context : moderngl.Context
         Context that is current in every step.
     settings : RecordSettings

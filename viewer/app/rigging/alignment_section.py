@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 from imgui_bundle import imgui
 
-from viewer.app.core.fields import begin_field
+from viewer.app.core.fields import begin_field, in_row
 from viewer.app.core.ink import WARNING, ink
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import number_field
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -185,25 +185,27 @@ def _inputs(
     state: AppState, shift: Floats, angles: Floats, scale: float
 ) -> tuple[Floats | None, Floats | None, float | None]:
     """Draw the input fields; return the values that were typed, None for unchanged fields."""
-    flags = imgui.InputTextFlags_.enter_returns_true
-    typed: list[Floats | None] = []
-    for label, values, digits in (
-        ("Translation", shift, "%.4g"),
-        ("Rotation (degrees)", angles, "%.2f"),
-    ):
-        changed, new = imgui.input_float3(
-            begin_field(label),
-            [plain_zero(value, digits) for value in values.tolist()],
-            digits,
-            flags,
-        )
-        note_item(state, label)
-        is_valid = changed and bool(np.isfinite(new).all())
-        typed.append(np.array(new, dtype=np.float64) if is_valid else None)
-    changed, size = imgui.input_float(begin_field("Scale factor"), scale, 0.0, 0.0, "%.6g", flags)
+    moved = _vector_field(state, "Translation", shift, "%.4g")
+    rotated = _vector_field(state, "Rotation", angles, "%.2f\N{DEGREE SIGN}")
+    size = number_field(state, begin_field("Scale factor"), scale)
     note_item(state, "Scale factor")
-    is_valid = changed and math.isfinite(size) and size > 0.0
-    return typed[0], typed[1], size if is_valid else None
+    return moved, rotated, size if size is not None and size > 0.0 else None
+
+
+def _vector_field(state: AppState, label: str, values: Floats, text: str) -> Floats | None:
+    """Draw three number fields; return the vector with the number that was entered, if any."""
+    entered = values.copy()
+    found = []
+
+    def draw(hidden: str, axis: int) -> None:
+        number = number_field(state, hidden, plain_zero(float(values[axis]), text), text)
+        if number is not None:
+            entered[axis] = number
+            found.append(axis)
+
+    in_row(begin_field(label), range(3), draw)
+    note_item(state, label)
+    return entered if found else None
 
 
 def _move(state: AppState, template: Template, similarity: Similarity) -> None:

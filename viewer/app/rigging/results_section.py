@@ -7,6 +7,7 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from viewer.app.core.ink import WARNING, ink
+from viewer.app.core.key_names import key_name, with_key
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
@@ -43,7 +44,7 @@ def draw_results(state: AppState) -> None:
     """Draw the choice of version and colours, the statistics of each method, and the report."""
     why, result = no_results(state), shown_result(state)
     if why or result is None:
-        imgui.text_wrapped("The rig was undone; Ctrl+Shift+Z restores it.")
+        imgui.text_wrapped(f"The rig was undone; {key_name(state, 'Ctrl+Shift+Z')} restores it.")
         return
     _draw_versions(state)
     _draw_colors(state)
@@ -80,7 +81,7 @@ def _draw_versions(state: AppState) -> None:
         if imgui.radio_button(f"{text}###version {name}", name == shown) and name != shown:
             show_version(state, name)
         note_item(state, f"version {name}")
-        explain("A cycles through them")
+        explain(with_key(state, "cycle through the versions", "A"))
 
 
 def _draw_colors(state: AppState) -> None:

@@ -46,7 +46,7 @@ def use_gizmo(state: AppState, template: Template) -> None:
     Parameters
     ----------
     state : AppState
-        Holds a target, and a tool other than landmarks.
+        State with a target, and a tool other than landmarks.
     template : Template
         Template in its current pose.
     """

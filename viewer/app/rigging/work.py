@@ -140,7 +140,7 @@ def start_reading(
     Parameters
     ----------
     state : AppState
-        Holds the chosen template, which is read if there are no paths.
+        State with the chosen template, which is read if there are no paths.
     paths : tuple of Path
         Files of the template.
     then : callable, optional
@@ -255,7 +255,7 @@ def landmark_settings(state: AppState, mesh: Mesh, refines: bool) -> AlignmentSe
     Parameters
     ----------
     state : AppState
-        Holds the landmarks.
+        State with the landmarks.
     mesh : Mesh
         Mesh of the posed template.
     refines : bool

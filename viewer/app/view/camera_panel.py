@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from viewer.app.core.key_names import with_key
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, choice, explain, note_item, slider
 from viewer.app.view.camera_actions import face, fit_view, look, look_through, toggle_projection
@@ -40,7 +41,7 @@ def draw(state: AppState) -> None:
     if checkbox(state, "Orthographic", camera.orthographic) != camera.orthographic:
         toggle_projection(state)
     imgui.same_line()
-    if button(state, "Fit (F)"):
+    if button(state, with_key(state, "Fit", "F")):
         fit_view(state)
     for number, name in enumerate(VIEWS):
         if number % 3:

@@ -54,7 +54,7 @@ def _draw_light(state: AppState, name: str, light: Light) -> None:
         ("inclination", "Elevation", -90.0, 90.0, "%.0f\N{DEGREE SIGN}"),
     ):
         shown = plain_zero(getattr(light, attribute), unit)
-        changed, value = slider_float(begin_field(text), shown, low, high, unit, _CLAMP)
+        changed, value = slider_float(state, begin_field(text), shown, low, high, unit, _CLAMP)
         note_item(state, f"{name} {text}")
         if changed:
             setattr(light, attribute, value)

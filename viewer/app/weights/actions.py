@@ -42,7 +42,7 @@ def no_view(state: AppState, key: str) -> str:
     Parameters
     ----------
     state : AppState
-        Holds the scene.
+        State with the scene.
     key : str
         A key of ``SCALARS``.
     """
@@ -150,7 +150,7 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
     Parameters
     ----------
     state : AppState
-        Holds the scene.
+        State with the scene.
     actor : int
         Index of the actor in the scene.
     vertex : int

@@ -53,7 +53,7 @@ def pinned_annotations(state: AppState, size: tuple[int, int]) -> tuple[Annotati
     Parameters
     ----------
     state : AppState
-        Holds the posed scene; a vertex that cannot be explained is unpinned.
+        State with the posed scene; a vertex that cannot be explained is unpinned.
     size : (int, int)
         Width and height of the image, pixels.
     """

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.key_names import with_key
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import button, checkbox, explain, note_item, same_line_if_room
 from viewer.app.posing.joint_tree import joint_tree
@@ -130,7 +131,7 @@ def _draw_head(state: AppState, one: Explanation) -> None:
     same_line_if_room("Unpin")
     if button(state, "Unpin"):
         unpin(state)
-    explain("unpin the vertex (Esc)")
+    explain(with_key(state, "unpin the vertex", "Esc"))
     same_line_if_room("Lines")
     weights.draws_lines = checkbox(state, "Lines", weights.draws_lines)
     explain("draw lines to the vertex as moved by each joint alone; thicker for larger weights")

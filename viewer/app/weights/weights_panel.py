@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from viewer.app.core.fields import begin_field
 from viewer.app.core.reasons import no_mesh
 from viewer.app.core.state import AppState
+from viewer.app.core.text_fields import number_field
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -151,12 +152,12 @@ def _end_field(
 ) -> float:
     """Draw a field for one end of the range; the ends keep their order."""
     hidden = begin_field(label, _FIELD)
-    changed, typed = imgui.input_double(hidden, plain_zero(value, "%.6g"), 0.0, 0.0, "%.6g")
+    typed = number_field(state, hidden, plain_zero(value, "%.6g"))
     note_item(state, label)
     if unit:
         imgui.same_line()
         imgui.text_disabled(unit)
-    return typed if changed and math.isfinite(typed) and above < typed < below else value
+    return typed if typed is not None and above < typed < below else value
 
 
 def _present_range(state: AppState) -> tuple[float, float]:

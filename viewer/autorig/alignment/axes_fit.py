@@ -24,7 +24,7 @@ def fit_axes(
 
     Each iteration solves for factors f, a shift t and, optionally, a small rotation w that minimise
     sum (n . (x - q))^2 + 1e-5 |x - q|^2 with x = f R p + f' (w x R p) + t, or with the template's
-    axes x = R f p + w x R f' p + t, in which f' are the factors so far: linear in all
+    axes x = R f p + w x R f' p + t, where f' are the current factors. This is linear in all
     unknowns.
 
     Parameters
@@ -34,7 +34,7 @@ def fit_axes(
     start : Similarity
         Approximate alignment, with one scale.
     rotations : bool
-        Whether the rotation is refined too: one found with a single scale is biased
+        Whether the rotation is also refined: a rotation found with a single scale is biased
         towards the stretched target's diagonal.
     own : bool
         Whether the axes are those of the template.
@@ -42,7 +42,8 @@ def fit_axes(
     Returns
     -------
     Similarity
-        With factors; the best so far if a fit would be a reflection, or too few pairs are left.
+        Alignment with factors; the best so far if a fit would be a reflection, or too few pairs are
+        left.
     """
     similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):

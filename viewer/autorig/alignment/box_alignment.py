@@ -14,10 +14,10 @@ _FLAT = 1e-9  # fraction of the longest side; a thinner box cannot be scaled to 
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:
-    """Return the map that aligns the bounding box of some points with that of others.
+    """Return the map that aligns the bounding box of one set of points with that of another.
 
-    p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is Tex-An Mesh's
-    rule; an axis along which both boxes are flat keeps its scale.
+    p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is the rule of
+    Tex-An Mesh; an axis along which both boxes are flat keeps its scale.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def align_boxes(positions: Floats, onto: Floats) -> Floats:
     Raises
     ------
     RigError
-        If a box is flat along an axis along which the other is not.
+        If only one of the boxes is flat along an axis.
 
     >>> align_boxes(np.array([[0.0, 0, 0], [2, 1, 1]]), np.array([[1.0, 1, 1], [2, 2, 2]])).tolist()
     [[0.5, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]]

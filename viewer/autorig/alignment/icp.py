@@ -1,8 +1,8 @@
 """Iterative closest point: match nearby points, fit, and match again.
 
 Besl and McKay 1992, with pairs from both surfaces, so that neither the scale nor a part
-missing from one of them biases the result. Near convergence surfaces may slide along
-each other (point-to-plane distances, Chen and Medioni 1992), which needs far fewer iterations.
+missing from one of them biases the result. Near convergence, surfaces may slide along each other
+(point-to-plane distances, Chen and Medioni 1992), which needs far fewer iterations.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Cloud:
         self.size = _size(dense.positions)
 
     def with_samples(self, samples: SurfaceSamples) -> Cloud:
-        """Return the same mesh with different points for the search on the other mesh."""
+        """Return the same mesh with different sample points."""
         other = copy(self)
         other.samples = samples
         return other
@@ -119,7 +119,7 @@ class Triangles:
     def find(self, points: Floats) -> _Found:
         """Return the nearest points of the surface."""
         found = self._surface.closest(points)
-        # The corner with coordinate 0 is opposite the edge that the point lies on.
+        # The corner with coordinate 0 is opposite the edge on which the point lies.
         on_edge = found.barycentric < _ON_EDGE
         at_border = np.logical_or.reduce(on_edge & self._border[found.triangles], axis=1)
         return _Found(found.positions, self._normals[found.triangles], ~at_border)
@@ -160,24 +160,24 @@ def iterate(
 ) -> Similarity:
     """Improve an alignment until it converges.
 
-    Pairs farther apart than three times the median, with normals more than 60 degrees apart
-    (ignoring their signs), or on the border of a hole are left out of each iteration.
+    Each iteration ignores pairs that are farther apart than three times the median, that have
+    normals more than 60 degrees apart (ignoring their signs), or that lie on the border of a hole.
 
     Parameters
     ----------
     template, target : Side
-        The surface to move, and the one to align it with.
+        The surface to move, and the surface with which to align it.
     start : Similarity
         Approximate alignment; its factors are kept.
     rounds : int
         Maximum number of iterations; fewer if the relative change of the error is below 1e-5.
     scales : bool
-        Whether the scale is fitted too.
+        Whether the scale is also fitted.
 
     Returns
     -------
     Similarity
-        The best so far if too few pairs are left to continue.
+        The best alignment so far if too few pairs are left to continue.
     """
     similarity, before = start, np.inf
     for _ in range(rounds):
@@ -219,7 +219,7 @@ def slide(
     Returns
     -------
     Similarity
-        The best so far if too few pairs are left to continue.
+        The best alignment so far if too few pairs are left to continue.
     """
     similarity, best, lowest, idle = start, start, np.inf, 0
     for _ in range(rounds):
@@ -260,7 +260,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
     rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
-    grow = min(max(grow, 0.5), 2.0)  # the linearisation is invalid beyond these
+    grow = min(max(grow, 0.5), 2.0)  # the linearisation is invalid beyond these limits
     # The step rotates and scales about the centre: p' = g R (p - c) + c + v.
     shift = grow * rotation @ (similarity.shift - center) + center + size * solved[3:6]
     return Similarity(
@@ -320,8 +320,8 @@ class Gaps:
     away : (M,)
         From the template's samples to the target.
     uneven_towards, uneven_away : (N,), (M,)
-        The same without the median offset along the normals: a
-        jacket at a constant two centimetres from the skin fits it well.
+        The same without the median offset along the normals, so that a jacket at a constant
+        distance of two centimetres from the skin fits well.
     """
 
     towards: Floats
@@ -352,6 +352,6 @@ def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
 
 
 def _uneven(ways: Floats, normals: Floats) -> Floats:
-    """Return the lengths of vectors (N, 3) without the median of their normal components."""
+    """Return the lengths of vectors (N, 3) minus the median of their normal components."""
     along = np.median(np.einsum("na,na->n", ways, normals))
     return np.linalg.norm(ways - along * normals, axis=1)

@@ -31,12 +31,12 @@ _UNITS = (1.0, 100.0, 0.01, 1000.0, 0.001, 39.37, 1.0 / 39.37)
 """Ratios between metres and centimetres, millimetres and inches, in both directions."""
 
 _NEAR_UNIT = 0.15  # relative tolerance for interpreting a ratio of sizes as a ratio of units
-_TRIM = 0.8  # fraction of distances that counts: excludes hair, skirts and cropped parts
+_TRIM = 0.8  # fraction of the distances that are used: excludes hair, skirts and cropped parts
 _QUICK, _LONG = 12, 60  # iterations for every candidate, and for the best few
 _FINALISTS = 4
 # A mesh that is already in place is rotated only if that reduces the error below this fraction.
 _NO_BETTER = 0.7
-_IN_PLACE = 300  # samples that decide whether a mesh is in place already
+_IN_PLACE = 300  # number of samples that determine whether a mesh is already in place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,9 +71,9 @@ def axis_rotations(
     Parameters
     ----------
     template_up : "y" or "z"
-        Up axis of the template. Y-up figures face +z, z-up ones +x.
+        Up axis of the template. Y-up figures face +z, z-up figures +x.
     up, facing : str, optional
-        One of ``AXES`` each: where the template's up and forward axes are mapped.
+        Axes, from ``AXES``, to which the template's up and forward axes are mapped.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def axis_rotations(
 
 
 def unit_scale(ratio: float) -> float:
-    """Return the unit factor that a ratio of sizes is within 15 % of, or the ratio itself.
+    """Return the unit factor within 15 % of a ratio of sizes, or the ratio itself if there is none.
 
     >>> unit_scale(93.0), unit_scale(1.4)
     (100.0, 1.4)
@@ -124,14 +124,14 @@ def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bo
     rotations : list of (3, 3)
         From ``axis_rotations``.
     scaled : bool
-        Whether scales between units are tried as well.
+        Whether scales between units are also tried.
 
     Returns
     -------
     Candidate
-        The error is one-way: a shirt that lies on the body fits, regardless of the parts it
-        leaves uncovered. The first of several with similar errors, so that nothing is
-        rotated unnecessarily: most figures look nearly the same from behind.
+        The first of several candidates with similar errors, so that nothing is rotated
+        unnecessarily: most figures look nearly the same from behind. The error is one-way: a shirt
+        that lies on the body fits, regardless of the parts it leaves uncovered.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []
@@ -160,15 +160,15 @@ def search(
     rotations : list of (3, 3)
         From ``axis_rotations``.
     scale : float or None
-        Kept if given; else starts from the ratio of the mean distances from the centroid, which,
-        unlike that of boxes, does not depend on the orientation of a mesh.
+        Fixed scale; if None, the search starts from the ratio of the mean distances from the
+        centroid, which, unlike box sizes, do not depend on the orientation of a mesh.
     report : callable
         Called with the completed fraction; may raise to cancel.
 
     Returns
     -------
     Candidate
-        The one with the smallest two-way error.
+        The candidate with the smallest two-way error.
     """
     ours, theirs = template.samples.positions, target.samples.positions
     start = unit_scale(_radius(theirs) / _radius(ours)) if scale is None else scale

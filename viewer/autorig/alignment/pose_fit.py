@@ -1,4 +1,4 @@
-"""Fit a template's pose and proportions to a target, by joint rotations and limb scales.
+"""Fitting of a template's pose and proportions to a target by joint rotations and limb scales.
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
@@ -40,10 +40,10 @@ __all__ = ["Fitted", "fit_pose"]
 
 _ROUNDS = 32
 _NEARING = 16  # iterations over which the search radius shrinks
-_VERTICES = 1500  # vertices of the template that are matched with the target
+_VERTICES = 1500  # number of template vertices that are matched with the target
 _FAR, _NEAR = 0.25, 0.03  # search radius at the start and at the end, over the size
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_STILL = 2e-3  # radians; iterations end when no joint rotates by more
+_STILL = 2e-3  # radians; iterations end when no joint rotates by more than this
 _FEWEST = 50  # minimum number of pairs for fitting a pose
 _SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # logarithms of limb scales
 
@@ -89,13 +89,13 @@ def fit_pose(
     Parameters
     ----------
     template : Figure
-        With mesh, skeleton and skin, and its shape applied.
+        Figure with mesh, skeleton and skin, and its shape applied.
     pose : Pose
-        Initial pose; not changed. Pose correctives are ignored.
+        Initial pose; not modified. Pose correctives are ignored.
     similarity : Similarity
         Initial map from the posed template to the target; without factors.
     far, near : Side
-        The target, as a fast search for the start and an exact one for the end.
+        The target, with a fast search for the first iterations and an exact search for the last.
     scales : bool
         Whether the template's size and its proportions may change.
     report : callable
@@ -137,7 +137,7 @@ def _aligned_template(state: Fitted, limbs: Limbs) -> AlignedTemplate:
 
 
 def _pairs(aligned: AlignedTemplate, chosen: Ints, target: Side, reach: float) -> Pairs:
-    """Match both ways; points too far away or on the border of a hole form no pair."""
+    """Match in both directions; distant points and those on the border of a hole are ignored."""
     points = aligned.positions[chosen]
     found = target.find(points)
     near = found.usable & (np.linalg.norm(found.positions - points, axis=1) <= reach)

@@ -8,15 +8,15 @@ the limb's axis::
     x'  = x + w x (x - m) + t + u (x - m) + sum_j s_vj w_j x (x - c_j)
             + sum_j (l_j P_j + g_j (1 - P_j)) e_j
 
-The rotations w_j, growths l_j along and g_j across the limbs, and w, t and u of the
-whole figure, minimise the mean of
+The rotations w_j, the growths l_j along and g_j across the limbs, and w, t and u of the whole
+figure minimise the mean of
 
     (n . (x' - q))^2    over pairs of a vertex and a point q of the target with the normal n
     h |x' - q|^2        over vertices and the target's points closest to them, in any direction
 
-The second sum constrains the ends of limbs, which planes do not. All lengths are over the target's
-size. Small penalties on rotations and growths, per step and in total, preserve what the surface
-does not determine, such as the rotation of a limb about its own axis.
+The second sum constrains the ends of limbs, which planes do not. All lengths are divided by the
+target's size. Small penalties on rotations and growths, per step and in total, preserve what the
+surface does not determine, such as the rotation of a limb about its own axis.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Pairs:
     targets, normals : (N, 3)
         Points of the target and the normals there.
     ends : (M,)
-        Vertices of the template, whichever way they face.
+        Vertices of the template, regardless of their orientation.
     end_targets : (M, 3)
         The points of the target closest to them.
     """
@@ -94,7 +94,7 @@ class PoseStep:
     growth : float
         Logarithm of the whole figure's scale.
     rotation_vectors : (J, 3)
-        Rotation vectors of the joints, 0 for roots, which rotate with the whole figure.
+        Rotation vectors of the joints; 0 for roots, which rotate with the whole figure.
     limb_growths : (2, J)
         Logarithms of the limbs' scales: along, across.
     """
@@ -109,7 +109,7 @@ class PoseStep:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Frame:
-    """Quantities that the columns of the linear problem are built from."""
+    """Quantities from which the columns of the linear problem are built."""
 
     middle: Floats
     size: float
@@ -152,7 +152,8 @@ def solve_step(
     Returns
     -------
     PoseStep
-        No joint rotates by more than 0.3 radians, nothing grows by more than a fifth.
+        Step in which no joint rotates by more than 0.3 radians and nothing grows by more than a
+        fifth.
     """
     middle = aligned.positions[pairs.vertices].mean(axis=0)
     frame = _Frame(middle, size, aligned, limbs, parents)
@@ -185,8 +186,8 @@ def solve_step(
 def _penalties(n_rotating: int, n_joints: int) -> Floats:
     """Return the penalties on all rotations and growths as a quadratic form.
 
-    Making all limbs thicker, as clothes do, costs nothing: only differences between limbs do.
-    Otherwise the figure as a whole would grow instead, and extend beyond the target.
+    Making all limbs thicker, as clothes do, is not penalised, only differences between limbs are.
+    Otherwise the figure as a whole would grow and extend beyond the target.
     """
     penalties = np.diag(np.repeat([_ROTATED, _GROWN], [3 * n_rotating, 2 * n_joints]))
     # sum_j g_j^2 - (sum_j g_j)^2 / J: only deviations from the mean girth are penalised.
@@ -197,7 +198,7 @@ def _penalties(n_rotating: int, n_joints: int) -> Floats:
 def _equations(
     frame: _Frame, vertices: Ints, targets: Floats, normals: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the normal equations of n . (x' - q) = 0, columns as ordered above."""
+    """Return the normal equations of n . (x' - q) = 0, with columns in the above order."""
     x = frame.aligned.positions[vertices]
     count = len(x)
     arms = (x - frame.middle) / frame.size

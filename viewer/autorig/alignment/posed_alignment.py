@@ -1,9 +1,10 @@
 """Alignment of a template whose pose and proportions differ from the target's.
 
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
-similarity aligns one with the other. So if the alignment leaves a large error, pose and proportions
-are fitted too, and kept if that removes most of the error. A figure in a different pose also looks
-nearly the same from behind: if the alignment is ambiguous, both facings are fitted.
+similarity aligns one with the other. If the alignment leaves a large error, pose and proportions
+are therefore fitted too, and the fit is kept if it removes most of the error. A figure in a
+different pose also looks nearly the same from behind: if the alignment is ambiguous, both facings
+are fitted.
 """
 
 from __future__ import annotations
@@ -42,17 +43,17 @@ _CLOSE = 0.002  # misfit over size up to which joints are not rotated
 # Fraction of the misfit that may remain if rotated joints are to be kept: clothes fit a
 # little better with a bent body, but only a figure in a different pose fits much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
-# A misfit above the first after a joint was rotated by more than the second indicates a different
-# kind of figure: a fox fitted to a pig bends its spine until its legs meet any surface.
+# A misfit above the first value, after a joint was rotated by more than the second, indicates a
+# different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
-_SURE = 0.004  # misfit after the fit up to which the facing is accepted without trying another
+_SURE = 0.004  # misfit after the fit up to which the opposite facing is not tried
 _ALIKE = 1.5  # ratio of misfits up to which front and back are ambiguous
 _CLEARLY = 0.85  # fraction of the misfit that the opposite facing must reach after the fit
 _ROUNDS = 30  # iterations to align the template facing the other way
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # alignments that were not given by the user
-# Separate scales are tried if the error exceeds the first, and kept if they leave at
-# most the second of it and differ by more than the third.
+# Separate scales are tried if the error exceeds the first value, and kept if they reduce it to at
+# most the second fraction and differ by more than the third value.
 _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
 
@@ -67,9 +68,9 @@ class PosedAlignment:
     figure : Figure
         The template, with scaled limbs if needed.
     pose : Pose
-        The template's own, or fitted.
+        The template's own pose, or the fitted pose.
     positions : (V, 3)
-        The template's vertices in that pose, in its own frame.
+        The template's vertices in that pose, in the template's frame.
     lines : tuple of Diagnostic
         Messages about changes to pose and proportions, and about better options.
     most_rotated : (float, str)
@@ -109,14 +110,14 @@ def align_posed(
     Parameters
     ----------
     template : Figure
-        With mesh, skeleton and skin, and its shape applied.
+        Figure with mesh, skeleton and skin, and its shape applied.
     pose : Pose
         Pose of the template, without shape weights.
     target : Mesh
-        With triangles.
+        Mesh with triangles.
     settings : AlignmentSettings
-        Known facts about the alignment. With a separate scale per axis nothing is fitted,
-        with a known scale only the pose.
+        Known facts about the alignment. With a separate scale per axis, nothing is fitted; with a
+        known scale, only the pose is.
     fits : bool
         Whether pose and proportions may change.
     report : callable
@@ -125,7 +126,7 @@ def align_posed(
     Returns
     -------
     PosedAlignment
-        The unchanged template, unless a fitted one is much better.
+        Alignment of the unchanged template, unless a fitted template is much better.
 
     Raises
     ------
@@ -237,7 +238,7 @@ def _stretched(
     ]
     if not alignments:
         return None
-    # If both have the same axes, use those that --scale axes refers to.
+    # If both have the same axes, use the target's, to which --scale axes refers.
     alignment, *other = alignments
     if other and misfit(other[0], False) < _CLEARLY * misfit(alignment, False):
         alignment = other[0]
@@ -260,7 +261,7 @@ def _is_closer(stretched: PosedAlignment, other: PosedAlignment) -> bool:
 
 
 def _advice(stretched: PosedAlignment, kept: PosedAlignment) -> Diagnostic:
-    """Return the message that a stretched template would fit better."""
+    """Return a message saying that a stretched template would fit better."""
     gap, other = (100.0 * misfit(one.alignment, False) for one in (stretched, kept))
     similarity = stretched.alignment.similarity
     is_own = (similarity.factors == 1.0).all()

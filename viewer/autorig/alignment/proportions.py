@@ -1,4 +1,4 @@
-"""Proportions of a figure: limbs scaled by one factor along and one across their axes.
+"""Proportions of a figure: limbs scaled by one factor along their axes and one across them.
 
 A joint's limb is the part of the body after it. Its vertices are moved, in the bind pose, by
 S_j (x - c_j) + c'_j, blended with the skin's weights; S_j = g_j I + (l_j - g_j) d_j d_j^T with
@@ -55,7 +55,7 @@ def limbs_of(figure: Figure) -> Limbs:
     Parameters
     ----------
     figure : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     """
     mesh, skeleton, skin = figure.attached()
     parents = skeleton.parents
@@ -86,7 +86,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     Parameters
     ----------
     figure : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     limbs : Limbs
         Limbs of this figure.
     lengths, girths : (J,)
@@ -95,7 +95,7 @@ def resized(figure: Figure, limbs: Limbs, lengths: Floats, girths: Floats) -> Fi
     Returns
     -------
     Figure
-        Same joints and weights; all other vertex data is unchanged.
+        Figure with the same joints and weights; all other vertex data is unchanged.
     """
     mesh, skeleton, skin = figure.attached()
     scales = girths[:, None, None] * np.eye(3) + (lengths - girths)[:, None, None] * np.einsum(

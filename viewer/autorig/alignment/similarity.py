@@ -11,8 +11,8 @@ from viewer.rig.arrays import Floats, frozen
 
 __all__ = ["Similarity", "fit_similarity"]
 
-# Ratio of the second to the first extent below which points are collinear and leave a rotation
-# free.
+# Ratio of the second to the first extent below which points are collinear, so that a rotation is
+# undetermined.
 _ON_LINE = 1e-6
 
 
@@ -29,7 +29,7 @@ class Similarity:
     shift : (3,)
         Translation in the unit of the target space.
     factors : (3,)
-        Further scales along the axes of the target space; their product is 1.
+        Additional scales along the axes of the target space; their product is 1.
     own_factors : (3,)
         The same along the axes of the points' own space.
     """
@@ -90,12 +90,12 @@ def fit_similarity(points: Floats, targets: Floats, scale: float | None = None) 
     points, targets : (N, 3)
         Pairs, N >= 3.
     scale : float, optional
-        Fixed if given, fitted if omitted.
+        Scale; fitted if omitted.
 
     Returns
     -------
     Similarity
-        With all factors 1.
+        Similarity whose factors are all 1.
 
     Raises
     ------

@@ -46,11 +46,11 @@ SAMPLES = 2_000
 
 _ROUNDS, _SLIDES = 60, 25  # iterations of point-to-point and of point-to-plane fits
 _AXES_ROUNDS = 20
-_IN_PLACE = 0.03  # misfit over size up to which a mesh may be in place already
-_SURELY = 0.003  # mean distance over size up to which no search is made
+_IN_PLACE = 0.03  # misfit over size up to which a mesh may already be in place
+_SURELY = 0.003  # mean distance over size up to which no search is performed
 _SLIDING = 0.02  # misfit over size up to which sliding refines the fit
-# Fraction of that misfit that a search must reach to move the mesh after all: a part of a figure
-# fits nearly as well in many other positions, a whole figure does not.
+# Fraction of that misfit that a search must reach to move the mesh: a part of a figure fits nearly
+# as well in many other positions, whereas a whole figure does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
 PART = 0.05
 """Fraction of the size: if template points are farther than this, the target is only a part."""
@@ -139,8 +139,8 @@ class Alignment:
         the surfaces. All distances count, each clamped to 5 %, so that protruding ends of limbs are
         included.
     how : str
-        ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` where pose and
-        proportions were fitted beyond that, unless landmarks were given.
+        ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` if pose and
+        proportions were also fitted, unless landmarks were given.
     """
 
     similarity: Similarity
@@ -160,7 +160,7 @@ class Alignment:
         similarity : Similarity
             Placement of the template.
         how : str
-            As in the attribute of this name.
+            As in the attribute with this name.
         """
         size = target.size
         gaps = gaps_between(template, target, similarity)
@@ -181,10 +181,10 @@ def misfit(alignment: Alignment, is_part: bool) -> float:
     Parameters
     ----------
     alignment : Alignment
-        With its errors.
+        Alignment with its errors.
     is_part : bool
-        Whether the target is only a part of the template: parts of the template
-        beyond it are then ignored.
+        Whether the target is only a part of the template; other parts of the template are then
+        ignored.
     """
     towards, away = alignment.uneven
     return towards if is_part else 0.5 * (towards + away)
@@ -199,15 +199,15 @@ def align(
 ) -> Alignment:
     """Find the similarity that aligns the template with the target.
 
-    A target that is in place already, up to its unit and rotations by multiples of 90 degrees, is
-    left there: a fit of a part (a shirt, an open shell) would only move it away. Otherwise all
+    A target that is already in place, up to its unit and rotations by multiples of 90 degrees, is
+    left there: fitting a part (a shirt, an open shell) would only move it away. Otherwise all
     rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
     refined on the surfaces.
 
     Parameters
     ----------
     template, target : Posed
-        In approximately the same pose.
+        Surfaces in approximately the same pose.
     template_up : "y" or "z"
         The template's up axis.
     settings : AlignmentSettings
@@ -218,7 +218,7 @@ def align(
     Returns
     -------
     Alignment
-        Including its error.
+        Alignment with its error.
 
     Raises
     ------
@@ -257,7 +257,7 @@ def align(
         similarity = _refined(fine, best.similarity, settings, report)
         slid = Alignment.of(ours, theirs, similarity, "search")
         is_part &= slid.away > PART
-        # It considers only surfaces that face each other, and may miss ends of limbs.
+        # It considers only surfaces that face the same way, and may miss the ends of limbs.
         if settings.scale == "axes" or misfit(slid, is_part) <= misfit(found, is_part):
             found = slid
     fraction = _PART_BETTER if is_part else _BETTER
@@ -332,7 +332,7 @@ _HOW = {
 
 
 def alignment_lines(alignment: Alignment) -> list[Diagnostic]:
-    """Return messages about scale, rotation, shift and error, and doubts about the result."""
+    """Return messages about scale, rotation, shift and error, and about doubtful results."""
     similarity = alignment.similarity
     angle = np.degrees(np.arccos(np.clip((np.trace(similarity.rotation) - 1.0) / 2.0, -1.0, 1.0)))
     how = Phrase(_HOW[alignment.how])

@@ -1,7 +1,7 @@
 """Detection and reversal of parts of a target whose triangles are wound the wrong way.
 
-A part that faces the opposite way to the template may be a lining, which is correct. It is
-wrong if it encloses a volume, or makes up most of the target.
+A part whose normals are opposite to the template's may be a lining, which is correct. It is an
+error if it encloses a volume, or makes up most of the target.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
     Parameters
     ----------
     target : Welded
-        W vertices that represent V.
+        W welded vertices that represent V.
     facing_away : (I,)
-        Islands that face the opposite way to the template.
+        Islands that face away from the template's surface.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def wound_backwards(target: Welded, facing_away: Ints) -> Bools:
 
 
 def with_reversed_winding(mesh: Mesh, vertices: Bools) -> Mesh:
-    """Return a mesh with the triangles at some vertices reversed, and normals to match.
+    """Return a mesh with the triangles at some vertices reversed, and with matching normals.
 
     Parameters
     ----------

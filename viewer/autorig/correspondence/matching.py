@@ -42,11 +42,11 @@ class MatchSettings:
     max_angle : float
         Radians between the normals of both surfaces.
     near_distance, near_angle : float
-        Within this fraction, this angle suffices: normals of sharp and thin parts of a coarse
-        mesh are unreliable. Sheets thinner than this are matched on the side whose normal agrees.
+        Within this fraction of the diagonal, this angle suffices: normals of sharp and thin parts
+        of a coarse mesh are unreliable. Sheets thinner than this are matched on the side whose
+        normal agrees.
     flipped_normals : bool
-        Accept a normal that points the other way as well. An island that is inside out as a
-        whole is reversed without this.
+        Also accept opposite normals. An island that is entirely inside out is reversed in any case.
     """
 
     max_distance: float = 0.05
@@ -69,12 +69,12 @@ class Matches:
     Attributes
     ----------
     points : SurfacePoints
-        W points of the template: for each matched vertex the closest with an agreeing normal, else
-        the closest.
+        W points of the template: for each matched vertex, the closest with an agreeing normal; for
+        others, the closest.
     matched : (W,) bool
         Whether each vertex lies on the template.
     angles : (W,)
-        Radians between the normals there, 0 where the target has no normal.
+        Angles between the normals, radians; 0 where the target has no normal.
     inside_out : (I,) int32
         Islands of the target that were reversed.
     """
@@ -91,7 +91,7 @@ class Template:
     Parameters
     ----------
     positions : (V, 3)
-        In the target's space.
+        Positions in the target's space.
     triangles : (T, 3)
         Vertex indices.
 
@@ -109,7 +109,7 @@ class Template:
         self.normals: Floats = normals[self.welded.vertices]
 
     def normals_at(self, points: SurfacePoints) -> Floats:
-        """Return unit normals at points of the surface, (N, 3), blended from the corners'."""
+        """Return unit normals at points of the surface, (N, 3), interpolated from the corners."""
         return unit(interpolate(points, self.triangles, self.normals))
 
 
@@ -144,7 +144,7 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
     Parameters
     ----------
     template : Template
-        In the target's space.
+        Positions in the target's space.
     target : Welded
         W vertices.
     size : float
@@ -202,7 +202,7 @@ def _accepted(distances: Floats, angles: Floats, size: float, settings: MatchSet
 
 
 def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
-    """Return the islands of which most judged vertices face the other way."""
+    """Return the islands in which most of the tested vertices face the other way."""
     of = target.islands[judged]
     total = np.bincount(of, minlength=target.n_islands)
     rotated = np.bincount(of[angles[judged] > _INSIDE_OUT], minlength=target.n_islands)
@@ -212,8 +212,8 @@ def _inside_out(target: Welded, angles: Floats, judged: Bools) -> Ints:
 def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoints:
     """Return the closest points on triangles that face approximately the same way.
 
-    Directions are grouped into 26, those of a cube's faces, edges and corners; none is farther
-    than 28 degrees from one of them. Each group is searched in its own subset of triangles.
+    Directions are grouped by the 26 directions of a cube's faces, edges and corners; each is within
+    28 degrees of one of them. Each group is searched in its own subset of triangles.
     """
     count = len(positions)
     triangles, distances = np.zeros(count, dtype=np.int32), np.full(count, np.inf)
@@ -232,7 +232,7 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
         triangles[inside] = facing[part.triangles]
         barycentric[inside], found[inside] = part.barycentric, part.positions
         distances[inside] = part.distances
-    # If no triangle faces that way, the distance is infinite but the coordinates are valid.
+    # If no triangle faces that way, the distance is infinite, but the coordinates are valid.
     distances[np.isinf(distances)] = np.finfo(float).max
     return SurfacePoints(triangles, barycentric, found, distances)
 

@@ -26,7 +26,7 @@ def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
     vertices : (N,) int32
         ``skin_rows(skin, vertices)`` is the target's skin.
     distances : (N,)
-        Distance to each of them.
+        Distance to each of these vertices.
 
     Raises
     ------

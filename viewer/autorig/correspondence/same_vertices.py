@@ -1,10 +1,10 @@
 """Vertices common to target and template: a mesh that was edited or sculpted, not remeshed.
 
-The closest point of the surface slides if a vertex was moved along it, and gets blended weights;
-the vertex itself has the exact ones. A target's vertex is identified with one of the template's if
-each is the other's nearest, it slid by less than half the length of its edges, and nearly all of
-its edges correspond to edges of the template. A different tessellation of the same surface has
-hardly any such vertices.
+If a vertex was moved along the surface, its closest point has interpolated weights, whereas the
+original vertex has the exact ones. A target's vertex is identified with a vertex of the template if
+each is the other's nearest, it moved along the surface by less than half the length of its edges,
+and nearly all of its edges correspond to edges of the template. A different tessellation of the
+same surface has hardly any such vertices.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ _FEW = 10_000  # points; with fewer, starting threads costs more time than it sa
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:
-    """Return the template's vertex that each vertex of the target is identified with, -1 for none.
+    """Return the template's vertex that corresponds to each vertex of the target, -1 for none.
 
     Parameters
     ----------
     template, target : Welded
-        In the same space; U and W vertices.
+        Meshes in the same space, with U and W vertices.
     distances : (W,)
         Distances of the target's vertices from the template's surface.
 
     Returns
     -------
     (W,) int64
-        No vertex of the template occurs twice.
+        Indices; no vertex of the template occurs twice.
     """
     there, far = _nearest(template.positions, target.positions)
     back, _ = _nearest(target.positions, template.positions)
@@ -66,13 +66,13 @@ def at_vertices(
     points : SurfacePoints
         W closest points.
     positions : (W, 3)
-        The points that were searched for.
+        The query points.
     corners : (T, 3)
         The surface's triangles, as indices of its U vertices.
     places : (U, 3)
         Positions of the U vertices.
     same : (W,)
-        The vertex that a point is snapped to, or -1.
+        The vertex to which a point is snapped, or -1.
     """
     rows = np.flatnonzero(same >= 0)
     used, first = np.unique(corners, return_index=True)

@@ -33,7 +33,7 @@ def laplacian(mesh: Welded) -> tuple[Any, Floats]:
     Returns
     -------
     operator : sparse (W, W)
-        Symmetric, positive semidefinite, rows add up to 0.
+        Symmetric and positive semidefinite; rows sum to 0.
     areas : (W,)
         Squared units, at least 1e-9 of their mean; all 1 if no triangle has an area.
     """
@@ -54,9 +54,9 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     """Return the cotangent Laplacian: L_ij = -(cot a + cot b) / 2 on edges, L_ii = -sum_j L_ij.
 
     a and b are the angles opposite to the edge (Pinkall and Polthier 1993). A triangle with an
-    angle below 0.6 degrees, or without area, is treated as equilateral: it still connects, and the
-    operator stays positive semidefinite triangle by triangle, which it would not if large
-    cotangents were clamped.
+    angle below 0.6 degrees, or without area, is treated as equilateral: it still connects its
+    vertices, and the contribution of each triangle stays positive semidefinite, which clamping
+    large cotangents would not ensure.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     Returns
     -------
     sparse (V, V)
-        Unitless. The opposite sign of the Laplacian of calculus.
+        Dimensionless, with the opposite sign of the Laplacian in calculus.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     >>> L = cotangent_laplacian(square, np.array([[0, 1, 2], [0, 2, 3]]))
@@ -94,7 +94,7 @@ def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
     Returns
     -------
     sparse (V, V)
-        Unitless.
+        Dimensionless.
     """
     links = edges(triangles)
     return _from_edges(n_vertices, links, np.ones(len(links)))
@@ -103,8 +103,9 @@ def graph_laplacian(n_vertices: int, triangles: Ints) -> Any:
 def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
     """Return the area of the surface nearest to each vertex, "mixed" at obtuse angles.
 
-    In a triangle without an obtuse angle vertex a owns (|ab|^2 cot c + |ac|^2 cot b) / 8; in
-    one with, the obtuse corner owns half and the others a quarter (Meyer et al. 2003, fig. 4).
+    In a triangle without an obtuse angle, vertex a owns (|ab|^2 cot c + |ac|^2 cot b) / 8; in an
+    obtuse triangle, the obtuse corner owns half of the area and the others a quarter (Meyer et al.
+    2003, fig. 4).
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
     Returns
     -------
     (V,)
-        Squared units; they add up to the area of the mesh.
+        Squared units; the sum is the area of the mesh.
     """
     cotangents = _cotangents(positions, triangles)
     corners = positions[triangles]
@@ -138,7 +139,7 @@ def _cotangents(positions: Floats, triangles: Ints) -> Floats:
     u = np.roll(corners, -1, axis=1) - corners
     v = np.roll(corners, 1, axis=1) - corners
     double = np.linalg.norm(np.cross(u[:, 0], v[:, 0]), axis=1)
-    # Without area the cotangents become very large, but stay finite.
+    # Without area, the cotangents become very large, but stay finite.
     longest = np.einsum("tka,tka->tk", u, u).max(axis=1, initial=np.finfo(float).tiny)
     return np.einsum("tka,tka->tk", u, v) / np.maximum(double, _FLAT * longest)[:, None]
 
@@ -149,7 +150,7 @@ def _steady(cotangents: Floats) -> Floats:
 
 
 def _from_edges(n_vertices: int, links: Ints, weights: Floats) -> Any:
-    """Return the Laplacian of weighted edges (E, 2); weights of the same edge add up."""
+    """Return the Laplacian of weighted edges (E, 2); weights of the same edge are summed."""
     sparse = scipy_part("sparse")
     a, b = links[:, 0], links[:, 1]
     shape = (n_vertices, n_vertices)

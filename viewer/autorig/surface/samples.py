@@ -1,4 +1,4 @@
-"""Evenly distributed sample points of a surface, by which alignments are evaluated."""
+"""Evenly distributed sample points of a surface, for the evaluation of alignments."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class SurfaceSamples:
     positions : (N, 3)
         The mesh's unit.
     normals : (N, 3)
-        Unit normals of the triangles they lie on.
+        Unit normals of the triangles on which they lie.
     """
 
     positions: Floats
@@ -44,9 +44,10 @@ def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
 def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSamples:
     """Return evenly distributed points of a surface, deterministically.
 
-    Positions along the cumulative area are evenly spaced, so every triangle gets its share, rounded
-    up or down. Within a triangle the point is a (1 - sqrt u) + b sqrt u (1 - v) + c v sqrt u
-    (Turk 1990), with u and v from the R2 sequence (multiples of the plastic number's powers).
+    Positions along the cumulative area are evenly spaced, so every triangle gets points in
+    proportion to its area, rounded up or down. Within a triangle the point is a (1 - sqrt u) + b
+    sqrt u (1 - v) + c v sqrt u (Turk 1990), with u and v from the R2 sequence (multiples of the
+    plastic number's powers).
 
     Parameters
     ----------

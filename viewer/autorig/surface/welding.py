@@ -1,7 +1,7 @@
-"""Weld a mesh into connected surfaces: coincident vertices joined, islands labelled.
+"""Welding of a mesh into connected surfaces: coincident vertices merged, islands labelled.
 
-Files repeat a vertex along seams of texture coordinates and hard edges. Problems solved on a
-surface must not treat these as borders, or the mesh would tear there.
+Files repeat vertices along texture seams and hard edges. Computations on a surface must not treat
+these as borders, or the mesh would tear there.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def edges(triangles: Ints) -> Ints:
 
 
 def non_manifold_edges(triangles: Ints) -> Ints:
-    """Return the non-manifold edges, those of more than two triangles: (E, 2) int32."""
+    """Return the non-manifold edges, shared by more than two triangles: (E, 2) int32."""
     pairs, counts = _counted_edges(triangles)
     return pairs[counts > 2]
 
@@ -143,8 +143,8 @@ def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
 def _joined_nearby(positions: Floats, tolerance: float) -> Any:
     """Return a label for each position, the same for those within the tolerance.
 
-    Each round joins every position to its nearest one, so clusters at least halve per round; asking
-    for all pairs at once would take memory quadratic in a cluster's size.
+    Each round merges every position with its nearest neighbour, so the size of clusters at least
+    halves per round; finding all pairs at once would take memory quadratic in a cluster's size.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     spatial = scipy_part("spatial")

@@ -26,7 +26,7 @@ def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Float
     triangles : (T, 3)
         Vertex indices, counter-clockwise from outside.
     points : (N, 3)
-        Points to test; not on the surface.
+        Points to test, none of them on the surface.
 
     Returns
     -------

@@ -65,7 +65,7 @@ def transfer_correctives(
 
 
 def _fade(matched: Bools, positions: Floats, triangles: Ints) -> Floats:
-    """Return weights that are 1 on the template, 0 away from it, smooth between: (V,)."""
+    """Return weights that are 1 on the template, 0 away from it, and smooth in between: (V,)."""
     if matched.all():
         return np.ones(len(matched))
     welded = weld(positions, triangles)

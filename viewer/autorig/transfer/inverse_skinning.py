@@ -1,4 +1,4 @@
-"""Inverse skinning: a posed mesh returned to rest by each vertex's inverse blended matrix."""
+"""Inverse skinning: transforms a posed mesh to rest by each vertex's inverse blended matrix."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class InvertedSkinning:
     matrices : (V, 3, 4)
         The matrix that poses each vertex.
     guarded : (V,) bool
-        Vertices whose matrix is nearly singular: unposed with the inverse of the nearest
-        rotation, so posing does not reproduce them exactly.
+        Vertices whose matrix is nearly singular: the inverse of the nearest rotation is used
+        instead, so posing does not reproduce them exactly.
     """
 
     positions: Floats
@@ -95,7 +95,7 @@ def _is_singular(linear: Floats) -> Bools:
 def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> Floats:
     """Smooth the neighbourhoods of guarded vertices by least squares.
 
-    Minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
+    It minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
     two-ring, all others fixed, with the graph Laplacian L and lambda = 0.01. The problem is linear
     in x, so one linear system solves it.
 
@@ -160,7 +160,7 @@ def _laplacian(count: int, links: Ints) -> Any:
 def _normal_equations(
     inverted: InvertedSkinning, posed: Floats, welded: Ints, free: Bools
 ) -> tuple[Any, Floats]:
-    """Return B^T B as blocks, and B^T (t - d), summed over coincident vertices."""
+    """Return the blocks B^T B, and B^T (t - d), summed over coincident vertices."""
     number = np.cumsum(free) - 1
     inside = np.flatnonzero(free[welded])
     rows = number[welded[inside]]

@@ -1,4 +1,4 @@
-"""Transfer of joints to another mesh: each moves with the surface around it."""
+"""Transfer of joints to another mesh: each joint moves with the surface around it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts",
 
 _ENOUGH = 0.5  # fraction of a joint's weights that must be matched
 _SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
-_INSIDE = 0.5  # threshold of the winding number between outside and inside
+_INSIDE = 0.5  # winding number that separates outside from inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ def surface_shifts(
     target_triangles: Ints,
     max_distance: float,
 ) -> tuple[Floats, Bools]:
-    """Return the vectors from points to the closest points of a target, and which are reliable.
+    """Return the vectors from points to the closest points of a target, and their reliability.
 
     Parameters
     ----------
@@ -57,14 +57,15 @@ def surface_shifts(
     target_triangles : (T, 3)
         Triangles of the target.
     max_distance : float
-        In the target's unit; pairs farther apart are rejected.
+        Maximum distance in the target's unit.
 
     Returns
     -------
     shifts : (V, 3)
         Target minus template.
     matched : (V,) bool
-        Close enough, with surfaces at most 60 degrees apart, whichever way they face.
+        Whether the points are close enough, with surfaces at most 60 degrees apart in either
+        orientation.
     """
     found = Surface(target_positions, target_triangles).closest(positions)
     facing = triangle_normals(target_positions, target_triangles)[found.triangles]
@@ -76,8 +77,8 @@ def surface_shifts(
 def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     """Return a regressor of joint positions: b_v = w_vj w_v,parent, on vertices of both joints.
 
-    A root uses the boundary with its children. Rows are not normalised: a joint without a
-    boundary has an empty one.
+    A root uses the boundary with its children. Rows are not normalised; a joint without a boundary
+    has an empty row.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def transfer_joints(
     shifts : (V, 3)
         From ``surface_shifts``.
     matched : (V,) bool
-        Where the shifts are reliable.
+        Whether each shift is reliable.
 
     Returns
     -------
@@ -147,7 +148,7 @@ def transfer_joints(
     whole = np.bincount(rows, np.abs(weights), minlength=count)
     present = np.bincount(rows, np.abs(used), minlength=count)
     total = np.bincount(rows, used, minlength=count)
-    # Rows with weights of both signs may nearly cancel out, which makes them unreliable.
+    # Weights of both signs in a row may nearly cancel out, which makes the row unreliable.
     transferred = (present >= _ENOUGH * whole) & (total >= _ENOUGH * present) & (whole > 0.0)
     sums = [np.bincount(rows, used * shifts[columns, axis], minlength=count) for axis in range(3)]
     moves = np.stack(sums, axis=1) / np.where(transferred, total, 1.0)[:, None]

@@ -1,8 +1,8 @@
 """Ratio of the leg lengths of two figures, by which paths and heights are scaled.
 
 The root's height above the feet is roughly the leg length, and step length is proportional
-to it. So if limbs were scaled, or the whole figure stretched, root heights and translations scale
-with the legs.
+to it. If limbs were scaled or the whole figure was stretched, root heights and translations
+therefore scale with the legs.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["leg_scale"]
 
 _LOW = 0.1  # fraction of the joints' vertical extent; joints this close to the lowest are feet
-_LEGS = 0.2  # fraction of the vertical extent; with the root closer to the feet there are no legs
+_LEGS = 0.2  # fraction of the vertical extent; if the root is closer to the feet, there are no legs
 
 
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:
@@ -30,7 +30,7 @@ def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> f
     up : "y" or "z"
         Up axis of both skeletons.
     otherwise : float
-        Returned if there are no legs, as for hands, heads, or a root on the ground.
+        Result if there are no legs, as for hands, heads, or a root on the ground.
     """
     axis = "xyz".index(up)
     heights = _heights(before, axis)

@@ -1,4 +1,4 @@
-"""Fit a skeleton to new proportions: same joints and DOFs, different bone lengths."""
+"""Fitting of a skeleton to new proportions: same joints and DOFs, different bone lengths."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class RestSkeleton:
     inverse_bind : (J, 4, 4)
         Inverse bind matrices for the template's bind pose.
     pose : Pose
-        Puts the joints at their positions in the target.
+        Pose that puts the joints at their positions in the target.
     root_scale : float
         Scale of the root's lengths, see ``leg_scale``.
     lines : tuple of Diagnostic
@@ -60,16 +60,16 @@ def fit_rest_skeleton(
 ) -> RestSkeleton:
     """Find rest offsets that put a posed skeleton's joints at given positions.
 
-    The target's joint j has the world linear part R P_j, P_j being that of the
-    template's pose and R the alignment's rotation. So the offset from its parent i is
-    (R P_i)^-1 (p_j - p_i), which includes the DOFs' translations, scaled. The rest root is
-    the template's, scaled like the legs; the figure's translation moves it to the target, and
-    R is included in the root's rotation.
+    The target's joint j has the world linear part R P_j, where P_j is that of the template's pose
+    and R is the alignment's rotation. So the offset from its parent i is (R P_i)^-1 (p_j - p_i),
+    which includes the scaled translations of the DOFs. The rest root is that of the template,
+    scaled like the legs; the figure's translation moves it to the target, and R is included in the
+    root's rotation.
 
     Parameters
     ----------
     template : Figure
-        With the pose's shape applied, with skeleton and skin.
+        Figure with the pose's shape applied, with skeleton and skin.
     pose : Pose
         Pose of the template.
     similarity : Similarity
@@ -81,12 +81,12 @@ def fit_rest_skeleton(
         skeleton: left and right offsets are averaged, or taken from the measured side.
         None keeps the joints unchanged.
     original : Skeleton or None
-        The template's before its limbs were scaled; None if they were not.
+        The template's skeleton before its limbs were scaled; None if they were not.
 
     Returns
     -------
     RestSkeleton
-        Lengths in the target's unit.
+        Skeleton with lengths in the target's unit.
     """
     skeleton, skin = template.require_skeleton(), template.require_skin()
     scale = similarity.scale * pose.figure_scale
@@ -205,7 +205,7 @@ def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
 def _rotate_roots(
     skeleton: Skeleton, pose: Pose, rotation: Floats
 ) -> tuple[Skeleton, list[Diagnostic]]:
-    """Rotate the roots by the alignment, in place: by their DOFs where they are ball joints.
+    """Rotate the roots by the alignment, in place; ball joints are rotated by their DOFs.
 
     Limits of a root apply to the template's world, not to the target's: they are
     widened to include the pose.
@@ -238,7 +238,7 @@ def _rotate_roots(
 
 
 def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
-    """Return angles about x, y, z: of the two triples for a rotation, the one within limits.
+    """Return angles about x, y, z: of the two triples for a rotation, the one within the limits.
 
     (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
     """

@@ -1,12 +1,12 @@
-"""Inpaint missing weights, as smoothly as the surface allows.
+"""Inpainting of missing weights, as smooth as the surface allows.
 
-Between known weights W_m the unknown ones W_u minimise trace(W^T Q W), Q = L + L M^-1 L, with
+Between known weights W_m, the unknown weights W_u minimise trace(W^T Q W), Q = L + L M^-1 L, with
 the Laplacian L and vertex areas M (Abdrashitov et al. 2023)::
 
     Q_uu W_u = -Q_um W_m
 
-Constants have zero energy, so rows still add up to 1. The second term makes joins smooth, but
-overshoots; negative weights are clipped and rows rescaled to 1.
+Constants have zero energy, so rows still sum to 1. The second term makes transitions smooth, but
+overshoots; negative weights are clipped and rows rescaled to a sum of 1.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Report = Callable[[float, str], None]
 
 NEGLIGIBLE = 1e-6  # smaller solved weights count as 0, as solutions decay without reaching 0
 _BLOCK = 1 << 22  # unknowns per batch, 32 MB
-_TRUE = 1e-4  # maximum error of a solution that must be 1 everywhere
+_TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
 _SHIFT = 1e-10  # fraction of the mean diagonal, added to a matrix that cannot be factorised
 _STEPS = 2000  # maximum iterations of conjugate gradients
 _CONVERGED = 1e-9  # relative residual
@@ -46,7 +46,7 @@ def inpaint(
     areas : (W,)
         Areas of the vertices, positive.
     weights : sparse (W, J) in rows
-        Only those of matched vertices are read.
+        Weights; only those of matched vertices are read.
     matched, unknown : (W,) bool
         Known and unknown vertices; each island of unknown ones must touch a known one. Vertices
         that are neither are ignored.
@@ -56,7 +56,7 @@ def inpaint(
     Returns
     -------
     weights : sparse (U, J) in rows
-        Weights of the unknown vertices, in order. No weight is negative, rows add up to 1.
+        Weights of the unknown vertices, in order. No weight is negative; rows sum to 1.
     method : str
         Solver that succeeded: "direct" unless that failed.
 
@@ -83,7 +83,9 @@ def inpaint(
         solve = _iterative(matrix) if "conjugate" in method else _factorised(matrix)
         if solve is not None and _is_true(solve, known):
             return _solved(solve, known, weights[given], report), method
-    raise RigError("the weights of unmatched vertices could not be solved for: mesh too irregular")
+    raise RigError(
+        "the weights of unmatched vertices could not be computed: the mesh is too irregular"
+    )
 
 
 def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
@@ -107,7 +109,7 @@ def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
 
 
 def _is_true(solve: _Solve, border: Any) -> bool:
-    """Return whether known weights of 1 everywhere give 1 everywhere, as they must."""
+    """Return whether known weights of 1 everywhere give 1 everywhere, as they should."""
     ones = solve(-np.asarray(border.sum(axis=1)).reshape(-1, 1))
     return bool(np.isfinite(ones).all() and np.abs(ones - 1.0).max() <= _TRUE)
 
@@ -119,7 +121,7 @@ def _shifted(matrix: Any) -> Any:
 
 
 def _factorised(matrix: Any) -> _Solve | None:
-    """Return a solver by sparse factorisation, None if that fails."""
+    """Return a solver by sparse factorisation, or None if that fails."""
     linear = scipy_part("sparse.linalg")
     try:
         # Symmetric and positive: no pivoting, and an ordering that preserves the symmetry.
@@ -135,7 +137,7 @@ def _factorised(matrix: Any) -> _Solve | None:
 
 
 def _iterative(matrix: Any) -> _Solve:
-    """Return a solver by conjugate gradients, all columns together, diagonal preconditioner."""
+    """Return a solver by conjugate gradients for all columns, with diagonal preconditioner."""
     diagonal = matrix.diagonal()
     scale = np.divide(1.0, diagonal, out=np.ones_like(diagonal), where=diagonal > 0.0)[:, None]
 

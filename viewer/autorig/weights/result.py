@@ -34,11 +34,11 @@ class RigidIslands:
     vertices : (R,) int32
         The first vertex of each island.
     counts : (R,) int32
-        Number of vertices of each, coincident ones counted once.
+        Number of vertices of each island; coincident vertices count once.
     joints : (R,) int32
-        The joint with the largest weight in each.
+        The joint with the largest weight in each island.
     distances : (R,)
-        From the mean of each one's vertices to the template, in the target's unit.
+        Distances from the mean of each island's vertices to the template, in the target's unit.
     """
 
     vertices: Ints
@@ -58,14 +58,14 @@ class WeightTransfer:
     matched : (V,) bool
         Vertices whose weights are those of the template's surface.
     inpainted : (V,) bool
-        Vertices whose weights were solved for. Those neither matched nor inpainted belong to a
-        rigid island.
+        Vertices whose weights were inpainted. Vertices that are neither matched nor inpainted
+        belong to a rigid island.
     distances : (V,)
         Distances to the template, in the target's unit.
     angles : (V,)
-        Radians between the normals of both, 0 where the target has none.
+        Radians between the normals of both meshes; 0 where the target has none.
     points : SurfacePoints or None
-        The V points of the template that were compared; None if only its vertices were.
+        The V points of the template that were compared; None if only its vertices were compared.
     backwards : (V,) bool
         Vertices of parts whose triangles are wound the wrong way.
     rigid : RigidIslands

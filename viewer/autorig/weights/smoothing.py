@@ -24,11 +24,11 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -
     Parameters
     ----------
     weights : sparse (W, J) in rows
-        Rows that add up to 1 still do afterwards.
+        Rows that sum to 1 keep that sum.
     triangles : (F, 3)
         Vertex indices; their edges define neighbours.
     active : (W,) bool
-        Vertices that change. The others are only read.
+        Vertices that change; the others are only read.
     rounds : int
         Number of iterations.
 
@@ -70,14 +70,14 @@ def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> 
     triangles : (F, 3)
         Vertex indices.
     sources : (W,) bool
-        Where the paths start.
+        Vertices at which the paths start.
     reach : float
-        In the unit of ``positions``.
+        Maximum length in the unit of ``positions``.
 
     Returns
     -------
     (W,) bool
-        Sources included.
+        Reached vertices, including the sources.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     if not sources.any():

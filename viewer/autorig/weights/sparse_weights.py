@@ -17,20 +17,21 @@ _NO_SUM = 1e-12  # weights with a smaller sum cannot be normalised
 
 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:
-    """Return a skin's weights as a sparse (V, J) matrix in rows that add up to 1.
+    """Return a skin's weights as a sparse (V, J) matrix whose rows sum to 1.
 
     Parameters
     ----------
     skin : Skin
-        Rows need not add up to 1; repeated weights for a joint are added, negative ones set to 0.
+        Stored weights need not sum to 1; repeated weights for a joint are added, negative ones set
+        to 0.
     triangles : (T, 3)
         Triangles of the same mesh. Vertices without triangles may have no weights.
 
     Raises
     ------
     RigError
-        If the skin has fewer vertices than the triangles refer to, or the weights of a
-        corner of a triangle add up to 0.
+        If the skin has fewer vertices than the triangles refer to, or the weights of a triangle
+        corner sum to 0.
     """
     if triangles.max(initial=-1) >= skin.n_vertices:
         raise RigError(
@@ -54,7 +55,7 @@ def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) 
     Parameters
     ----------
     rows : sparse (V, J) in rows
-        Rows that add up to 1.
+        Rows that sum to 1.
     inverse_bind : (J, 4, 4)
         Bind-space-to-joint matrices.
     max_influences : int, optional
@@ -74,7 +75,7 @@ def scaled_rows(matrix: Any, factors: Floats) -> Any:
 
 
 def put_rows(rows: Any, where: Any, values: Any) -> Any:
-    """Return sparse rows with those at ``where`` replaced by ``values``; no repeated indices."""
+    """Return sparse rows with those at ``where``, unique indices, replaced by ``values``."""
     sparse = scipy_part("sparse")
     kept = np.ones(rows.shape[0])
     kept[where] = 0.0

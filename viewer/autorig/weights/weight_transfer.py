@@ -40,7 +40,7 @@ class WeightSettings:
     Attributes
     ----------
     match : MatchSettings
-        When a vertex counts as lying on the template.
+        Criteria by which a vertex lies on the template.
     smoothing_rounds : int
         Smoothing iterations of the inpainted weights and their neighbourhoods; 0 for none.
     max_influences : int or None
@@ -72,7 +72,7 @@ def transferred_weights(
     Parameters
     ----------
     template : Template
-        Its surface, aligned with the target.
+        The template's surface, aligned with the target.
     weights : Skin
         Weights of the template's vertices.
     positions : (V, 3)
@@ -87,8 +87,8 @@ def transferred_weights(
     Returns
     -------
     WeightTransfer
-        Rows add up to 1. No weight of the template is dropped, only inpainted ones below 1e-6, and
-        those of corners with a barycentric coordinate below 1e-6.
+        Weights whose rows sum to 1. No weight of the template is dropped, only inpainted weights
+        below 1e-6, and those of corners with a barycentric coordinate below 1e-6.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def transferred_weights(
 
 
 def _without_residue(points: SurfacePoints) -> SurfacePoints:
-    """Return points snapped to edges and corners, without small coordinates left by rounding."""
+    """Return points snapped to edges and corners, without small coordinates caused by rounding."""
     kept = np.where(points.barycentric < NEGLIGIBLE, 0.0, points.barycentric)
     return replace(points, barycentric=kept / kept.sum(axis=1, keepdims=True))
 
@@ -206,7 +206,7 @@ def _with_rigid(
 def _inpainted(
     target: Welded, size: float, rows: Any, matched: Bools, unknown: Bools, report: Report
 ) -> tuple[Any, str]:
-    """Solve for the unknown rows on the mesh scaled to size 1, as the operator is unitless."""
+    """Solve for the unknown rows on the mesh scaled to size 1, as the operator is dimensionless."""
     if not unknown.any():
         return rows, "direct"
     report(0.5, "measuring the surface")

@@ -14,7 +14,7 @@ def input_files(text: str) -> list[Path]:
 
     ``text``: a file; several joined by ``+``; a folder in a known format (PIG, EasyMocap); or
       any folder with rig files, all opened together, such as a student's submission.
-    Raises FormatError if it is a folder without a readable file.
+    Raises FormatError for a folder without a readable file.
 
     >>> input_files("arm.skel+arm.skin") == [Path("arm.skel"), Path("arm.skin")]
     True

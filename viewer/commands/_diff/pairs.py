@@ -43,10 +43,10 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
     """Pair the actors of two scenes, and the motions of paired actors.
 
     People of captures are paired by their number. Actors with the same name are paired first, of
-    the same kind if there are several; then actors of the same kind, skinned figures with
-    skinned figures; then the rest, in order. Keyframed clips are assigned to any skeleton they
-    fit when files are opened, so a clip with the same name as the other actor's clip takes
-    precedence, then the actor's own, then one assigned to an unpaired actor.
+    the same kind if there are several; then actors of the same kind, such as skinned figures; then
+    the rest, in order. Keyframed clips are assigned to any skeleton they fit when files are opened,
+    so a clip with the same name as the other actor's clip takes precedence, then the actor's own,
+    then one assigned to an unpaired actor.
 
     ``first``, ``second``: actors of the reference and of the other scene; not modified.
     """
@@ -99,8 +99,8 @@ def _with_clips(
 ) -> tuple[list[Actor], list[Clip]]:
     """Return actors with the keyframed clips to compare, and the remaining clips.
 
-    ``actors``: the paired ones.
-    ``lone``: the unpaired ones of the same scene; their clips may belong to paired actors.
+    ``actors``: the paired actors.
+    ``lone``: the unpaired actors of the same scene; their clips may belong to paired actors.
     ``partners``: the motion of each actor's counterpart.
     """
     pool = [actor.clip for actor in (*actors, *lone) if isinstance(actor.clip, Clip)]
@@ -125,7 +125,7 @@ def _with_clips(
 
 
 def _rank(clip: Clip, actor: Actor, partner: Motion | None) -> int:
-    """Return the rank of a clip's match with the other motion, 0 is best; ``_N_RANKS`` if none."""
+    """Return the rank of a clip's match with the other motion: 0 is best, ``_N_RANKS`` no match."""
     if isinstance(partner, Clip) and clip.name == partner.name:
         return 0
     if clip is actor.clip:

@@ -40,7 +40,7 @@ class Heat:
 def heat_of(name: str, posed: Sequence[tuple[Actor, Difference]]) -> Heat | None:
     """Return the heat map of a comparison; None if no mesh was compared.
 
-    ``name``: of the compared files, for the legend.
+    ``name``: name of the compared files, for the legend.
     ``posed``: the reference's actors in their worst poses.
     """
     actors, most = [], 0.0

@@ -63,7 +63,7 @@ class Numbering:
     def time_of(self, frame: int, option: str = "--frame") -> float:
         """Return the time of a frame in seconds.
 
-        ``frame``: its number.
+        ``frame``: number of the frame.
         ``option``: the option that gave it, for messages.
         Raises ViewerError if there is no such frame.
         """
@@ -78,7 +78,7 @@ class Numbering:
     def checked_time(self, time: float) -> float:
         """Return a time, checked to lie within the motions.
 
-        A capture's last frame extends for half a frame's duration, since nobody enters its exact
+        A capture's last frame is extended by half a frame's duration, since nobody enters its exact
         time.
 
         Raises ViewerError if the time lies outside the captures.
@@ -93,7 +93,7 @@ class Numbering:
         return min(max(time, self.start), self.end)
 
     def span(self, asked: Range | None) -> tuple[int, int]:
-        """Return the first frame of a range and the one after its last, counted from 0.
+        """Return the first frame of a range and the frame after its last, counted from 0.
 
         Raises ViewerError if the range begins outside the motions, or exceeds a capture.
         """
@@ -115,8 +115,8 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     The longest capture defines it: at its own rate, frames have the numbers in its files. At
     another rate, or if there are only keyframed clips, frames count from 0.
 
-    ``actors``: with or without motions.
-    ``rate``: frames per second; that of the longest capture, or 30, if omitted.
+    ``actors``: actors with or without motions.
+    ``rate``: frames per second; if omitted, the rate of the longest capture, or 30.
     """
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
@@ -155,7 +155,7 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
         help="frames per second of captures, and for numbering the frames of clips "
         "(default: the file's own, or 30)",
     )
-    # Commands that name the option differently use their own name in messages.
+    # Commands with another name for the option use that name in messages.
     parser.set_defaults(frame_option="--frame")
 
 

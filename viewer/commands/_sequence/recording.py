@@ -96,7 +96,7 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
 
 
 def _kind(arguments: argparse.Namespace, output: Path) -> tuple[str, bool]:
-    """Return the kind of output, and whether it is certain; "" for a still image."""
+    """Return the kind of output, "" for a still image, and whether the kind is certain."""
     asks = arguments.frames is not None or arguments.turntable is not None
     if arguments.contact_sheet is not None:
         return "sheet", True
@@ -221,13 +221,13 @@ def draw_sequence(
             cells = f"cells of a contact sheet of {size[0]} x {size[1]} pixels"
             check_size(offscreen.context, frame_size, cells)
         steps = record(recording, offscreen.renderer, sink)
-        # Closed while the context still exists, even after an error.
+        # The drawing is closed while the context still exists, even after an error.
         with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
             for progress in steps:
                 line.show(progress.done)
                 if (
                     progress.done < progress.total
-                ):  # afterwards the file may be complete at any moment
+                ):  # after this, the file may be complete at any moment
                     poll()
         print_warnings(offscreen.renderer.notes)
     return _summary(request, shots, outputs, frame_size, sink)

@@ -24,7 +24,7 @@ _FULL = 360.0  # degrees
 
 @dataclass(frozen=True, slots=True)
 class Turntable:
-    """Rotation of the camera in degrees, and its duration in seconds; None for the motion's."""
+    """Rotation of the camera in degrees, and its duration in seconds; None for the whole motion."""
 
     degrees: float
     seconds: float | None
@@ -39,7 +39,7 @@ class Request:
     kind : "pictures", "video", "sheet" or "onion"
         One file per frame, one video file, or one image of all frames: in cells or superimposed.
     output : Path
-        As given; includes ``{frame}`` for images.
+        The given path; includes ``{frame}`` for images.
     range : Range or None
         Range of frames; None for the whole motion.
     turntable : Turntable or None
@@ -129,7 +129,7 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
         places, more = _places(request, arguments, numbering, rates)
         notes += [*more, *_overridden(arguments, scene)]
     else:
-        assert request.turntable is not None  # or nothing would move
+        assert request.turntable is not None  # otherwise nothing would move
         places = np.zeros(_count((request.turntable.seconds or _ROTATION_SECONDS) * rates.drawn))
     seconds = len(places) / rates.drawn
     if request.kind == "sheet":
@@ -213,11 +213,11 @@ def _spread(places: Floats, count: int, moves: bool) -> Floats:
 
 
 def _too_few(option: str, found: int, wanted: int) -> list[str]:
-    """Return a message if there are fewer frames than requested; none is shown twice."""
+    """Return a message if there are fewer frames than requested; no frame is shown twice."""
     if found == wanted:
         return []
     frames = "is 1 frame" if found == 1 else f"are {found} frames"
-    return [f"--{option}: there {frames}, not {wanted}; none is shown twice"]
+    return [f"--{option}: there {frames}, not {wanted}; no frame is shown twice"]
 
 
 def _overridden(arguments: argparse.Namespace, scene: Scene) -> list[str]:

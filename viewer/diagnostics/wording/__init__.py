@@ -17,12 +17,15 @@ from viewer.diagnostics.wording import (
     comparison,
     easymocap,
     export,
+    fbx,
+    gltf,
     joints,
     kinds,
     loading,
     meshes,
     morph,
     motion,
+    nodes,
     obj,
     pictures,
     ply,
@@ -36,11 +39,14 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
     *(archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
-_CODED = (reading, weights, bindings, skeletons, meshes, clips, rigging, comparison, export)
+_CODED = (
+    *(reading, weights, bindings, skeletons, meshes, clips, gltf),
+    *(rigging, comparison, export),
+)
 
 CODES: dict[str, Code] = {
     code: row for table in _CODED for code, row in sorted(table.CODES.items())

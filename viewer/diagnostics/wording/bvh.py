@@ -27,12 +27,12 @@ PHRASES = {
     "bvh-frames": "{n:#frame}",
     "bvh-part": "{n} of {width} numbers for the next",
     # Estimates of unit and up axis; in inches, 0 if that would be no likely size
-    "unit-from-size": "taken for {unit} (skeleton {size:.4g} high{metres:+; inches would be "
+    "unit-from-size": "{unit} assumed (skeleton {size:.4g} high{metres:+; inches would be "
     "{metres:.3g} m})",
     "unit-unknown": "unit unknown (skeleton {size:.4g} high{metres:+; inches would be "
     "{metres:.3g} m})",
-    "up-of-longest": "{up} taken for up: the rest skeleton is longest along {up}",
-    "up-of-head": "{up} taken for up: the head is above the feet along {up}",
-    "up-against-rest": "{up} taken for up, though the rest skeleton stands along {axis}",
-    "up-against-frames": "{up} taken for up, but in its frames it stands along {axis}",
+    "up-of-longest": "{up} up assumed: the rest skeleton is longest along {up}",
+    "up-of-head": "{up} up assumed: the head is above the feet along {up}",
+    "up-against-rest": "{up} up assumed, although the rest skeleton stands along {axis}",
+    "up-against-frames": "{up} up assumed, although the skeleton stands along {axis} in the frames",
 }

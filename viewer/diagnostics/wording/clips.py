@@ -41,8 +41,8 @@ MESSAGES = {
     "C010.one-time": "starts and ends at {time:zg} s",
     "C011.point": "{name:text} has a confidence below {limit:g} in {percent:.0f} % of the {n} "
     "frames in which it is visible (first: frame {frame})",
-    "C011.more-points": "{n:#more keypoint|has|have} a confidence below {limit:g}: {points:all} of "
-    "the frames in which they are visible",
+    "C011.more-points": "{n:#more keypoint|has|have} a confidence below {limit:g} in some of the "
+    "frames in which they are visible: {points:all}",
     "C012.points": "{n:#keypoint/{all}|is|are} never visible: {names:list}",
     "C013.heights": "feet rest at {n:#height} ({levels:list}): ground height unclear, feet not "
     "checked",

@@ -31,8 +31,7 @@ MESSAGES = {
     "the first has {first:text}, the second has {second:text}",
     "D002.partner": "compared with {name:name}",
     "D002.points-by-index": "no point names in common: compared by index",
-    "D002.rates": "frame rates differ ({first:g} and {second:g} fps): compared at that of the "
-    "first",
+    "D002.rates": "frame rates differ ({first:g} and {second:g} fps): compared at the first",
     "D002.searched": "closest points computed in {n:#frame/{all}}",
     "D002.up": "up axes differ ({first} and {second}): compared without conversion",
 }

@@ -7,7 +7,7 @@ CODES = {
     "X002": Code(
         "note", "error of a written file", "none if it is small; otherwise choose another format"
     ),
-    "X003": Code("note", "data that is not written", "choose a format that can hold it"),
+    "X003": Code("note", "data that is not written", "choose a format that can store it"),
     "X004": Code("note", "missing frames of a written motion", "choose another --gaps"),
     "X005": Code("note", "data that is written in another form", "none if intentional"),
 }
@@ -40,8 +40,8 @@ MESSAGES = {
     "X001.skin": "{n:#vertex}",
     "X001.rigged": "the figure with its rig, the target's pose, confidence",
     "X001.amass": "{n:#frame} of {model} at {rate:g} fps, {up} up",
-    "X001.easymocap": "{n:#frame} of {people:?1 person|{people} people}, {up} up; EasyMocap stores "
-    "no frame rate: it is {rate:g} fps",
+    "X001.easymocap": "{n:#frame} of {people:?1 person|{people} people}, {up} up; EasyMocap does "
+    "not store the frame rate of {rate:g} fps",
     "X001.pose-at-frame": "one frame: the pose at frame {frame}",
     "X001.pose-at-time": "one frame: the pose at {time:zg} s",
     "X001.current-pose": "one frame: nothing moves, so the current pose was written",
@@ -53,13 +53,13 @@ MESSAGES = {
     "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
     "to {length}{extent:+ ({})}",
     # Omitted data
-    "X003.parts": "not held by {format}: {parts:all}",
+    "X003.parts": "not stored in {format}: {parts:all}",
     "X003.clip-placement": "the placement of the whole figure is not part of its clip and is "
     "omitted",
-    "X003.clip-scale": ".anim cannot hold the figure's scale of {scale:g}, which is omitted",
+    "X003.clip-scale": ".anim cannot store the figure's scale of {scale:g}, which is omitted",
     "X003.clip-translations": ".anim translates only the root: translations of other joints, up to "
     "{length}, are omitted",
-    "X003.clip-shape": ".anim holds no shape: the weights of blend shapes are omitted",
+    "X003.clip-shape": ".anim stores no shape: the weights of blend shapes are omitted",
     "X003.body-translations": "translations of joints are omitted (up to {distance:.3g} m)",
     "X003.body-scale": "the figure's scale is omitted ({low:.6g} to {high:.6g})",
     "X003.rigged-correctives": "pose correctives cannot be stored in .skel and .skin: the rest "
@@ -68,8 +68,8 @@ MESSAGES = {
     "X003.absent": "{figure:text}: absent in {frames}, not written",
     "X003.absent-now": "{figure:text}: absent at that time, not written",
     "X003.absent-in-range": "{figure:text}: absent throughout the range, not exported",
-    "X003.no-motion": "{figure:text}: it has no motion, so it is not written",
-    "X003.no-joints": "{figure:text}: it has no joints, so it is not written",
+    "X003.no-motion": "{figure:text}: no motion, not written",
+    "X003.no-joints": "{figure:text}: no joints, not written",
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
     "keypoints3d folder",
@@ -80,7 +80,7 @@ MESSAGES = {
     "X004.kept": "{n:?frame|frames} {gaps:list} missing, as in the original motion",
     "X004.of-person": "{person}: {remark}",
     # Changed data
-    "X005.seams": "split at texture seams: {before} vertices are {after} in the .skin",
+    "X005.seams": "split at texture seams: {before} vertices become {after} in the .skin",
     "X005.common-root": "several roots: a common parent joint {joint:name} was added",
     "X005.unit-unknown": "lengths are unchanged: the unit of {figure:text} is unknown",
     "X005.unit-unknown-metres": "lengths are unchanged: the unit of {figure:text} is unknown, and "
@@ -98,7 +98,7 @@ MESSAGES = {
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
-    "X005.morph-normals": "normals are not affected by these: glTF does not define it",
+    "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
     "X005.influences": _INFLUENCES,
     "X005.no-influence": '{n:#vertex} without influence: bound to the node "fixed", which never '
     "moves",
@@ -109,7 +109,7 @@ MESSAGES = {
     "--model for exact translations)",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",
-    "X005.untracked": "{names:all}: without a track, possibly a different person in each frame",
+    "X005.untracked": "{names:all}: not tracked, possibly a different person in each frame",
     "X005.of-person": "{person}: {remark}",
 }
 
@@ -126,7 +126,7 @@ PHRASES = {
     "written-joints": "{n:#joint}",
     "missing-frame": "{frame}",
     "missing-frames": "{first} to {last}",
-    # What stands in place of missing frames
+    # Replacements of missing frames
     "pose-held": "the last pose is held",
     "pose-held-and-marked": "the last pose is held, and the frames are marked in present",
     "interpolated": "interpolated",
@@ -158,7 +158,7 @@ PHRASES = {
     "single-precision": "the mesh is far from its origin for glTF's single precision",
     # Parts of a figure
     "part-blend-shapes": "{n:#blend shape}",
-    "part-baked-shapes": "{n:#blend shape} as such",
+    "part-baked-shapes": "{n:#blend shape} (baked into the mesh)",
     "part-current-shape": "{n:#blend shape} (the current shape is kept)",
     "part-correctives": "pose correctives",
     "part-up": "the up axis {up}",
@@ -168,6 +168,7 @@ PHRASES = {
     "part-reduced": "the reduced mesh",
     "part-regressor": "the joint regressor",
     "part-limits": "limits of joints",
+    "part-all-materials": "materials and textures",
     "part-materials": "material properties except one texture each",
     "part-occlusion": "occlusion maps",
     "part-alpha-cutoff": "alpha cutoffs",

@@ -28,6 +28,7 @@ MESSAGES = {
     "{found:quoted}; ignored",
     "F006.mtl-number": "{word:text}: expected a number from 0 to 1, found {found:quoted}; ignored",
     "F007.mtl-statements": "{statements:list8} not drawn",
+    "F005.mtl-moved": "texture {name:text} not found: {used:text} next to the library is used",
     "F005.library": "material library {problem}; drawn untextured",
     "F005.library-refused": "material library {name:text} {reason}",
     "F005.mtl-materials": "{n:#material|is|are} not in any library (first: {material:text}): drawn "

@@ -18,7 +18,7 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
 
     ``matrices`` (..., 3, 3): rotations for column vectors.
     ``order``: ``"zyx"`` for R = Rz Ry Rx.
-    Returns (..., 3): radians, in the order of the axes; the middle one from -pi / 2 to pi / 2.
+    Returns (..., 3): radians, in the order of the axes; the middle angle is from -pi / 2 to pi / 2.
     """
     i, j, k = ("xyz".index(letter) for letter in order)
     sign = _sign(order)
@@ -35,18 +35,19 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
 def unrolled(angles: Floats, order: str) -> Floats:
     """Return equivalent angles that are nearest to those of the previous frame.
 
-    (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation, and so are multiples of 2 pi
-    more. If the middle angle is +-pi / 2, only the sum or difference of the outer two is defined.
+    (a, b, c) and (a + pi, pi - b, c + pi) are the same rotation, as are angles that differ by
+    multiples of 2 pi. If the middle angle is +-pi / 2, only the sum or difference of the outer two
+    is defined.
 
     ``angles`` (N, ..., 3): radians, one row per frame; result of ``euler_angles``.
     ``order``: order of the axes.
-    Returns (N, ..., 3): radians, of any size.
+    Returns (N, ..., 3): radians, not limited to one revolution.
     """
     if len(angles) < 2:
         return angles.copy()
     angles = _unlocked(angles, order)
     other = angles * [1.0, -1.0, 1.0] + np.pi
-    # The cost of switching is the same from either form, so the switches accumulate.
+    # Switching costs the same from either form, so the number of switches accumulates.
     stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
     change = np.abs(_wrapped(other[1:] - angles[:-1])).sum(axis=-1)
     changed = np.logical_xor.accumulate(change < stay - 1e-9, axis=0)

@@ -24,7 +24,7 @@ from viewer.rig.kinematics import forward_kinematics, world_matrices
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 
-_BLOCK = 4096  # frames at a time, so that matrices of all frames never exist at once
+_BLOCK = 4096  # frames at a time, so that the matrices of all frames never exist at once
 _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 
@@ -54,11 +54,11 @@ class Body:
     Attributes
     ----------
     offsets : (J, 3)
-        Offset at rest from the parent; for roots from the figure's origin.
+        Offset at rest from the parent; for roots, from the figure's origin.
     angles : (F, J, 3)
         Radians, in the order of the rotation channels.
     positions : (F, J, 3)
-        Relative to the parent, including the offset; for roots in the file's space.
+        Relative to the parent, including the offset; for roots, in the file's space.
     moves : (J,) bool
         Joints whose positions differ from the offset.
     places : (F, J, 3)
@@ -73,7 +73,7 @@ class Body:
 
 
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
-    """Return joint space to figure space with all DOFs at 0, for given rest translations."""
+    """Return joint-to-figure matrices with all DOFs at 0, for given rest translations."""
     skeleton = replace(figure.require_skeleton(), rest_translations=offsets)
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
@@ -83,11 +83,10 @@ def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
 def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: Space) -> Body:
     """Return the contents of a file for a figure's frames.
 
-    ``figure``: without its shape applied; the frames hold the shape weights.
-    ``frames``: without missing frames.
-    ``reference``: frame that defines the shape and scale of all bones; roots follow every frame.
-    ``order``: order of the rotation channels.
-    ``space``: transform to the file's space.
+    ``figure``: figure without its shape applied; the frames contain the shape weights.
+    ``frames``: frames, none of them missing.
+    ``reference``: frame that defines the shape and scale of all bones; root positions follow every
+    frame. ``order``: order of the rotation channels. ``space``: transform to the file's space.
     """
     skeleton = figure.require_skeleton()
     parents, count = skeleton.parents, frames.n_frames

@@ -11,7 +11,7 @@ from viewer.rig.units import METRES
 _MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
 _FEW = 4  # minimum number of vertices for measuring a joint's extent
 _TOO_SHORT = 0.1  # fraction of the parent bone: shorter ends are implausible
-_HALF = 0.5  # fraction of the parent bone: length of an end without any other estimate
+_HALF = 0.5  # fraction of the parent bone: length of an end without another estimate
 _NO_SIZE = 0.1  # metres: the end of a skeleton without any bone
 _DEFAULT_END = 1.0  # the same, if the unit is unknown
 
@@ -19,10 +19,10 @@ _DEFAULT_END = 1.0  # the same, if the unit is unknown
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:
     """Return the offsets of end sites at rest; none is zero.
 
-    ``figure``: with its shape applied.
+    ``figure``: figure with its shape applied.
     ``rest`` (J, 4, 4): joint space to figure space in the rest pose.
     ``leaves`` (L,): joints without children.
-    Returns (L, 3): from the joint, figure space.
+    Returns (L, 3): offsets from the joint in figure space.
     """
     skeleton = figure.require_skeleton()
     ends = np.zeros((len(leaves), 3))

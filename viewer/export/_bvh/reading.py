@@ -6,7 +6,7 @@ x and e are as in ``body``. A joint with the rest matrix P then has::
     linear part  s x^-1 D e P        position  x^-1 p / factor
 
 A file has no mesh. Its vertices are those of the figure's skin in the shape of the file's bones,
-skinned with LBS and with pose correctives from the file's rotations.
+skinned with LBS, with pose correctives from the file's rotations.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class BvhFile:
     reference : int
         Frame that defines the shape and scale of the file's bones.
     ahead : int
-        Index in the file of the animation's first frame; negative if the file begins later.
+        Index of the animation's first frame in the file; negative if the file begins later.
     """
 
     path: Path
@@ -68,10 +68,10 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
     """Return the contents of a file as poses of a figure.
 
     ``file``: the written file.
-    ``figure``: the original, without its shape applied.
+    ``figure``: original figure without its shape applied.
     ``frames``: the written frames. They define the placement of the whole figure, which is applied
       after skinning, without weights.
-    ``how``: skinning, whose correctives are applied if enabled.
+    ``how``: skinning; its correctives are applied if enabled.
     """
     space = file.space
     motion = bvh.read(Source(file.path, file.text))
@@ -107,7 +107,7 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
 
 
 def _bound(figure: Figure, weights: Floats) -> Floats:
-    """Return the inverse bind matrices of a shape, identity matrices without a skin."""
+    """Return the inverse bind matrices of a shape; identity matrices if there is no skin."""
     if figure.skin is None or not figure.is_attached:
         return np.tile(np.eye(4), (figure.require_skeleton().n_joints, 1, 1))
     bound = figure.skin.inverse_bind.copy()

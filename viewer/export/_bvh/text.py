@@ -30,15 +30,15 @@ def bvh_text(
 ) -> str:
     """Return the text of a whole file.
 
-    ``names``: unique, of letters, digits and underscores.
+    ``names``: unique names of letters, digits and underscores.
     ``parents`` (J,): parent indices; the first joint is the only root.
-    ``offsets`` (J, 3): offsets from the parent; the root's is written as 0.
+    ``offsets`` (J, 3): offsets from the parent; the root's offset is written as 0.
     ``ends``: offset of the End Site of every joint without children.
     ``moves`` (J,) bool: which joints have position channels.
     ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
     ``rate``: frames per second.
-    ``rows`` (F, J, 3), (F, J, 3): positions, and angles in degrees in that order.
-    ``digits``: decimals.
+    ``rows`` (F, J, 3), (F, J, 3): positions, and angles in degrees in the rotation order.
+    ``digits``: number of decimals.
     """
     order = depth_first(parents)
     lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)

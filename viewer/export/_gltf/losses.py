@@ -1,4 +1,4 @@
-"""Parts of a figure that glTF cannot hold, and measured errors of a file that is read back."""
+"""Parts of a figure that glTF cannot store, and measured errors of a file that is read back."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Written:
     Attributes
     ----------
     path : Path
-        Its path.
+        Path of the file.
     file : GltfFile
         Its parsed contents.
     tree : Tree
@@ -63,7 +63,7 @@ def gltf_losses(
     ``written``: the file.
     ``figure``: the original, without its shape applied.
     ``frames``: its poses.
-    ``rows`` (F,): the frames to compare.
+    ``rows`` (F,): frames to compare.
     ``how``: the requested skinning.
     ``shape``, ``influences``: the written shape and skin.
     ``first_frame``: number of the first frame; None for a single pose.
@@ -93,7 +93,7 @@ def gltf_losses(
 
 
 def _split(side: Side, sources: Ints) -> Side:
-    """Return a side with its vertices duplicated as in a file."""
+    """Return a side whose vertices are duplicated as in the file."""
     whole = side.exact
     assert side.body is not None  # the caller checked for a mesh
     body = body_rows(side.body, sources)

@@ -30,7 +30,7 @@ class Materials:
 
     ``document``: modified in place.
     ``mesh``: mesh with the materials.
-    ``color`` (r, g, b): linear, for surfaces without their own colour.
+    ``color`` (r, g, b): linear colour of surfaces without their own colour.
     """
 
     def __init__(self, document: Document, mesh: Mesh, color: Color | None) -> None:
@@ -101,19 +101,19 @@ class Materials:
         return rest
 
     def _add(self, name: str, surface: dict[str, Any], rest: dict[str, Any] | None = None) -> int:
-        # Unless the file states it, triangles may be wound either way.
+        # Triangles may be wound either way unless the file states that they are single-sided.
         rest = {"doubleSided": True} if rest is None else rest
         item = {"name": text_of(name), "pbrMetallicRoughness": surface, **rest}
         return self._document.add("materials", item)
 
     def _reference(self, texture: Texture, name: str) -> dict[str, Any]:
         """Return a texture's index with its transform; each image is written once."""
-        assert texture.image is not None  # the caller looked
+        assert texture.image is not None  # checked by the caller
         image = texture.image
         key = id(image), image.size
         if key not in self._images:
             png = self._document.picture(encode_png(image), texture.name or name)
-            # The pixels are kept alive, so that no other array can get the same id.
+            # The pixels are kept alive, so that no other array gets the same id.
             self._images[key] = png, image
         source, sampler = self._images[key][0], self._sampler(texture)
         pair = source, sampler
@@ -144,7 +144,7 @@ class Materials:
 
 
 def material_losses(mesh: Mesh) -> list[Diagnostic]:
-    """Return notes about material properties of a mesh that glTF cannot hold."""
+    """Return notes about material properties of a mesh that glTF cannot store."""
     lost = []
     for material in mesh.materials:
         values = {"material": material.name or "unnamed"}
@@ -181,7 +181,7 @@ def _placement(matrix: Floats) -> tuple[dict[str, Any], float]:
 def _packed(metallic: Texture | None, roughness: Texture | None) -> Texture:
     """Return one texture with roughness in green and metallic in blue."""
     first = roughness or metallic
-    assert first is not None and first.image is not None  # the caller looked
+    assert first is not None and first.image is not None  # checked by the caller
     if metallic is None or roughness is None or metallic.image is roughness.image:
         channels = {1: roughness, 2: metallic}
         if all(one is None or one.channel == column for column, one in channels.items()):

@@ -32,9 +32,9 @@ def add_mesh(
 
     ``document``: modified in place.
     ``name``: name of the figure.
-    ``shape``: shape of a figure whose mesh has vertices.
+    ``shape``: shape of a figure whose mesh is not empty.
     ``influences``: influences of the mesh; None if it is not skinned.
-    ``color`` (r, g, b): linear, of untextured surfaces.
+    ``color`` (r, g, b): linear colour of untextured surfaces.
     Returns ``mesh``: its index.
     Returns ``n_vertices``: number of written vertices; vertices on seams are
       duplicated.
@@ -64,7 +64,7 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
         "NORMAL": document.array(_normals(mesh)[sources], "VEC3", VERTICES),
     }
     if mesh.uvs is not None and len(mesh.uvs):
-        # glTF puts the first image row at v = 0, this program at v = 1.
+        # In glTF, the first image row is at v = 0, in this program at v = 1.
         uvs = mesh.uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
         attributes["TEXCOORD_0"] = document.array(uvs, "VEC2", VERTICES)
         if mesh.second_uvs is not None:
@@ -74,7 +74,7 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
 
 
 def _normals(mesh: Mesh) -> Floats:
-    """Return unit normals, computed from the triangles where the figure's cannot be normalised."""
+    """Return unit normals; those that cannot be normalised are computed from the triangles."""
     with np.errstate(over="ignore", invalid="ignore"):
         normals = unit(mesh.normals)
         odd = ~(np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _NOT_UNIT)

@@ -22,7 +22,7 @@ def moving(skeleton: Skeleton, frames: Frames) -> Bools:
 
 
 def still_locals(skeleton: Skeleton, rest: Locals, frames: Frames) -> Locals:
-    """Return the rest pose, with joints of constant translation at that translation."""
+    """Return the rest pose; joints whose translation is constant have that translation."""
     there = skeleton.rest_translations + frames.translations[0]
     chosen = moving(skeleton, frames)[:, None]
     translations = np.where(chosen, rest.translations, there)

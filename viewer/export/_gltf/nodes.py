@@ -57,7 +57,7 @@ class Tree:
     joints : list of J int
         Nodes of the joints, in the figure's order.
     fixed : list of int
-        The node of vertices without influence; one or none.
+        The node of vertices without influence, if there are any.
     """
 
     root: int
@@ -69,8 +69,8 @@ class Tree:
 def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
     """Return the local joint transforms of a pose.
 
-    ``skeleton``: with its shape applied.
-    ``pose``: DOFs in lengths and radians.
+    ``skeleton``: skeleton with its shape applied.
+    ``pose``: pose with DOFs in lengths and radians.
     """
     rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
     return Locals(local_matrices(skeleton, pose)[:, :3, 3], rotations, pose.scales)
@@ -90,7 +90,7 @@ def add_nodes(
 
     ``document``: modified in place.
     ``name``: name of the figure.
-    ``up``: the up axis of the figure's world.
+    ``up``: up axis of the figure's world.
     ``unit``: as in ``Figure.unit``.
     ``skeleton``, ``still``: the joints and their transforms.
     ``pose``: pose with the figure's placement.
@@ -119,7 +119,7 @@ def add_nodes(
 
 
 def _above(up: str, unit: str) -> dict[str, Any]:
-    """Return the node that rotates and scales the whole figure, with its name; may be empty."""
+    """Return the properties and name of the node above the whole figure; may be empty."""
     names, node = [], {}
     if up == "z":
         names.append("z up")

@@ -51,7 +51,7 @@ class GltfFile:
 
 
 def parsed(files: list[bytes]) -> GltfFile:
-    """Return a file from its bytes: of a ``.glb``, or of a ``.gltf`` and its buffer."""
+    """Return a file from the bytes of a ``.glb``, or of a ``.gltf`` and its buffer."""
     if files[0][:4] != b"glTF":
         return GltfFile(json.loads(files[0]), files[1] if len(files) > 1 else b"")
     (length,) = struct.unpack_from("<I", files[0], _HEAD)
@@ -165,7 +165,7 @@ def _body(
 
 
 def _skin(file: GltfFile, attributes: dict[str, int], n_joints: int, sets: int | None) -> Skin:
-    """Return the influences of a mesh; an unskinned one follows the last joint, its own node."""
+    """Return the influences of a mesh; an unskinned mesh follows the last joint, its own node."""
     count = file.root["accessors"][attributes["POSITION"]]["count"]
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]

@@ -39,12 +39,12 @@ class Shape:
 def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
     """Return the written form of a figure's shape.
 
-    Morph targets do not move joints, so a shape that affects the joints is baked into the mesh, and
-    so is one with too many targets.
+    Morph targets do not move joints, so a shape that affects joints or has too many targets is
+    baked into the mesh.
 
-    ``figure``: without its shape applied.
+    ``figure``: figure without its shape applied.
     ``weights`` (F, S) or (1, S): weights of its blend shapes over time.
-    ``reference``: the row to bake in.
+    ``reference``: index of the row to bake in.
     """
     used = np.flatnonzero(weights.any(axis=0))
     if figure.mesh is None or figure.blend_shapes is None or len(used) == 0:

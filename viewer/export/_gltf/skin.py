@@ -20,13 +20,13 @@ from viewer.rig.skin import (
 )
 
 PER_SET = 4
-_SUM = 1e-6  # smaller deviations from 1 are rounding errors of the figure's file
+_SUM = 1e-6  # smaller deviations from 1 are rounding errors of the original file
 _MOST_JOINTS = 65536  # joint indices have 16 bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Influences:
-    """A skin in the form that a file can hold.
+    """A skin in the form that a file can store.
 
     Attributes
     ----------
@@ -50,12 +50,12 @@ class Influences:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints the file's skin lists: one more if vertices are fixed."""
+        """Number of joints that the file's skin lists: one more if vertices are fixed."""
         return self.skin.n_joints + bool(self.n_fixed)
 
 
 def influences_of(skin: Skin) -> Influences:
-    """Return a skin in the form that glTF can hold.
+    """Return a skin in the form that glTF can store.
 
     ``skin``: a skin with arbitrary weights.
     Raises RigError if there are more joints than a file can number.
@@ -112,8 +112,8 @@ def influence_sets(
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
 
-    ``influences``: determines whether vertices are fixed; their node is bound at the origin.
-    ``inverse_bind`` (J, 4, 4): of the figure's joints.
+    ``influences``: determines whether any vertices are fixed; the node of these is bound at the
+    origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
     matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exact, as readers expect

@@ -20,7 +20,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
-_BLOCK = 1024  # poses at a time, so that matrices of all frames never exist at once
+_BLOCK = 1024  # poses at a time, so that the matrices of all frames never exist at once
 _CHUNK = 128  # poses per single-precision estimate
 _LIKELY = 4  # poses per chunk whose farthest vertex is measured first
 _SMALL = 0.05  # if joints add less than this fraction of the rest meshes' distance, skip skinning
@@ -34,7 +34,7 @@ _NO_REASONS: dict[str, object] = {"causes": [], "estimate": "", "rate": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class Farthest:
-    """The largest distance, with its joint or vertex and frame."""
+    """The largest distance, with the joint or vertex and the frame."""
 
     distance: float
     index: int
@@ -43,7 +43,7 @@ class Farthest:
 
 @dataclass(frozen=True, slots=True)
 class Apart:
-    """Distances larger than rounding.
+    """Distances above the rounding error.
 
     Attributes
     ----------
@@ -64,8 +64,9 @@ class Apart:
 def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
     """Return the distance, in figure units, up to which rounding errors are not reported.
 
-    ``figure``: defines the size.
-    ``frames``: define the distance of its joints from the origin. The tolerance grows with this
+    ``figure``: figure that defines the size.
+    ``frames``: frames that define the distance of the joints from the origin. The tolerance grows
+    with this
       distance, since numbers have larger rounding errors there, up to five times the usual one.
     ``rows`` (F,): the frames to use.
     """
@@ -83,13 +84,13 @@ def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
 def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | None = None) -> Apart:
     """Return the largest distances between joints and vertices of two sides over all poses.
 
-    Poses and vertices that cannot have the largest distance are skipped: the result is exact in
-    double precision, although only few vertices are skinned in it.
+    Poses and vertices that cannot have the largest distance are skipped: the result is exact,
+    although only few vertices are skinned in double precision.
 
     ``first``, ``second``: sides with the same joints and vertices, in the same space.
-    ``rows`` (F,): frames of the first.
+    ``rows`` (F,): frames of the first side.
     ``least``: threshold below which distances are ignored.
-    ``frames`` (F,): frames of the second; the same if omitted.
+    ``frames`` (F,): frames of the second side; the same if omitted.
     """
     others = rows if frames is None else frames
     if first.exact is not None or second.exact is not None:
@@ -176,7 +177,7 @@ class _Search:
 
 
 def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least: float) -> Apart:
-    """Compare sides with nonlinear skinning, for which there is no bound."""
+    """Compare sides with nonlinear skinning, for which no bound is known."""
     count = min(len(rows), _MOST)
     chosen = np.linspace(0, len(rows) - 1, count).round().astype(int)
     plain = [replace(side, body=None, exact=None) for side in (first, second)]
@@ -215,7 +216,7 @@ def apart_notes(
     """Return a note about the errors of a file, or an empty list if there are none.
 
     ``path``: the file.
-    ``figure``: the original.
+    ``figure``: original figure.
     ``found``: the measured distances.
     ``first_frame``: number of the first frame; None for a single pose.
     ``sources`` (V,): vertex of the figure for each compared vertex.
@@ -247,5 +248,5 @@ def apart_notes(
 
 
 def with_values(notes: list[Diagnostic], **values: object) -> list[Diagnostic]:
-    """Return notes with other values."""
+    """Return copies of notes with different values."""
     return [replace(note, values={**note.values, **values}) for note in notes]

@@ -29,7 +29,7 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
     linearly.
 
     ``path``: the written file.
-    ``animation``: its contents.
+    ``animation``: contents of the file.
     ``how``: skinning of the mesh.
     """
     motion, frames, rate = animation.motion, animation.frames, animation.frame_rate
@@ -59,11 +59,11 @@ def between_losses(
 ) -> list[Diagnostic]:
     """Return a note with the largest errors between an animation's frames, if there are any.
 
-    Keyframed curves are searched for the times of the largest error. A capture is defined only on
+    Keyframed curves are searched for the times of the largest error. A capture is defined only at
     its own frames, and is compared there.
 
     ``path``: the written file.
-    ``animation``: its contents.
+    ``animation``: contents of the file.
     ``found``: function from seconds (T,) to the poses that the file gives.
     ``how``: skinning of the mesh.
     ``also`` (T,): additional times at which captures are compared, seconds.

@@ -23,7 +23,7 @@ _NUMBERS = 9  # entries of a joint's rotation matrix, which drive the corrective
 class Bounds:
     """Bounds for two bodies with the same vertices and joints.
 
-    ``first``, ``second``: the bodies; the second has the first's correctives, or none.
+    ``first``, ``second``: the bodies; the second has the same correctives as the first, or none.
     """
 
     def __init__(self, first: Body, second: Body) -> None:

@@ -60,7 +60,7 @@ class Poses:
     palette : (F, J + 1, 4, 4)
         Skinning matrices; the last one is that of the whole figure.
     shifts : (F, 3)
-        Translations added to the vertices after skinning, without weights.
+        Translations added to the vertices after skinning, independent of weights.
     weights : (F, S) or (1, S)
         Weights of the blend shapes, relative to the reference shape.
     corrective_weights : (F, P)
@@ -102,7 +102,7 @@ def figure_side(
 ) -> Side:
     """Return an animated figure as a comparable side.
 
-    ``figure``: without its shape applied.
+    ``figure``: figure without its shape applied.
     ``frames``: its poses.
     ``how``: skinning of the mesh.
     ``reference`` (S,): weights of the reference shape.
@@ -140,7 +140,7 @@ def changing(frames: Frames, still: Floats) -> Rows:
 
 
 def anchored(palette: Floats, scales: Floats) -> Floats:
-    """Return skinning matrices (F, J, 4, 4) with that of the whole figure appended."""
+    """Return skinning matrices (F, J, 4, 4), followed by the matrix of the whole figure."""
     whole = np.zeros((len(palette), 1, 4, 4))
     whole[:, 0, [0, 1, 2], [0, 1, 2]] = scales[:, None]
     whole[..., 3, 3] = 1.0
@@ -200,7 +200,7 @@ def _skinning(figure: Figure, frames: Frames, world: Floats) -> Floats:
 
 
 def body_rows(body: Body, rows: Ints) -> Body:
-    """Return a body with a selection of its vertices, possibly repeated."""
+    """Return a body with a selection of its vertices, which may be repeated."""
     every = len(rows) == len(body.positions) and (rows == np.arange(len(rows))).all()
     if every:
         return body

@@ -1,4 +1,4 @@
-"""Search for the times at which two motions of one figure, given as curves, differ most.
+"""Search for the times at which two motions of one figure differ most, given as curves.
 
 Curves are smooth between their keys, so the difference is sampled there, and the highest samples
 are refined.
@@ -34,7 +34,7 @@ _MOST = 8192  # total number of samples before refinement
 _STEPS = 16  # maximum number of samples between two keys or frames
 _FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
 _LIKELY = 256  # number of likely spans, for joints and vertices each
-_INSET = 1e-6  # fraction of a span kept away from its keys, where curves may jump
+_INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
 _SHORT = 1e-6  # in frames: shorter spans are ignored
 _BLOCK = 1024  # poses at a time
 _NAMING = 1024  # approximate number of times at which all vertices are compared
@@ -92,8 +92,8 @@ def worst_times(
 ) -> WorstTimes:
     """Return candidate times of the largest distance between two motions.
 
-    ``figure``: without its shape applied.
-    ``one``, ``other``: functions from seconds (T,) to poses of the figure, without missing ones.
+    ``figure``: figure without its shape applied.
+    ``one``, ``other``: functions from seconds (T,) to poses of the figure, none of them missing.
     ``edges`` (E,): ascending times between which both are smooth, seconds.
     ``rate``: frames per second; defines the shortest relevant span.
     ``how``: skinning of the mesh; LBS replaces its method.

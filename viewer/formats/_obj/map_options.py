@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from viewer.formats._numbers import is_number, to_number
+from viewer.formats._text.numbers import is_number, to_number
 
 __all__ = ["MapOptions", "map_options"]
 
@@ -53,18 +53,19 @@ def map_options(text: str) -> MapOptions:
     found: dict[str, list[str]] = {}
     rest = text
     while rest.startswith("-"):
-        option, _, behind = rest.partition(" ")
+        option, behind = _first_word(rest)
+        option = option.lower()
         if option not in _VECTORS and option not in _OPTIONS:
             # A file whose name begins with "-".
             return MapOptions(text)
-        rest = behind.lstrip()
+        rest = behind
         values = found[option] = []
         for _ in range(3 if option in _VECTORS else _OPTIONS[option]):
-            value, _, behind = rest.partition(" ")
+            value, behind = _first_word(rest)
             if option in _VECTORS and not is_number(value.encode("utf-8", "surrogateescape")):
                 break
             values.append(value)
-            rest = behind.lstrip()
+            rest = behind
     return MapOptions(
         rest,
         scale=_vector(found, "-s"),
@@ -73,6 +74,12 @@ def map_options(text: str) -> MapOptions:
         channel=_CHANNELS.get(found.get("-imfchan", [""])[0].lower(), 0),
         strength=_number(found.get("-bm", ["1"])[0], 1.0),
     )
+
+
+def _first_word(text: str) -> tuple[str, str]:
+    """Return the text up to the first blank, and what follows the blanks."""
+    word, *behind = text.split(None, 1)
+    return word, behind[0] if behind else ""
 
 
 def _vector(found: dict[str, list[str]], option: str) -> tuple[float, float]:

@@ -6,13 +6,15 @@
     line  = "newmtl" name | color r (g b)? | number x | map option* file | anything else
     color = "Kd" | "Ke"                     linear; one number stands for three
     number = "Pr" | "Pm" | "d" | "Tr"       roughness, metallic, opacity, 1 - opacity
-    map   = "map_Kd" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d" | "norm" | "map_Kn"
+    map   = "map_Kd" | "map_Ka" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d"
+          | "norm" | "map_Kn" | "map_Bump" | "bump"
 
 ``Pr``, ``Pm`` and ``norm`` are those of the PBR extension (Burley and others, 2013, as Blender and
 tinyobjloader write it). An option is a word that begins with ``-`` and its values: ``-o`` and
 ``-s`` offset and scale the image, ``-clamp`` clamps it at its edges, ``-bm`` scales a normal map,
-``-imfchan`` picks a channel. Bump (height), specular and reflection maps and the rest of the
-extension are not drawn.
+``-imfchan`` picks a channel. ``map_Ka`` counts without ``map_Kd``. A bump map is drawn if its image
+holds normals; heights, specular and reflection maps and the rest of the extension are not drawn.
+Programs differ in details, see ``_REPLACING``, ``name_here`` and ``image_kinds``.
 """
 
 from __future__ import annotations
@@ -24,20 +26,26 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._numbers import to_number
+from viewer.formats._obj.image_kinds import is_cut_out, is_normal_map
 from viewer.formats._obj.map_options import MapOptions, map_options
+from viewer.formats._obj.names_here import name_here
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import to_number
 from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture
 
 __all__ = ["read_libraries"]
 
+_Load = Callable[[Source, str, int], Bytes | None]
+"""Function from library, file and offset to the pixels of an image."""
+
 _COLORS = {b"kd": "diffuse", b"ke": "emissive"}
 _NUMBERS = {b"pr": "roughness", b"pm": "metallic", b"d": "opacity", b"tr": "transparency"}
 _MAPS = {
     b"map_kd": "base_texture",
+    b"map_ka": "ambient_texture",
     b"map_ke": "emissive_texture",
     b"map_pr": "roughness_texture",
     b"map_pm": "metallic_texture",
@@ -45,17 +53,28 @@ _MAPS = {
     b"norm": "normal_texture",
     b"map_kn": "normal_texture",
 }
+_BUMPS = b"map_bump", b"bump"
 _NOT_DRAWN = (
-    *(b"map_ka", b"map_ks", b"map_ns", b"map_bump", b"bump", b"disp", b"decal", b"refl"),
+    *(b"map_ks", b"map_ns", b"map_tr", b"disp", b"map_disp", b"decal", b"refl", b"map_refl"),
     *(b"map_ps", b"ps", b"pc", b"pcr", b"aniso", b"anisor", b"map_pc", b"map_pcr"),
+    *(b"map_orm", b"map_rma"),
 )
+_REPLACING = b"Blender", b"3ds Max"
+"""Programs, named in a comment, whose maps replace the value beside them, which has its default."""
+
+_HEAD = 300  # bytes in which that comment is
+_ROUNDING = 1e-3  # by which values may exceed 1
 
 
 @dataclass(slots=True)
 class _Statements:
-    """What one ``newmtl`` states: values, and maps with their location in the library."""
+    """What one ``newmtl`` states: values, and maps with their location in the library.
+
+    ``replaces``: whether maps replace the values; otherwise they are multiplied.
+    """
 
     library: Source
+    replaces: bool = False
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     maps: dict[str, tuple[MapOptions, int]] = field(default_factory=dict)
 
@@ -75,19 +94,19 @@ def read_libraries(
         The materials that faces use.
     """
     known: dict[str, _Statements] = {}
+    loaded: dict[tuple[Source, str], Bytes | None] = {}
+
+    def load(library: Source, file: str, offset: int) -> Bytes | None:
+        if (library, file) not in loaded:
+            loaded[library, file] = load_image(library, file, offset)
+        return loaded[library, file]
+
     for text, offset in libraries:
         for library in _opened(source, text, offset):
-            _read(library, known)
+            _read(library, known, load)
     missing = [name for name in names if name not in known]
     if missing and libraries:
         source.warn("F005.mtl-materials", n=len(missing), material=missing[0])
-    loaded: dict[str, Bytes | None] = {}
-
-    def load(library: Source, file: str, offset: int) -> Bytes | None:
-        if file not in loaded:
-            loaded[file] = load_image(library, file, offset)
-        return loaded[file]
-
     return tuple(
         _material(name, known[name], load) if name in known else Material(name) for name in names
     )
@@ -96,13 +115,12 @@ def read_libraries(
 def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     """Return the libraries of one ``mtllib``: one whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
-    names = [whole]
-    path = referenced_path(source.path.parent, whole)
-    if " " in whole and not (path and path.is_file()):
-        names = whole.split()
+    folder = source.path.parent
+    names = whole.split() if " " in whole and name_here(folder, whole) is None else [whole]
     found = []
-    for name in names:
-        if referenced_path(source.path.parent, name) is None:
+    for written in names:
+        name = name_here(folder, written) or written
+        if referenced_path(folder, name) is None:
             source.warn("F005.library-refused", offset, name=name, reason=refused_text(name))
             continue
         library = source.beside(name.replace("\\", "/"))
@@ -115,24 +133,29 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     return found
 
 
-def _read(library: Source, known: dict[str, _Statements]) -> None:
+def _read(library: Source, known: dict[str, _Statements], load: _Load) -> None:
     """Record the statements of each material; of several with one name, the first is used."""
     now: _Statements | None = None
     ignored: dict[str, int] = {}
+    moved: set[str] = set()
     position = 0
+    replaces = any(program in library.data[:_HEAD] for program in _REPLACING)
     for line in library.data.replace(b"\r", b"\n").split(b"\n"):
         words = line.split(None, 1)
         word = words[0].lower() if words else b""
         rest = words[1].strip() if len(words) > 1 else b""
         if word == b"newmtl":
             name = rest.decode("utf-8", "surrogateescape")
-            now = None if name in known else _Statements(library)
+            now = None if name in known else _Statements(library, replaces)
             if now is not None:
                 known[name] = now
-        elif now is not None and word in _MAPS:
-            options = map_options(rest.decode("utf-8", "surrogateescape"))
-            if options.file:
-                now.maps.setdefault(_MAPS[word], (options, position))
+        elif now is not None and (word in _MAPS or word in _BUMPS):
+            options = _found_here(library, rest, position, moved)
+            if word in _BUMPS and not _holds_normals(library, options.file, position, load):
+                ignored.setdefault(words[0].decode("ascii"), position)
+            elif options.file:
+                kind = "bump_texture" if word in _BUMPS else _MAPS[word]
+                now.maps.setdefault(kind, (options, position))
         elif now is not None and (word in _COLORS or word in _NUMBERS):
             _record(now, words[0], rest, position)
         elif now is not None and word in _NOT_DRAWN:
@@ -140,6 +163,27 @@ def _read(library: Source, known: dict[str, _Statements]) -> None:
         position += len(line) + 1
     if ignored:
         library.warn("F007.mtl-statements", min(ignored.values()), statements=list(ignored))
+
+
+def _found_here(library: Source, text: bytes, position: int, moved: set[str]) -> MapOptions:
+    """Return a map with its file's name in this folder; warn once if it is another one."""
+    options = map_options(text.decode("utf-8", "surrogateescape"))
+    file = name_here(library.path.parent, options.file)
+    if file is None:
+        return options
+    if file != options.file.strip("\"'").replace("\\", "/") and file not in moved:
+        moved.add(file)
+        library.warn("F005.mtl-moved", position, name=options.file, used=file)
+    return replace(options, file=file)
+
+
+def _holds_normals(library: Source, file: str, position: int, load: _Load) -> bool:
+    """Return whether the image of a bump map exists and holds normals."""
+    path = referenced_path(library.path.parent, file)
+    if path is None or not path.is_file():
+        return False
+    image = load(library, file, position)
+    return image is not None and is_normal_map(image)
 
 
 def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
@@ -153,7 +197,7 @@ def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
     read = [to_number(text) for text in words[:count]]
     values = [value for value in read if value is not None]
     most = float("inf") if lower == b"ke" else 1.0
-    if len(values) != count or not all(0.0 <= value <= most for value in values):
+    if len(values) != count or not all(0.0 <= value <= most + _ROUNDING for value in values):
         written = word.decode("ascii")
         if is_color:
             limits = "from 0" if lower == b"ke" else "from 0 to 1"
@@ -161,47 +205,73 @@ def _record(now: _Statements, word: bytes, rest: bytes, position: int) -> None:
         else:
             now.library.warn("F006.mtl-number", position, word=written, found=rest)
         return
+    values = [min(value, most) for value in values]
     name = _COLORS[lower] if is_color else _NUMBERS[lower]
     now.numbers.setdefault(name, tuple(values * 3 if is_color and count == 1 else values))
 
 
-def _material(
-    name: str, stated: _Statements, load: Callable[[Source, str, int], Bytes | None]
-) -> Material:
+def _material(name: str, stated: _Statements, load: _Load) -> Material:
     """Return the material of one ``newmtl``."""
+    maps = dict(stated.maps)
+    for kind, other in (("base_texture", "ambient_texture"), ("normal_texture", "bump_texture")):
+        spare = maps.pop(other, None)
+        if spare is not None:
+            maps.setdefault(kind, spare)
     textures = {
         kind: _texture(options, load(stated.library, options.file, offset))
-        for kind, (options, offset) in stated.maps.items()
+        for kind, (options, offset) in maps.items()
     }
-    numbers = stated.numbers
-    cut = textures.pop("opacity_texture", None)
+    cut, numbers = textures.pop("opacity_texture", None), _numbers(stated, textures)
+    opacity = _opacity(numbers)
+    alpha_mode = "blend" if opacity < 1.0 or cut is not None else "opaque"
     if cut is not None and cut.image is not None:
-        textures["base_texture"] = _with_opacity(textures.get("base_texture"), cut)
+        base = textures.get("base_texture")
+        if base is not None and base.image is cut.image and cut.image[..., 3].min() == 255:
+            # The alpha of an image that has none; its brightness is not meant.
+            alpha_mode = "blend" if opacity < 1.0 else "opaque"
+        else:
+            whole = textures["base_texture"] = _with_opacity(base, cut)
+            assert whole.image is not None  # made from images
+            if opacity == 1.0 and is_cut_out(whole.image[..., 3]):
+                alpha_mode = "mask"
     parts: dict[str, Any] = dict(textures)
     for kind in ("roughness", "metallic"):
         if kind in numbers or f"{kind}_texture" in textures:
             # A map without a factor has full strength.
             parts[kind] = numbers.get(kind, (1.0,))[0]
-    if "normal_texture" in stated.maps:
-        parts["normal_scale"] = stated.maps["normal_texture"][0].strength
-    opacity = _opacity(numbers)
+    if "normal_texture" in maps:
+        parts["normal_scale"] = maps["normal_texture"][0].strength
     return Material(
         name,
         base_color=_base_color(numbers.get("diffuse"), opacity, "base_texture" in textures),
         emissive=_emissive(numbers.get("emissive"), "emissive_texture" in textures),
-        alpha_mode="blend" if opacity < 1.0 or cut is not None else "opaque",
+        alpha_mode=alpha_mode,
         is_physical="roughness" in parts or "metallic" in parts,
         **parts,
     )
+
+
+def _numbers(stated: _Statements, textures: dict[str, Texture]) -> dict[str, tuple[float, ...]]:
+    """Return the values of a material that count beside its textures."""
+    of_texture = {
+        "diffuse": "base_texture",
+        "emissive": "emissive_texture",
+        "roughness": "roughness_texture",
+        "metallic": "metallic_texture",
+    }
+    numbers = dict(stated.numbers)
+    for kind, texture in of_texture.items():
+        # A factor of 0 would leave nothing of a map, which many programs write all the same.
+        is_zero = kind != "roughness" and not any(numbers.get(kind, ()))
+        if texture in textures and (stated.replaces or is_zero):
+            numbers.pop(kind, None)
+    return numbers
 
 
 def _base_color(
     color: tuple[float, ...] | None, opacity: float, has_texture: bool
 ) -> tuple[float, float, float, float] | None:
     """Return Kd and opacity; None if neither has an effect."""
-    if has_texture and color == (0.0, 0.0, 0.0):
-        # Many exporters write a black Kd with a texture that is meant to be visible.
-        color = None
     if (color is None or (has_texture and min(color) == 1.0)) and opacity == 1.0:
         return None
     red, green, blue = color or (1.0, 1.0, 1.0)
@@ -210,7 +280,7 @@ def _base_color(
 
 def _emissive(color: tuple[float, ...] | None, has_texture: bool) -> tuple[float, float, float]:
     """Return Ke; white for a map without it."""
-    if color is None or (has_texture and max(color) == 0.0):
+    if color is None:
         color = (1.0, 1.0, 1.0) if has_texture else (0.0, 0.0, 0.0)
     return color[0], color[1], color[2]
 

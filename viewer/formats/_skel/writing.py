@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
-from viewer.formats._numbers import LARGEST
+from viewer.formats._text.numbers import LARGEST
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -28,20 +28,25 @@ KEYWORDS = frozenset(
 _DEEPEST = 32  # maximum number of tabs at the beginning of a line
 
 
-def write(figure: Figure, path: str | Path) -> None:
+def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     """Write a figure's skeleton.
 
     Parameters
     ----------
     figure : Figure
-        With a skeleton in depth-first order, with rotation DOFs and without rest rotations.
+        Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
     path : str or Path
         Replaced only when the whole text has been written.
+
+    Returns
+    -------
+    list of Diagnostic
+        Empty: the format holds all of a skeleton that it accepts.
 
     Raises
     ------
     UnsupportedFormatError
-        If the format cannot hold the skeleton.
+        If the format cannot store the skeleton.
     OutputError
         If the file cannot be written.
     """
@@ -51,6 +56,7 @@ def write(figure: Figure, path: str | Path) -> None:
     _check_numbers(figure.skeleton)
     _check_names(figure.skeleton)
     save_text(path, "".join(_lines(figure.skeleton)))
+    return []
 
 
 def _check_dofs(skeleton: Skeleton) -> None:

@@ -7,10 +7,10 @@ import re
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._numbers import parse_numbers
 from viewer.formats._skin.blocks import find_block, unclosed, words_of
 from viewer.formats._source import Source
-from viewer.formats._words import refuse_words
+from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._text.words import refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
@@ -38,7 +38,7 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
         end = source.end if word is None else word.start()
         then = word and word.group()
         found = len(matrices)
-        # The error is the wrong count or, if the text is truncated, its end.
+        # The error is located at the count or, if the file is truncated, at its end.
         if not is_whole:
             line = source.line(stated)
             raise source.fault(

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._numbers import parse_numbers
 from viewer.formats._skin.blocks import Block, to_whole, words_of
 from viewer.formats._skin.influence_counts import find_heads
 from viewer.formats._skin.rows import OffsetOf
 from viewer.formats._source import Source
-from viewer.formats._words import Words, refuse_words
+from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._text.words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["read_weights"]
@@ -36,7 +36,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
     block : Block
         Range of the numbers.
     count : int
-        Number of vertices declared by the file; the actual number has precedence.
+        Number of vertices declared by the file; the actual number takes precedence.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def read_weights(source: Source, block: Block, count: int) -> Influences:
 def _whole_influences(
     source: Source, block: Block, values: Floats, heads: NDArray[np.integer]
 ) -> Influences | None:
-    """Return all influences, None if a joint is not an integer."""
+    """Return all influences, or None if a joint is not an integer."""
     is_pair = np.ones(len(values), dtype=bool)
     is_pair[heads] = False
     pairs = values[is_pair].reshape(-1, 2)
@@ -71,7 +71,7 @@ def _whole_influences(
     starts = np.zeros(len(heads) + 1, dtype=np.int32)
     np.cumsum(values[heads].astype(np.int32), out=starts[1:])
     weights = pairs[:, 1].copy()
-    # Lets the skin use them without a copy.
+    # The skin can use read-only arrays without a copy.
     starts.flags.writeable = weights.flags.writeable = False
     begin, end = block.start, block.end
 
@@ -142,7 +142,7 @@ def _refuse_lines(
 def _faulty_pairs(
     source: Source, words: Words, places: Places, owners: Places
 ) -> tuple[Ints, Floats]:
-    """Return joints and weights, both 0 if either is not a number."""
+    """Return joints and weights; both are 0 if either is not a number."""
     joints, weights = words.values[places], words.values[places + 1]
     bad = np.flatnonzero(np.isnan(np.stack([joints, weights], axis=1)).any(axis=1))
     at = np.where(np.isnan(joints[bad]), places[bad], places[bad] + 1)

@@ -48,7 +48,11 @@ def without_depth_test(context: moderngl.Context) -> Iterator[None]:
 
 @contextmanager
 def sides(
-    context: moderngl.Context, culled: bool, double_sided: bool, blended: bool
+    context: moderngl.Context,
+    culled: bool,
+    double_sided: bool,
+    blended: bool,
+    is_mirrored: bool = False,
 ) -> Iterator[tuple[str, ...]]:
     """Cull faces for some draws: yield the culled side of each.
 
@@ -62,15 +66,20 @@ def sides(
         Whether this surface has two sides.
     blended : bool
         Whether it is translucent: of two sides the farther one is drawn first.
+    is_mirrored : bool
+        Whether the surface is reflected: its front faces are then clockwise.
     """
     both = double_sided and not culled
     if both and not blended:
         yield ("back",)
         return
     context.enable(moderngl.CULL_FACE)
+    context.cull_face = "back"
+    context.front_face = "cw" if is_mirrored else "ccw"
     try:
         yield ("front", "back") if both else ("back",)
     finally:
+        context.front_face = "ccw"
         context.disable(moderngl.CULL_FACE)
 
 

@@ -77,11 +77,14 @@ class InstanceBuffers:
         Number of actors, A.
     n_updates : int
         Number of matrix uploads.
+    is_mirrored : bool
+        Whether the placements are reflections; the actors agree where it matters.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
         self.context, self.mesh = context, mesh
         self.count = self.n_updates = 0
+        self.is_mirrored = False
         self._n_joints = mesh.figure.require_skin().n_joints
         self._rest = RestBuffers(context, mesh, way)
         self._offsets = SummedOffsets(context, mesh, self._rest.way)
@@ -178,6 +181,7 @@ class InstanceBuffers:
         assert self._instances is not None  # updated before
         poses = [actor.pose for actor in actors if actor.pose is not None]
         model = view.matrix @ np.stack([actor.placement for actor in actors]) @ placements(poses)
+        self.is_mirrored = bool(np.linalg.det(model[0, :3, :3]) < 0.0)
         centers = self._centers[: self.count]
         model[:, :3, 3] += np.einsum("aij,aj->ai", model[:, :3, :3], centers)
         colors = np.array([actor.color or SKIN_COLOR for actor in actors])
@@ -224,7 +228,8 @@ class InstanceBuffers:
     ) -> moderngl.VertexArray:
         """Return the vertex array for a program; without indices it draws single vertices."""
         mesh, skin = self.mesh, self.mesh.skin(self._how)
-        key = (id(indices), id(skin), id(self._rest.positions))
+        listed = None if indices is None else indices.indices
+        key = (id(listed), id(skin), id(self._rest.positions))
 
         def content() -> list[Any]:
             found: list[Any] = self._rest.attributes(program, skin)

@@ -173,7 +173,7 @@ def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Seg
     Parameters
     ----------
     placed : PlacedLabels
-        From ``place_labels``.
+        Placed labels from ``place_labels``.
     view : View
         The camera's matrices.
     size : (int, int)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.mesh_pass import draw_runs, draw_solid, set_surface, shading_of
+from viewer.rendering.passes.mesh_pass import set_surface, shading_of
+from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
 
@@ -24,8 +27,9 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
     Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
-    translucent actors, and meshes that are drawn several times per frame, in the bind pose or
-    coloured by a scalar.
+    translucent actors, actors with hidden parts, and meshes that are drawn several times per
+    frame, in the bind pose or coloured by a scalar. Where back faces are culled, the actors of a
+    group are all mirrored or all not, and joints that are mirrored are drawn singly.
 
     Parameters
     ----------
@@ -43,12 +47,25 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         return []
     if options.wireframe or options.normals:
         return []
-    groups: dict[tuple[int, bytes], list[Actor]] = {}
+    groups: dict[tuple[int, bytes, bool], list[Actor]] = {}
     for actor in actors:
-        if actor.pose is not None and actor.figure.is_attached and actor.opacity == 1.0:
-            key = id(actor.figure), actor.pose.shape_weights.tobytes()
-            groups.setdefault(key, []).append(actor)
+        pose, is_plain = actor.pose, actor.opacity == 1.0 and not actor.hidden_parts
+        if pose is None or not actor.figure.is_attached or not is_plain:
+            continue
+        is_mirrored = False
+        if options.cull or _has_single_sides(actor):
+            if (pose.scales < 0.0).any():
+                continue
+            sign = np.linalg.det(actor.placement[:3, :3]) * pose.figure_scale
+            is_mirrored = bool(sign < 0.0)
+        key = id(actor.figure), pose.shape_weights.tobytes(), is_mirrored
+        groups.setdefault(key, []).append(actor)
     return [group for group in groups.values() if len(group) >= FEWEST]
+
+
+def _has_single_sides(actor: Actor) -> bool:
+    """Return whether back faces of some material are not drawn."""
+    return any(not material.double_sided for material in actor.figure.require_mesh().materials)
 
 
 def draw_instances(
@@ -91,7 +108,7 @@ def draw_instances(
     set_surface(program, instances.mesh, options)
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
     array = instances.array(program, indices)
-    draw_runs(array, indices, options, instances.count, blended)
+    draw_runs(array, indices, options, instances.count, blended, instances.is_mirrored)
 
 
 def draw_instance_shapes(
@@ -101,12 +118,18 @@ def draw_instance_shapes(
     view: View,
     options: DisplayOptions,
     fragment: str,
+    prepare: Prepare,
 ) -> None:
-    """Draw instanced surfaces with a fragment shader that needs no material."""
+    """Draw instanced surfaces with a fragment shader that shows no colours."""
     program = programs.drawing(
-        "instance", fragment=fragment, skin=instances.method, affine=instances.is_affine
+        "instance",
+        fragment=fragment,
+        skin=instances.method,
+        affine=instances.is_affine,
+        materials=instances.mesh.has_materials,
     )
     instances.place(actors, view)
     instances.use(program, view)
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
-    draw_solid(instances.array(program, indices), indices, instances.count)
+    array, mirrored = instances.array(program, indices), instances.is_mirrored
+    draw_shapes(array, indices, options, fragment, prepare, instances.count, mirrored)

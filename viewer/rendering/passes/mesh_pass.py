@@ -6,7 +6,6 @@ from typing import Any
 
 import moderngl
 
-from viewer.rendering.gpu.draw_state import sides
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
@@ -15,13 +14,14 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 
-__all__ = ["SKIN_COLOR", "MeshPass", "draw_runs", "draw_solid", "set_surface", "shading_of"]
+__all__ = ["SKIN_COLOR", "MeshPass", "set_surface", "shading_of", "uses_materials"]
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""
@@ -80,7 +80,7 @@ class MeshPass:
             "mesh",
             "scalar" if look is not None else shading_of(mesh.mesh, options),
             geometry=corners,
-            materials=look is None and mesh.mesh.has_materials,
+            materials=uses_materials(mesh, options),
             effects=view.effects.defines,
         )
         set_model(program, view, placement, mesh.center)
@@ -94,8 +94,10 @@ class MeshPass:
         if look is not None:
             set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        draw_runs(self.array(mesh, program, indices), indices, options, blended=blended)
+        indices = mesh.index_set(options)
+        is_mirrored = mesh.is_mirrored_by(placement)
+        array = self.array(mesh, program, indices)
+        draw_runs(array, indices, options, blended=blended, is_mirrored=is_mirrored)
 
     def draw_shape(
         self,
@@ -104,12 +106,15 @@ class MeshPass:
         view: View,
         options: DisplayOptions,
         fragment: str,
+        prepare: Prepare,
     ) -> None:
-        """Draw the surface with a fragment shader that needs no material."""
-        program = self.programs.drawing("mesh", fragment=fragment)
+        """Draw the surface with a fragment shader that shows no colours, see ``draw_shapes``."""
+        materials = uses_materials(mesh, options)
+        program = self.programs.drawing("mesh", fragment=fragment, materials=materials)
         set_model(program, view, placement, mesh.center)
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
-        draw_solid(self.array(mesh, program, indices), indices)
+        indices = mesh.index_set(options)
+        array, is_mirrored = self.array(mesh, program, indices), mesh.is_mirrored_by(placement)
+        draw_shapes(array, indices, options, fragment, prepare, is_mirrored=is_mirrored)
 
     def draw_lines(
         self,
@@ -142,8 +147,10 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_EDGE_COLOR, opacity)
         self.context.wireframe = True
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
-        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
+        indices = mesh.index_set(options, as_listed=True)
+        array = self.array(mesh, program, indices)
+        for first, count in indices.spans:
+            array.render(moderngl.TRIANGLES, vertices=count, first=first)
         self.context.wireframe = False
 
     def draw_normals(
@@ -154,7 +161,11 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)
         program["u_length"] = _NORMAL_LENGTH * size
-        content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
+        shown = mesh.mesh.lines_shown(mesh.hidden_parts)
+        content = [
+            (mesh.posed, "3f4 3f4/i", "in_position", "in_normal"),
+            (shown, "f4/i", "in_shown"),
+        ]
         array = self._arrays_of(mesh).get(program, lambda: content)
         array.render(moderngl.LINES, vertices=2, instances=mesh.mesh.n_vertices)
 
@@ -177,7 +188,8 @@ class MeshPass:
                     found.append((values, layout, name))
             return found
 
-        return self._arrays_of(mesh).get(program, content, indices.indices, (id(indices),))
+        buffer = indices.indices
+        return self._arrays_of(mesh).get(program, content, buffer, (id(buffer),))
 
     def _arrays_of(self, mesh: PosedMesh) -> VertexArrays:
         return self._arrays.get(mesh, lambda: VertexArrays(self.context))
@@ -201,6 +213,12 @@ def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
     return "pbr" if mesh.is_physical else "phong"
 
 
+def uses_materials(mesh: PosedMesh, options: DisplayOptions) -> bool:
+    """Return whether a mesh is drawn with its materials: scalar quantities replace them."""
+    has_values = options.shading == "scalar" and mesh.scalars.look is not None
+    return mesh.mesh.has_materials and not has_values
+
+
 def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:
     """Set the uniforms of a figure's surface."""
     values = {
@@ -212,37 +230,6 @@ def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOp
         **STUDIO_SAMPLERS,
     }
     set_uniforms(program, values)
-
-
-def draw_runs(
-    array: moderngl.VertexArray,
-    indices: IndexSet,
-    options: DisplayOptions,
-    instances: int = 1,
-    blended: bool = False,
-) -> None:
-    """Draw all opaque or all blended triangles, one material at a time."""
-    plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
-    for run in indices.runs:
-        if run.surface.is_blended != blended:
-            continue
-        set_uniforms(array.program, plain)
-        run.surface.use(array.program, options.texture)
-        with sides(array.ctx, options.cull, run.surface.double_sided, blended) as orders:
-            for order in orders:
-                array.ctx.cull_face = order
-                array.render(
-                    moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
-                )
-
-
-def draw_solid(array: moderngl.VertexArray, indices: IndexSet, instances: int = 1) -> None:
-    """Draw all triangles that are not blended, whatever their material."""
-    for run in indices.runs:
-        if not run.surface.is_blended:
-            array.render(
-                moderngl.TRIANGLES, vertices=run.count, first=run.first, instances=instances
-            )
 
 
 def _premultiplied(color: tuple[float, float, float, float], opacity: float) -> tuple[float, ...]:

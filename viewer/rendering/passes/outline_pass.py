@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_test
+from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
@@ -198,9 +199,12 @@ class OutlinePass:
     ) -> None:
         mesh = self.tools.buffers.posed_mesh(actor)
         mesh.update(None if options.show == "binding" else actor.pose, options.skinning)
-        program = self.tools.programs.drawing("mesh", fragment="mask")
-        set_uniforms(program, {"u_mask": mask})
-        self.tools.meshes.draw_shape(mesh, placement_of(actor, options), view, options, "mask")
+
+        def prepare(program: moderngl.Program, _: MeshRun) -> None:
+            set_uniforms(program, {"u_mask": mask})
+
+        place = placement_of(actor, options)
+        self.tools.meshes.draw_shape(mesh, place, view, options, "mask", prepare)
 
     def _cover_points(
         self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions

@@ -9,6 +9,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -23,6 +24,7 @@ from viewer.rendering.gpu.upload import (
     write_rigid,
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, posed_skeleton
@@ -60,6 +62,8 @@ class PosedMesh:
         Origin of the positions in figure space; part of the model matrix.
     scalars : ScalarBuffer
         Values of a scalar quantity, computed when one is shown.
+    hidden_parts : frozenset of int
+        Parts of the mesh that are not drawn.
     """
 
     def __init__(
@@ -82,8 +86,14 @@ class PosedMesh:
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
-        self._is_affine = False
+        self._is_affine = self._is_mirrored = False
+        self.hidden_parts: frozenset[int] = frozenset()
         self.n_updates = 0
+
+    def index_set(self, options: DisplayOptions, as_listed: bool = False) -> IndexSet:
+        """Return the drawn triangles; see ``MeshBuffers.index_set``."""
+        hidden = options.hidden_parts
+        return self.mesh.index_set(options.reduced, hidden, as_listed, self.hidden_parts)
 
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
         """Skin the mesh if pose or method changed since the last call.
@@ -100,7 +110,7 @@ class PosedMesh:
         key = (*skinning_options_key(how), pose.skinning_key) if attached and pose else ("binding",)
         if key == self._key:
             return
-        self.center = self.mesh.center
+        self.center, self._is_mirrored = self.mesh.center, False
         if attached and pose is not None:
             self.upload(pose, how)
         self._run(self.mesh.skin(how), how, bool(attached))
@@ -145,6 +155,9 @@ class PosedMesh:
         assert skeleton is not None and skin is not None  # checked by the caller
         palette = posed_skeleton(skeleton, pose).palette(skin).copy()
         self._is_affine = not is_rigid(palette)
+        if self._is_affine:
+            signs = np.sign(np.linalg.det(palette[:, :3, :3]))
+            self._is_mirrored = bool(buffers.joint_fractions @ signs < 0.0)
         palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
         if buffers.joint_fractions.any():
             self.center = buffers.joint_fractions @ palette[:, :3, 3]
@@ -166,6 +179,13 @@ class PosedMesh:
         return self._arrays.get(
             program, lambda: self._rest.attributes(program, skin, attached), key=key
         )
+
+    def is_mirrored_by(self, placement: Floats) -> bool:
+        """Return whether a placement, (4, 4), or most of the skinning reflects the mesh.
+
+        Its triangles are then clockwise seen from their front.
+        """
+        return self._is_mirrored != bool(np.linalg.det(placement[:3, :3]) < 0.0)
 
     def read(self) -> tuple[Floats, Floats]:
         """Return the current posed positions in figure space and normals, (V, 3) each.

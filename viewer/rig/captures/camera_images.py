@@ -1,4 +1,4 @@
-"""Images that the calibrated cameras of a capture recorded."""
+"""Images recorded by the calibrated cameras of a capture."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class CameraImages(Protocol):
     def at(self, camera: str, seconds: float) -> CameraImage | None:
         """Return the image of a camera at a time of the scene; None if there is none.
 
-        The same object is returned as long as the image is the same. File errors become notes.
+        While the image stays the same, the same object is returned. File errors become notes.
         """
 
     def size_of(self, camera: str) -> tuple[int, int] | None:

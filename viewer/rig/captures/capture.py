@@ -23,7 +23,7 @@ class CapturePart:
     stop : int
         End frame of this part (exclusive), counted from the capture's first frame.
     bodies : mapping of person to BodyMotion
-        Only the rows of this part; their ``timing`` covers the whole capture, -1 elsewhere.
+        Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
         The same for keypoints.
     warnings : tuple of Diagnostic
@@ -45,7 +45,7 @@ class Capture:
     name : str
         Display name.
     n_frames : int
-        Frames on its timeline, gaps included, F.
+        Number of frames on its timeline, gaps included, F.
     first_frame : int
         Number of the first frame in the files.
     parts : callable

@@ -16,9 +16,9 @@ __all__ = ["fitted_body", "keypoint_distances"]
 
 
 def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
-    """Return the body of the person to whom captured keypoints belong; None without one.
+    """Return the body of the person to whom captured keypoints belong, or None.
 
-    Untracked people have none, because nothing associates their keypoints with a body.
+    Keypoints of untracked people cannot be associated with a body.
     """
     for actor in actors:
         same = actor.person == points.person and is_tracked(actor.person)
@@ -28,7 +28,7 @@ def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
 
 
 def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
-    """Return the distance from each seen keypoint to the joint it corresponds to.
+    """Return the distance from each visible keypoint to the corresponding joint.
 
     The joints are the model's own, regressed from its shaped mesh and posed.
 

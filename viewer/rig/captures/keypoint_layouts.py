@@ -60,7 +60,7 @@ _MEDIAPIPE_LIMBS = (
     "27-31 28-32"
 )
 _FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-# First keypoint, name, number of keypoints, and whether their line is closed.
+# First keypoint, name, number of keypoints, and whether their outline is closed.
 _FACE = (
     (0, "face_contour", 17, False),
     (17, "right_brow", 5, False),
@@ -84,7 +84,7 @@ _WORDS = {
     "mediapipe": (_MEDIAPIPE, _MEDIAPIPE_LIMBS, 33),
 }
 _JOINTS = {"smpl": 24, "smplh": 52, "smplx": 55}
-# Layouts of body, hands and face combined; a face mesh of 468 points has no names.
+# Combined layouts of body, hands and face; the 468 points of a face mesh have no names.
 _SETS = {
     "hand": ("hand",),
     "hands": ("left_hand", "right_hand"),
@@ -118,7 +118,7 @@ TITLES: dict[int, tuple[str, ...]] = {
     535: ("body25_hands_face",),
     543: ("mediapipe_total",),
 }
-"""Layouts by their number of keypoints; the first is the default for its number."""
+"""Layouts by number of keypoints; the first of each number is the default."""
 
 # Keypoints that SMPLify-X and EasyMocap fit to a joint with a different name.
 _SAME = {"mid_hip": "pelvis"}
@@ -136,12 +136,12 @@ def keypoint_layout(count: int, title: str = "") -> PointLayout:
     count : int
         Number of keypoints, K.
     title : str
-        Name of a layout, for counts that several layouts have; empty for the default.
+        Name of a layout, if several have this count; empty for the default.
 
     Returns
     -------
     PointLayout
-        With names ``point0``, ``point1`` … and no limbs if no layout has this count.
+        Layout with names ``point0``, ``point1`` … and no limbs if no layout has this count.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
     title : str
         Title of the combined layout.
     parts : sequence of PointLayout
-        In the order of the points.
+        Layouts in the order of the points.
     """
     names: list[str] = []
     limbs: list[tuple[int, int]] = []

@@ -1,4 +1,4 @@
-"""Names of people in a capture: the number of their track, or untracked."""
+"""Names of people in a capture: their track number, or "untracked"."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ __all__ = ["is_tracked", "person_label", "person_name"]
 
 
 def is_tracked(person: int | None) -> bool:
-    """Return whether a number identifies a track, which follows one person from frame to frame.
+    """Return whether a number identifies a track that follows one person from frame to frame.
 
     Capture systems give detections without a track the number -1. Here they are numbered -1, -2, -3
     … within each frame; in the next frame the same number may belong to a different person.

@@ -53,7 +53,7 @@ class PointClip:
     timing : Timing
         Frame rate, and the row of each frame.
     points : (N, K, 4)
-        x, y, z and confidence; confidence 0 means "not seen", and x, y, z are then undefined.
+        x, y, z and confidence; confidence 0 means "not visible", and x, y, z are then undefined.
     """
 
     name: str
@@ -75,10 +75,10 @@ class PointClip:
 
 
 def sample_points(clip: PointClip, time: float, interpolate: bool = False) -> Floats | None:
-    """Return the points at one time, None where they are absent.
+    """Return the points at one time, None if they are absent.
 
-    A point is interpolated linearly between two frames in which it is seen. Otherwise it keeps the
-    position and the confidence of the earlier frame until the next one.
+    A point is interpolated linearly between two frames in which it is visible. Otherwise it keeps
+    the position and confidence of the earlier frame until the next frame.
 
     Parameters
     ----------

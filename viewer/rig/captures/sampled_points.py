@@ -36,9 +36,9 @@ class SampledPoints:
     present : (F,) bool
         Whether the person is present.
     points : (F, K, 3)
-        In the unit of the capture; NaN where a point is not seen.
+        In the unit of the capture; NaN where a point is not visible.
     confidences : (F, K)
-        0 where a point is not seen.
+        0 where a point is not visible.
     """
 
     name: str
@@ -65,7 +65,7 @@ def sample_upright_points(
     scene : Scene
         Provides the up axis.
     actor : Actor
-        Captured points; the actor's placement in the scene is ignored.
+        Actor with captured points; its placement in the scene is ignored.
     rate, frames, interpolate
         As for ``viewer.rig.motion.sampled_animation.sample_animation``.
 
@@ -74,7 +74,7 @@ def sample_upright_points(
     animation : SampledPoints
         The sampled frames.
     up : "y" or "z"
-        The axis that points up in them.
+        Up axis of the frames.
 
     Raises
     ------

@@ -23,7 +23,7 @@ from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["Difference", "Measure", "compare", "rotation_distance"]
 
-# A closest-point search takes about a second, so only this many steps get one.
+# A closest-point search takes about a second, so it runs in at most this many steps.
 _MOST_SEARCHES = 32
 
 
@@ -37,18 +37,18 @@ def compare(
 ) -> Difference:
     """Compare two actors, regardless of their placements in a scene.
 
-    Joints are matched by name. Vertices are compared by index if the triangles are the same, else
-    by the closest point on the other's surface, in both directions. The actors are left in the pose
-    in which their meshes are farthest apart.
+    Joints are matched by name. Vertices are compared by index if the triangles are the same,
+    otherwise by the closest point on the other surface, in both directions. The actors are left in
+    the pose in which their meshes are farthest apart.
 
     Parameters
     ----------
     first, second : Actor
-        The first is the reference: lengths are in its unit and as fractions of its size.
+        The first is the reference: lengths are given in its unit and as fractions of its size.
     skinning : Skinning, optional
         Skinning options of both meshes.
     n_poses : int
-        Test poses for figures without motion, see ``steps_of``.
+        Number of test poses for figures without motion; see ``steps_of``.
     frames : (int or None, int or None), optional
         First frame and end frame (exclusive), in the numbering of the first motion.
     report : callable, optional
@@ -57,7 +57,7 @@ def compare(
     Returns
     -------
     Difference
-        With a mismatch for everything that only one actor has.
+        Result with a mismatch for everything that only one actor has.
 
     Raises
     ------
@@ -218,7 +218,7 @@ class _Comparison:
         self.back.add(step, _closest(other, one, self.first).distances)
 
     def _compare_weights(self) -> None:
-        """Compare the weights, once, as they do not depend on the pose."""
+        """Compare the weights once, as they do not depend on the pose."""
         first, second = self.first.figure, self.second.figure
         if first.skin is None or second.skin is None or self.joints is None:
             return
@@ -251,7 +251,7 @@ def _joint_frames(actor: Actor) -> Floats:
 
 
 def _size(actor: Actor) -> float:
-    """Return the diagonal of the rest mesh's box, or of the posed joints without a mesh."""
+    """Return the diagonal of the rest mesh's box, or of the posed joints if there is no mesh."""
     mesh = actor.figure.mesh
     points = actor_points(actor) if mesh is None else mesh.positions
     return box_size(bounding_box(points))

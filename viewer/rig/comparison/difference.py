@@ -14,7 +14,7 @@ __all__ = ["Difference", "Measure", "Tally"]
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """The difference in one respect.
+    """The difference of one property.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Measure:
     kind : "length", "angle" or "weight"
         Lengths are in the first figure's unit, angles in radians, weights dimensionless.
     maximum, mean : float
-        Over all items and steps that were compared.
+        Maximum and mean over all compared items and steps.
     step, item : str
         Location of the maximum: a frame or test pose, and a joint or vertex. The step is empty for
         weights, which do not depend on the pose.
@@ -65,7 +65,7 @@ class Difference:
     size : float
         Diagonal of the box of the first figure's rest mesh, or of its skeleton, in its unit.
     unit : str
-        The first figure's, as in ``Figure.unit``.
+        Unit of the first figure, as in ``Figure.unit``.
     """
 
     measures: tuple[Measure, ...]
@@ -80,7 +80,7 @@ class Difference:
         Parameters
         ----------
         tolerance : float
-            Compared with lengths as fractions of the size, angles in radians, and weights.
+            Limit for lengths as fractions of the size, angles in radians, and weights.
         """
         # Written as "not within" rather than "more than", so that NaN exceeds any tolerance.
         within = all(measure.relative(self.size) <= tolerance for measure in self.measures)
@@ -97,7 +97,7 @@ class Tally:
     count : int
         Number of joints or vertices.
     items : tuple of str
-        Their names; empty for vertices, which have indices.
+        Names of these; empty for vertices, which have indices.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Match two figures' joints by name, and measure the angle between rotations."""
+"""Matching of joints by name, and the angle between rotations."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Pairs:
     Attributes
     ----------
     first, second : (N,) int32
-        Indices into both lists, in the order of the first.
+        Indices into both lists, in the order of the first list.
     names : tuple of N str
         Names in the first list.
     mismatches, notes : tuple of Diagnostic
@@ -53,8 +53,8 @@ def pair_joints(first: Skeleton, second: Skeleton) -> Pairs:
     Returns
     -------
     Pairs
-        With a mismatch for unmatched joints, and for matched joints with different parents; a
-        note if their order differs, as skins and clips refer to joints by index.
+        Matched joints, with mismatches for unmatched joints and joints with different parents, and
+        a note if the order differs, as skins and clips refer to joints by index.
     """
     pairs = pair_names(_unique_labels(first), _unique_labels(second), "joint")
     parents = [
@@ -105,14 +105,15 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
     Parameters
     ----------
     first, second : sequences of str
-        Each without repetition.
+        Names, each list without duplicates.
     what : str
         The kind of item: ``"joint"``, ``"DOF"`` or ``"point"``.
 
     Returns
     -------
     Pairs
-        By index, with a note, if no name matches and both have the same length.
+        Matched names; if no name matches and both lists have the same length, matched by index,
+        with a note.
     """
     numbers = {name: number for number, name in enumerate(second)}
     shared = [(number, numbers[name]) for number, name in enumerate(first) if name in numbers]

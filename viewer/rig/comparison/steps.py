@@ -21,8 +21,8 @@ __all__ = ["FrameRange", "Steps", "steps_of"]
 FrameRange = tuple[int | None, int | None]
 """First frame and end frame (exclusive), in the numbering of the first motion."""
 
-_FREE = 0.7  # radians to either side in test poses, for rotations without limits
-_SHIFT = 0.05  # fraction of the skeleton's extent to either side, for translations without limits
+_FREE = 0.7  # radians in either direction in test poses, for rotations without limits
+_SHIFT = 0.05  # fraction of the skeleton's extent in either direction, for unlimited translations
 _SAME_TIME = 1e-6  # seconds
 
 
@@ -35,13 +35,13 @@ class Steps:
     times : (F,)
         Seconds, for two motions; empty for test poses.
     dofs : (N, D)
-        Test poses: values of the DOFs that both have.
+        Test poses: values of the DOFs that both figures have.
     first, second : (D,) int32
-        Rows of those DOFs in either skeleton.
+        Rows of these DOFs in both skeletons.
     first_frame : int
         Number of the first frame.
     mismatches, notes : tuple of Diagnostic
-        DOFs or motions that only one has; notes on the choice of steps.
+        DOFs or motions that only one actor has; notes on the choice of steps.
     own : (Pose or None, Pose or None)
         Initial poses of figures without motion.
     """
@@ -61,7 +61,7 @@ class Steps:
         return len(self.times) or 1 + len(self.dofs)
 
     def pose(self, number: int, first: Actor, second: Actor) -> str:
-        """Pose both actors for one step and return its name; steps may come in any order."""
+        """Pose both actors for one step and return its name; any order is possible."""
         if len(self.times):
             # Each motion is timed from its own start, as captures may start at any frame.
             for actor in (first, second):
@@ -105,7 +105,7 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
 
 
 def _own_pose(actor: Actor) -> Pose | None:
-    """Return an actor's initial pose, ignoring a motion that the other actor lacks."""
+    """Return an actor's initial pose; a motion that the other actor lacks is ignored."""
     if actor.clip is None:
         return None if actor.pose is None else actor.pose.copy()
     return None if actor.figure.skeleton is None else figure_pose(actor.figure)
@@ -169,14 +169,14 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
 
 
 def _random_dofs(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats:
-    """Draw random DOF values within both limits; those of the first win if they are disjoint."""
+    """Draw random DOF values within both limits, or those of the first if they are disjoint."""
     is_rotation = skeleton.dof_kinds[rows] >= 3
     # Relative to the skeleton's own extent, as its unit may be unknown.
     reach = _SHIFT * float(np.abs(skeleton.rest_translations).sum(axis=0).max())
     free = np.where(is_rotation, _FREE, reach)
     low = np.maximum(limits[:, :, 0].max(axis=0), -free)
     high = np.minimum(limits[:, :, 1].min(axis=0), free)
-    # If the limits lie entirely outside the default range, it shrinks to their closer end.
+    # If the limits lie entirely outside the default range, the range shrinks to the closer limit.
     low, high = np.minimum(low, limits[:, :, 1].min(axis=0)), np.maximum(high, low)
     fractions = np.random.default_rng(0).random((count, len(rows)))
     return np.clip(low + fractions * (high - low), limits[0, :, 0], limits[0, :, 1])

@@ -31,7 +31,7 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     (V,)
         0 for equal rows, regardless of the order of influences and of duplicate joints.
     """
-    # Unmatched joints of the second get indices that the first does not use.
+    # Unmatched joints of the second skin get indices that the first does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
     return row_norms(

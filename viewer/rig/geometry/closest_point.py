@@ -21,9 +21,10 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
 __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
-_PAIRS = 1 << 19  # pairs of point and piece per batch; some 150 bytes each
+_PAIRS = 1 << 19  # pairs of point and piece per batch, about 150 bytes each
 _LONG = 3.0  # pieces are split above this many times the median radius
-# Pieces in the first query; if more may lie within the bound, a second query finds all of them.
+# Pieces in the first query; if more pieces may lie within the bound, a second query finds all of
+# them.
 _NEAREST = 8
 _POINTS = 1 << 16  # points per batch
 _FLAT = 1e-20  # sin^2 of the angle below which a triangle counts as a segment
@@ -40,9 +41,9 @@ class SurfacePoints:
     Attributes
     ----------
     triangles : (N,) int32
-        Triangle that each point lies on; any of several equally close ones.
+        Triangle on which each point lies; any one of several equally close triangles.
     barycentric : (N, 3)
-        Weights of its corners, from 0 to 1, adding up to 1.
+        Weights of its corners, from 0 to 1, with a sum of 1.
     positions : (N, 3)
         Positions in the mesh's space.
     distances : (N,)
@@ -90,7 +91,7 @@ class Surface:
                 f"triangles: expected vertex indices 0 to {len(positions) - 1}, "
                 f"found {triangles.min()} to {triangles.max()}"
             )
-        # Far from the origin float64 has fewer digits left for small distances.
+        # Far from the origin, float64 has fewer digits left for small distances.
         self._center = positions.mean(axis=0)
         self._corners = (positions - self._center)[triangles]
         self._all, self._levels = _levels(self._corners)
@@ -106,7 +107,7 @@ class Surface:
         Returns
         -------
         SurfacePoints
-            One for each point.
+            Closest point to each query point.
 
         Raises
         ------
@@ -138,7 +139,7 @@ class Surface:
         return best
 
     def _examine(self, level: _Level, points: Floats, best: Ints, nearest: Floats) -> None:
-        """Examine all pieces of a level that may be closer than the closest so far."""
+        """Examine all pieces of a level that may be closer than the closest found so far."""
         count = min(_NEAREST, len(level.triangles))
         workers = _workers(len(points))
         reach = float(nearest.max(initial=0.0) + level.radius) * _SLACK
@@ -146,7 +147,8 @@ class Surface:
         distances, pieces = level.tree.query(
             points, k=range(1, count + 1), distance_upper_bound=reach, workers=workers
         )
-        # For neighbours beyond the reach the tree returns the number of pieces as index.
+        # For neighbours beyond the maximum distance, the tree returns the number of pieces as their
+        # index.
         near = (pieces < len(level.triangles)) & (
             distances - _SLACK * level.radii[pieces % len(level.triangles)] < nearest[:, None]
         )
@@ -154,7 +156,7 @@ class Surface:
         self._keep_nearer(level, points, rows, pieces[rows, columns], best, nearest)
         if count == len(level.triangles):
             return
-        farthest = distances[:, -1]  # infinite beyond the reach
+        farthest = distances[:, -1]  # infinite beyond the maximum distance
         more = np.flatnonzero(farthest - _SLACK * level.radius <= nearest)
         reaches = (nearest[more] + level.radius) * _SLACK
         counts = level.tree.query_ball_point(
@@ -175,7 +177,7 @@ class Surface:
     ) -> None:
         """Update best and nearest with the closest of some pieces, each tested for a row of points.
 
-        Among equally close ones the piece with the closest centroid wins.
+        Among equally close pieces, the one with the closest centroid is chosen.
         """
         offsets = points[rows] - level.centers[pieces]
         apart = _dot(offsets, offsets)
@@ -207,7 +209,7 @@ def interpolate(found: SurfacePoints, triangles: Ints, values: Any) -> Any:
     Returns
     -------
     (N, ...) array or (N, J) sparse matrix in rows
-        Sparse if ``values`` are.
+        Sparse if ``values`` is sparse.
     """
     corners = triangles[found.triangles]
     if not isinstance(values, np.ndarray):
@@ -305,12 +307,13 @@ def _normals(pieces: Floats) -> Floats:
 def _may_be_nearer(
     level: _Level, pieces: Any, offsets: Floats, apart: Floats, nearest: Floats
 ) -> Bools:
-    """Return a conservative mask of the pieces that may be closer than the closest so far.
+    """Return a conservative mask of the pieces that may be closer than the closest found so far.
 
     A piece lies in a disc of radius r around its centroid. With the height h of the point above
     the disc's plane, the distance a from the centroid and s = sqrt(a^2 - h^2), the distance from
-    the disc is sqrt(h^2 + max(0, s - r)^2). For distant points this excludes all pieces but those
-    below the point, whereas the bounding sphere, a - r, would leave a wide circle of them.
+    the disc is sqrt(h^2 + max(0, s - r)^2). For distant points, this excludes all pieces except
+    those below the point, whereas the bounding sphere, a - r, would leave a wide circle of
+    candidates.
     """
     squared_heights = _dot(offsets, level.normals[pieces]) ** 2
     beside = np.sqrt(np.maximum(apart - squared_heights, 0.0))
@@ -336,9 +339,10 @@ def _radii(pieces: Floats) -> Floats:
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:
-    """Return the barycentric coordinates of the point of each triangle closest to a point.
+    """Return the barycentric coordinates of the closest point of each triangle to a query point.
 
-    If the projection onto the plane is inside, it solves the 2 x 2 normal equations of
+    If the projection onto the plane lies inside the triangle, it solves the 2 x 2 normal equations
+    of
     |a + s ab + t ac - p|^2; otherwise the closest point is on one of the three edges.
     """
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -366,7 +370,7 @@ def _on_edges(points: Floats, corners: Floats) -> Floats:
         end = (start + 1) % 3
         edge, offset = corners[:, end] - corners[:, start], points - corners[:, start]
         length = _dot(edge, edge)
-        # A degenerate edge counts as its first corner.
+        # A degenerate edge is treated as its first corner.
         along = np.clip(_dot(edge, offset) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
         offset -= along[:, None] * edge
         distance = _dot(offset, offset)

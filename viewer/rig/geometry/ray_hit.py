@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 __all__ = ["RayHit", "first_hit", "surface_point"]
 
 _AT_ONCE = 1 << 18  # triangles per batch, about 300 bytes each
-_EDGE = 1e-9  # barycentric tolerance: no ray slips through between two triangles
+_EDGE = 1e-9  # barycentric tolerance: no ray may pass between two adjacent triangles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +23,7 @@ class RayHit:
     triangle : int
         Index of the triangle that is hit.
     barycentric : (3,)
-        Weights of its corners, adding up to 1.
+        Weights of its corners, with a sum of 1.
     distance : float
         Distance from the ray's origin, in multiples of the length of its direction.
     """
@@ -36,7 +36,7 @@ class RayHit:
 def first_hit(
     positions: Floats, triangles: Ints, origin: Floats, direction: Floats
 ) -> RayHit | None:
-    """Return the first intersection of a ray with a surface, from either side; None without one.
+    """Return the first intersection of a ray with a surface, from either side, or None.
 
     With edges e1, e2 from corner a, o + t d = a + u e1 + v e2 is solved by determinants
     (Möller and Trumbore 1997, eq. 6).
@@ -48,7 +48,7 @@ def first_hit(
     triangles : (T, 3)
         Vertex indices.
     origin, direction : (3,)
-        In the same space; triangles behind the origin are ignored.
+        Ray in the same space; triangles behind its origin are ignored.
 
     >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     >>> eye, ahead = np.array([0.25, 0.25, 2.0]), np.array([0.0, 0.0, -1.0])
@@ -67,7 +67,7 @@ def first_hit(
 def _nearest(
     positions: Floats, triangles: Ints, origin: Floats, direction: Floats
 ) -> RayHit | None:
-    """Return the nearest hit of a ray among some triangles; None without one."""
+    """Return the nearest hit of a ray among some triangles, or None."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     first, second, away = b - a, c - a, origin - a
     # The paper's vectors P and Q.

@@ -50,7 +50,7 @@ def axis_rotations(axis: int, angles: Floats) -> Floats:
 def quaternion_to_matrix(quaternions: Floats) -> Floats:
     """Return the rotation matrices of quaternions.
 
-    With q = (x, y, z, w) of any length but zero, R v = q v q* / |q|^2 (Shoemake 1985).
+    With q = (x, y, z, w) of any non-zero length, R v = q v q* / |q|^2 (Shoemake 1985).
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     Parameters
     ----------
     matrices : (..., 3, 3)
-        Any; a reflection gives a stretch with a negative determinant.
+        Matrices to split; a reflection gives a stretch with a negative determinant.
 
     Returns
     -------

@@ -48,12 +48,12 @@ def apply_transform(matrix: Floats, points: Floats) -> Floats:
     matrix : (4, 4)
         Affine matrix.
     points : (..., 3)
-        Points in the space that the matrix maps from.
+        Points in the space from which the matrix maps.
 
     Returns
     -------
     (..., 3)
-        Points in the space that it maps to.
+        Points in the space to which it maps.
 
     >>> apply_transform(translation_matrix(np.array([1.0, 0.0, 0.0])), np.zeros(3))
     array([1., 0., 0.])

@@ -15,7 +15,7 @@ def unit(vectors: Floats) -> Floats:
     Parameters
     ----------
     vectors : (..., 3)
-        Any lengths.
+        Vectors of any length.
 
     Returns
     -------

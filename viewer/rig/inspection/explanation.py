@@ -22,7 +22,7 @@ from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["DualTerms", "Explanation", "explain"]
 
-_TINY = 1e-12  # a smaller sum of weights or quaternions defines no rotation
+_TINY = 1e-12  # sums of weights or quaternions below this define no rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class DualTerms:
     duals : (K, 8)
         Each influence's unit dual quaternion (x, y, z, w), real part, then dual part.
     signs : (K,)
-        -1 where the quaternion was negated, to the hemisphere of the strongest influence.
+        -1 if the quaternion was negated, into the hemisphere of the strongest influence.
     stretches : (K, 3, 4)
         The non-rigid part of each matrix, applied before the rigid motion.
     blended : (8,)
@@ -44,9 +44,9 @@ class DualTerms:
     length : float
         Length of the real part of ``blended``, by which both parts are divided.
     stretched : (3,)
-        The rest position after sum_i fraction_i stretch_i.
+        The rest position, transformed by sum_i fraction_i stretch_i.
     position : (3,)
-        ``stretched`` moved by the blended dual quaternion; the rest position if influences cancel.
+        ``stretched``, moved by the blended dual quaternion; the rest position if influences cancel.
     """
 
     fractions: Floats
@@ -80,7 +80,7 @@ class Explanation:
     names : tuple of K str
         Names of these joints.
     weights : (K,)
-        w_i, after pruning and normalising if enabled.
+        w_i, pruned and normalised if enabled.
     matrices : (K, 4, 4)
         M_i: skinning matrices, bind pose to figure space.
     images : (K, 3)
@@ -90,7 +90,7 @@ class Explanation:
     linear : (3,)
         Sum of the terms: linear blend skinning; the rest position of a vertex without influence.
     dual : DualTerms or None
-        For methods that use dual quaternions.
+        Terms of methods that use dual quaternions; None for other methods.
     skinned : (3,)
         Result of the skinning method.
     placement : (4, 4)
@@ -131,11 +131,11 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
     Parameters
     ----------
     figure : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     pose : Pose
         DOFs in lengths and radians.
     skinning : Skinning
-        How the mesh is drawn.
+        Skinning of the drawn mesh.
     vertex : int
         Index of the vertex.
 

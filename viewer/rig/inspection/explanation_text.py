@@ -13,7 +13,7 @@ from viewer.rig.skinning import METHODS
 __all__ = ["explanation_text"]
 
 _LONGEST = 40  # characters of a joint's name
-_RIGID = 1e-9  # a stretch this close to the identity is rounding error
+_RIGID = 1e-9  # a stretch this close to the identity is a rounding error
 
 
 def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:
@@ -88,7 +88,7 @@ class _Text:
         """Add the dual quaternions, their sum, and the resulting position."""
         for index, values in enumerate(dual.duals):
             number = index + 1
-            flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
+            flip = "" if dual.signs[index] > 0.0 else ", negated into the hemisphere of q1"
             weight = f"{dual.fractions[index]:.{self.digits}f}"
             self.lines.append(f"q{number}: normalised weight {weight}{flip}")
             self._quaternions("   ", values)

@@ -28,7 +28,7 @@ Front: TypeAlias = str
 """A signed axis, as ``"+z"``; never the up axis."""
 
 FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
-"""All signed axes; the two along the up axis do not apply to a scene."""
+"""All signed axes; the two along a scene's up axis do not apply to it."""
 
 _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
 _N_TIMES = 9  # samples of a motion
@@ -58,14 +58,14 @@ def front_axes(up: str) -> tuple[Front, ...]:
 def guess_front(scene: Scene) -> Front:
     """Estimate the front of a scene; ``usual_front`` if the evidence is weak.
 
-    Each actor votes by its posed joints: left and right, toes, face, head and tail, and the
-    direction of its motion; by the shape of its feet if it has neither joints nor captured
+    Each actor votes by its posed joints (left and right, toes, face, head and tail) and the
+    direction of its motion, or by the shape of its feet if it has neither joints nor captured
     points. Votes of actors that face opposite directions cancel out.
 
     Parameters
     ----------
     scene : Scene
-        Posed; not changed.
+        Posed scene; not modified.
     """
     up = np.zeros(3)
     up["xyz".index(scene.up)] = 1.0

@@ -17,11 +17,11 @@ from viewer.rig.retargeting.joint_names import sided_words
 __all__ = ["from_ends", "from_face", "from_sides", "from_soles", "from_toes", "from_travel"]
 
 _LEAST = 0.01  # fraction of the figure's size; shorter offsets have no reliable direction
-# Fraction of the figure's size; a head this far from the centre is in front of the body.
+# Fraction of the figure's size: a head this far from the centre is in front of the body.
 _CLEAR = 0.2
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
 _SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and ankles above them
-# Fraction of the vertices of a symmetric mesh whose mirror image is near another vertex.
+# Fraction of the vertices of a symmetric mesh whose mirror images are near other vertices.
 _MIRRORED = 0.98
 _LOOKED_AT = 2000  # vertices in the symmetry test
 
@@ -57,17 +57,17 @@ def from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 
 
 def from_toes(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
-    """Return evidence from the feet: toes are ahead of their parent joints."""
+    """Return evidence from the feet: toes are in front of their parent joints."""
     return _by_word(_TOES, names, parents, places, up)
 
 
 def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -> Floats:
-    """Return evidence from the face: eyes and jaws are ahead of the head."""
+    """Return evidence from the face: eyes and jaws are in front of the head joint."""
     return _by_word(_FACE, names, parents, places, up)
 
 
 def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
-    """Return evidence from the ends of an animal: heads are ahead of its centre, tails behind.
+    """Return evidence from the ends of an animal: heads are in front of its centre, tails behind.
 
     A head directly above the centre, as in people, gives no evidence.
     """
@@ -100,7 +100,7 @@ def from_travel(places: Floats, size: float, up: Floats) -> Floats:
     Returns
     -------
     (3,)
-        Total displacement over path length; shorter if the path is shorter than the figure's size.
+        Total displacement divided by path length; shorter if the path is shorter than the figure.
     """
     steps = _horizontal(np.diff(places, axis=0), up)
     path = float(np.linalg.norm(steps, axis=1).sum())
@@ -108,7 +108,7 @@ def from_travel(places: Floats, size: float, up: Floats) -> Floats:
 
 
 def from_soles(positions: Floats, up: Floats) -> Floats:
-    """Return evidence from a mesh alone: two symmetric soles that extend ahead of the ankles.
+    """Return evidence from a mesh alone: two symmetric soles that extend in front of the ankles.
 
     Parameters
     ----------
@@ -120,7 +120,8 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
     Returns
     -------
     (3,)
-        0 unless the mesh has exactly one mirror plane and stands on feet on both sides of it.
+        0 unless the mesh has exactly one mirror plane and stands on feet on both sides of the
+        plane.
     """
     height = positions @ up
     low, tall = float(height.min()), float(np.ptp(height))
@@ -140,7 +141,7 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
         return np.zeros(3)
     way = positions[soles].mean(axis=0) - positions[ankles].mean(axis=0)
     way[planes[0]] = 0.0
-    # Soles that extend ahead of the ankles by 2 % of the height or more count as full evidence.
+    # Soles that extend in front of the ankles by 2 % of the height or more are full evidence.
     way = _horizontal(way, up) / (2.0 * _LEAST * tall)
     return way / max(float(np.linalg.norm(way)), 1.0)
 
@@ -152,8 +153,8 @@ def _is_symmetric(positions: Floats, axis: int) -> bool:
     middle = bounding_box(positions).mean(axis=0)[axis]
     mirrored[:, axis] = 2.0 * middle - mirrored[:, axis]
     low = positions.min(axis=0)
-    # Vertices no farther apart than a cell lie in the same or in adjacent cells, so 27 look-ups
-    # find them without a search tree.
+    # Vertices that are no farther apart than the cell size lie in the same or in adjacent cells, so
+    # 27 look-ups find them without a search tree.
     known = np.unique(_cells((positions - low) / size))
     found = np.zeros(len(mirrored), dtype=bool)
     for step in np.ndindex(3, 3, 3):
@@ -182,7 +183,7 @@ def _by_word(
 
 
 def _agreement(ways: Floats, size: float) -> Floats:
-    """Normalise the vectors that are long enough and return their mean."""
+    """Normalise the vectors that are long enough, and return their mean."""
     lengths = np.linalg.norm(ways, axis=1)
     clear = lengths > _LEAST * size
     if not clear.any():

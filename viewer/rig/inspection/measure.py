@@ -39,7 +39,7 @@ def measure(figure: Figure) -> Measures:
     Parameters
     ----------
     figure : Figure
-        With a mesh.
+        Figure with a mesh.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Skin a few vertices of a posed figure."""
+"""Skinning of a few vertices of a posed figure."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def deform_vertices(
     Parameters
     ----------
     figure : Figure
-        With a mesh.
+        Figure with a mesh.
     pose : Pose or None
         None for the file's own pose.
     skinning : Skinning
@@ -65,7 +65,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     Parameters
     ----------
     figure : Figure
-        With a mesh, already shaped.
+        Figure with a mesh, already shaped.
     pose : Pose
         DOFs in lengths and radians.
     vertices : (N,)
@@ -76,7 +76,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     Returns
     -------
     (N, 3)
-        In the bind pose.
+        Vertices in the bind pose.
     """
     rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
@@ -95,7 +95,7 @@ def check_vertices(figure: Figure, vertices: Ints) -> None:
     Raises
     ------
     RigError
-        If one is out of range, with the index and the range.
+        If an index is out of range; the message gives the index and the range.
     """
     count = 0 if figure.mesh is None else figure.mesh.n_vertices
     wrong = vertices[(vertices < 0) | (vertices >= count)]

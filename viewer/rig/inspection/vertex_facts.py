@@ -36,7 +36,7 @@ class VertexFacts:
     normal : (3,)
         Unit length.
     uvs : (N, 2)
-        Texture coordinates, several along a seam, those of the triangle first.
+        Texture coordinates, several along a seam; those of the triangle come first.
     body_part : str
         Body part; empty if there is none.
     joints : (K,)
@@ -44,7 +44,7 @@ class VertexFacts:
     names : tuple of K str
         Names of these joints.
     weights : (K,)
-        Weights, duplicates of a joint added up.
+        Weights; duplicates of a joint are summed.
     """
 
     vertex: int
@@ -66,7 +66,7 @@ def vertex_facts(
     Parameters
     ----------
     figure : Figure
-        With a mesh.
+        Figure with a mesh.
     pose : Pose or None
         None for the file's own pose, or a figure without a skeleton.
     skinning : Skinning
@@ -111,9 +111,9 @@ def nearest_corner(positions: Floats, triangle: Ints, point: Floats) -> int:
     Parameters
     ----------
     positions : (3, 3)
-        Positions of its corners.
+        Positions of the triangle's corners.
     triangle : (3,)
-        Their indices.
+        Indices of these vertices.
     point : (3,)
         In the same space.
     """
@@ -143,7 +143,7 @@ def facts_text(facts: VertexFacts) -> list[str]:
 
 
 def _uvs(figure: Figure, vertex: int, triangle: int) -> Floats:
-    """Return a vertex's distinct texture coordinates, that of a triangle first: (N, 2)."""
+    """Return a vertex's distinct texture coordinates, those of the triangle first: (N, 2)."""
     mesh = figure.require_mesh()
     if mesh.uvs is None or len(mesh.uvs) == 0:
         return np.zeros((0, 2))

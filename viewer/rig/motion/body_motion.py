@@ -49,7 +49,7 @@ class BodyMotion:
     up : "y", "z", "-y", "-z" or ""
         World up axis; empty if unknown.
     facts : tuple of (str, str)
-        Further facts from the file, for ``viewer info``.
+        Other facts from the file, for ``viewer info``.
     world_rotations : (N, 3) or None
         Rotation vectors that rotate the whole body about the figure's origin after ``vectors``
         have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be False.
@@ -82,7 +82,7 @@ class BodyMotion:
 
     @property
     def n_rows(self) -> int:
-        """Number of frames that hold data, N."""
+        """Number of frames with data, N."""
         return len(self.vectors)
 
 
@@ -96,9 +96,9 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     Parameters
     ----------
     motion : BodyMotion
-        Any member of the family.
+        Motion of any member of the family.
     figure : Figure
-        With the family's joint names; joints without a vector stay at rest.
+        Figure with the family's joint names; joints without a vector stay at rest.
 
     Returns
     -------
@@ -138,7 +138,8 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     elif motion.about_origin:
         origin_rotations = rotations[:, 0]
     if origin_rotations is not None:
-        # t = T - J0 + R J0: skinning rotates about the rest root J0, the file about the origin.
+        # t = T - J0 + R J0: skinning rotates about the rest root J0, the file rotates about the
+        # origin.
         root = root_positions(figure, weights)
         matrices = quaternion_to_matrix(origin_rotations)
         rotated_roots = np.einsum("nab,nb->na", matrices, root + 0.0 * translations)
@@ -160,7 +161,7 @@ def root_positions(figure: Figure, weights: Floats) -> Floats:
 
 
 def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diagnostic]:
-    """Rotate the fingers by their components, in place; return messages about dropped data."""
+    """Rotate the fingers by their components, in place; return messages about omitted data."""
     notes: list[Diagnostic] = []
     for side, coefficients in motion.hands.items():
         hand = _hand(figure, side)

@@ -55,7 +55,7 @@ class Channel:
     values : (N,)
         Lengths or radians.
     tangents : tuple of N (incoming, outgoing)
-        Rules or slopes on the two sides of each key.
+        Rules or slopes on both sides of each key.
     extrapolation : (before, after)
         Two of ``EXTRAPOLATIONS``.
     """
@@ -129,7 +129,7 @@ def slopes(channel: Channel) -> Floats:
     Parameters
     ----------
     channel : Channel
-        With N keys.
+        Channel with N keys.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def _ratio(rise: Floats, run: Floats) -> Floats:
 def is_course_rig(skeleton: Skeleton) -> bool:
     """Return whether a skeleton's DOFs are those of ``.anim`` channels, in that order.
 
-    These are translation x, y, z of the root, then rotations x, y, z of joint 0, 1, 2 and so on.
+    These are translations x, y, z of the root, then rotations x, y, z of joints 0, 1, 2 and so on.
     """
     count = skeleton.n_joints
     if skeleton.n_dofs != 3 + 3 * count:
@@ -177,7 +177,7 @@ def suits(clip: Clip, skeleton: Skeleton) -> bool:
 
 
 def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
-    """Return why a clip cannot move a skeleton, as a phrase that follows its name, or None."""
+    """Return why a clip cannot move a skeleton, as a phrase that follows the name, or None."""
     if not is_course_rig(skeleton):
         return Phrase("not-course-rig", reason=_first_misfit(skeleton))
     if len(clip.channels) != skeleton.n_dofs:

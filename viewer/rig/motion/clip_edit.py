@@ -60,7 +60,7 @@ def add_key(
     Parameters
     ----------
     channel : Channel
-        With any number of keys.
+        Channel with any number of keys.
     time : float
         Seconds.
     value : float, optional
@@ -128,7 +128,7 @@ def move_keys(
     Parameters
     ----------
     channel : Channel
-        Contains these keys.
+        Channel that contains these keys.
     keys : iterable of int
         Indices, which do not change.
     dt : float
@@ -259,7 +259,7 @@ def key_pose(
     Parameters
     ----------
     clip : Clip
-        Clip of that skeleton; its range is extended to include the time.
+        Clip of the skeleton; its range is extended to include the time.
     skeleton : Skeleton
         Provides the limits.
     pose : Pose

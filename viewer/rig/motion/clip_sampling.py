@@ -44,7 +44,7 @@ def sample(clip: Clip, skeleton: Skeleton, time: float, out: Pose) -> None:
     clip : Clip
         The motion.
     skeleton : Skeleton
-        Provides the limits; the clip must fit it, see ``check_fit``.
+        Provides the limits; the clip must fit the skeleton, see ``check_fit``.
     time : float
         Seconds; before ``start`` and after ``end`` the curves extrapolate.
     out : Pose

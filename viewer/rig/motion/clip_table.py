@@ -37,7 +37,7 @@ def evaluate_all(clip: Clip, times: Floats) -> tuple[Ints, Floats]:
     Parameters
     ----------
     clip : Clip
-        With C channels that have keys.
+        Clip with C channels that have keys.
     times : (T,)
         Seconds.
 

@@ -55,7 +55,7 @@ class Frames:
     times : (F,)
         Seconds.
     present : (F,) bool
-        Rows where it is False are undefined in the other arrays.
+        Whether the actor is present; otherwise the row is undefined in the other arrays.
     rotations : (F, J, 4)
         Each joint's complete rotation relative to its parent: unit quaternions (x, y, z, w).
     translations : (F, J, 3)
@@ -98,7 +98,7 @@ def frame_rate(motion: Motion | None) -> float:
 
 
 def scene_rate(actors: Iterable[Actor]) -> float:
-    """Return the frames per second of a scene's timeline: those of its longest capture."""
+    """Return the frame rate of a scene's timeline: that of its longest capture."""
     clips = [actor.clip for actor in actors if isinstance(actor.clip, SampledClip | PointClip)]
     return frame_rate(max(clips, key=lambda clip: clip.end - clip.start, default=None))
 
@@ -109,7 +109,7 @@ def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
     Parameters
     ----------
     actor : Actor
-        Its ``pose``, ``points`` and ``is_present`` are modified, unless it has no clip.
+        Actor whose ``pose``, ``points`` and ``is_present`` are modified, unless it has no clip.
     time : float
         Seconds; the actor's own ``offset`` is subtracted.
     interpolate : bool
@@ -161,13 +161,13 @@ def frames_of(
     Parameters
     ----------
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     motion : Clip or SampledClip
         Motion of that skeleton.
     times : (F,)
         Seconds on the motion's own clock.
     base : Pose, optional
-        Provides shape and placement where the motion has none; the figure's own if omitted.
+        Provides shape and placement if the motion has none; those of the file if omitted.
     interpolate : bool
         Interpolate across gaps.
 
@@ -256,12 +256,12 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
 
 
 def world_frames(figure: Figure, frames: Frames) -> Floats:
-    """Return every joint's world matrix in every frame: forward kinematics of all frames at once.
+    """Return every joint's world matrix in every frame; all frames are computed at once.
 
     Parameters
     ----------
     figure : Figure
-        With a skeleton; joints follow the frames' shapes.
+        Figure with a skeleton; joints follow the frames' shapes.
     frames : Frames
         Poses of that figure.
 
@@ -272,7 +272,8 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     """
     skeleton = figure.require_skeleton()
     count = frames.n_frames
-    # Joints first, as forward_kinematics multiplies the matrices of all frames of a joint at once.
+    # The joint axis comes first, as forward_kinematics multiplies a joint's matrices of all frames
+    # at once.
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
     linear = quaternion_to_matrix(frames.rotations) * skeleton.rest_scales[:, None, :]

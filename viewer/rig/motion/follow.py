@@ -18,7 +18,7 @@ def followed_point(actor: Actor, joint: int = -1) -> Floats | None:
     Parameters
     ----------
     actor : Actor
-        Posed and placed.
+        A posed and placed actor.
     joint : int
         Index of a joint or keypoint; -1 for the mean.
 

@@ -50,7 +50,7 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
     Parameters
     ----------
     actors : iterable of Actor
-        Those without a clip are unchanged.
+        Actors to pose; those without a clip are unchanged.
     time : float
         Seconds; each actor's own ``offset`` is subtracted.
     interpolate : bool
@@ -112,7 +112,7 @@ def local_rotations(skeleton: Skeleton, poses: Sequence[Pose]) -> Floats:
     Parameters
     ----------
     skeleton : Skeleton
-        With J joints.
+        Skeleton with J joints.
     poses : sequence of A Pose
         DOFs in lengths and radians.
 
@@ -194,7 +194,7 @@ def palettes(figure: Figure, poses: Sequence[Pose]) -> Floats:
     Parameters
     ----------
     figure : Figure
-        With skeleton and skin.
+        Figure with skeleton and skin.
     poses : sequence of A Pose
         At least one; all have the shape of the first.
 

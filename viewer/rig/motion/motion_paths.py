@@ -33,7 +33,7 @@ class MotionPath:
     points : (F, N, 3)
         Figure space, including the figure's own placement and scale.
     present : (F, N) bool
-        Points where it is False are undefined.
+        Whether the point is present; otherwise it is undefined.
     """
 
     times: Floats
@@ -42,7 +42,7 @@ class MotionPath:
 
 
 def path_times(motion: Motion) -> Floats:
-    """Return the sampling times of a path: a capture's frames, 60 per second on curves."""
+    """Return the sampling times of a path: a capture's frames, or 60 per second on curves."""
     if isinstance(motion, Clip):
         length = motion.end - motion.start
         steps = int(min(np.ceil(length * _KEYED_RATE - 1e-6), _MOST - 1))
@@ -64,7 +64,7 @@ def motion_path(
     Parameters
     ----------
     figure : Figure
-        With a skeleton, or made of points for a ``PointClip``.
+        Figure with a skeleton, or with captured points for a ``PointClip``.
     motion : Motion
         Motion of that figure.
     joints : sequence of N int
@@ -72,9 +72,9 @@ def motion_path(
     times : (F,), optional
         Seconds on the motion's own clock; ``path_times`` if omitted.
     base : Pose, optional
-        Provides shape and placement where the motion has none.
+        Provides shape and placement if the motion has none.
     min_confidence : float
-        Points with lower confidence are absent; unseen points always are.
+        Points with a lower confidence are absent, as are invisible points.
 
     Raises
     ------

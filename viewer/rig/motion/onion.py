@@ -31,7 +31,7 @@ def onion(
     Parameters
     ----------
     scene : Scene
-        Not modified; actors without a motion are shown once.
+        Scene, which is not modified; actors without a motion are shown once.
     times : int or iterable of float
         Number of poses, evenly spaced over the motions, or their times on the scene's clock,
         seconds, in any order.

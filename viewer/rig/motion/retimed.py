@@ -16,7 +16,7 @@ def with_rate(clip: SampledClip | PointClip, rate: float) -> SampledClip | Point
     Parameters
     ----------
     clip : SampledClip or PointClip
-        Returned unchanged if it already has that rate.
+        Clip, returned unchanged if it already has that rate.
     rate : float
         Frames per second.
     """

@@ -36,7 +36,7 @@ class SampledAnimation:
     name : str
         Name of the actor.
     figure : Figure
-        Without shape; the shape is in ``frames``.
+        Figure without a shape applied; the shape is in ``frames``.
     frame_rate : float
         Frames per second.
     first_frame : int
@@ -44,11 +44,12 @@ class SampledAnimation:
     frames : Frames
         Poses, in time order; gaps are in ``frames.present``.
     motion : Clip or SampledClip
-        The motion that the frames were sampled from.
+        The motion from which the frames were sampled.
     base : Pose or None
-        Provides what the motion does not animate.
+        Provides the properties that the motion does not animate.
     is_rotated : bool
-        Whether the frames are rotated upright, see ``upright_animation``; the motion never is.
+        Whether the frames are rotated upright, see ``upright_animation``; the motion is never
+        rotated.
     """
 
     name: str
@@ -72,7 +73,7 @@ def sample_animation(
     Parameters
     ----------
     actor : Actor
-        With a clip.
+        Actor with a clip.
     rate : float, optional
         Frames per second; the clip's own if omitted, which reproduces captured frames exactly.
     frames : (int, int), optional
@@ -108,7 +109,7 @@ def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
 def frame_range(
     motion: Motion, rate: float, frames: tuple[int, int | None] | None
 ) -> tuple[int, int]:
-    """Return the first frame and the exclusive end; arguments as for ``sample_animation``.
+    """Return the first frame and the exclusive end; see ``sample_animation`` for the arguments.
 
     Raises
     ------
@@ -134,7 +135,7 @@ def upright_animation(
     interpolate: bool = False,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Sample an actor's clip, rotated upright where its own world is upside down.
+    """Sample an actor's clip, rotated upright if its own world is upside down.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def upright_animation(
     animation : SampledAnimation
         The sampled frames.
     up : "y", "z", "-y" or "-z"
-        Up axis of the frames; the last two only if ``keeps_world`` is True.
+        Up axis of the frames; negative axes occur only if ``keeps_world`` is True.
     """
     animation = sample_animation(actor, rate, frames, interpolate)
     up, hangs = own_up(scene, actor)

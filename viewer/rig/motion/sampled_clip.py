@@ -17,7 +17,7 @@ __all__ = ["SampledClip", "SampledRows", "joined", "sample_rows"]
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class SampledClip:
-    """A motion of one skeleton as frames, the form in which captures are stored.
+    """A motion of one skeleton as frames, as captures are stored.
 
     Attributes
     ----------
@@ -96,9 +96,9 @@ class SampledRows:
 
 
 def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
-    """Return a clip's data at given times: rotations along the shorter arc, the rest linearly.
+    """Interpolate a clip at given times: rotations along the shorter arc, the rest linearly.
 
-    Exactly on a frame, the stored values are returned unchanged.
+    Exactly at a frame, the stored values are returned unchanged.
 
     Parameters
     ----------
@@ -148,14 +148,14 @@ def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
 
 
 def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
-    """Return one clip of the concatenated rows of several, with a new timing.
+    """Return one clip with the concatenated rows of several clips and a new timing.
 
     Parameters
     ----------
     clips : sequence of SampledClip
-        At least one, of one skeleton, all with the same arrays.
+        At least one clip; all are of one skeleton and have the same arrays.
     timing : Timing
-        Its rows index the concatenated rows.
+        Timing whose rows index the concatenated rows.
     """
 
     def stack(name: str) -> Floats | None:
@@ -176,7 +176,7 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
     if len(clips) == 1:
         return replace(first, timing=timing)
     rotations = stack("rotations")
-    assert rotations is not None  # every clip has them
+    assert rotations is not None  # every clip has rotations
     return SampledClip(
         first.name,
         timing,

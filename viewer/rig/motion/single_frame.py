@@ -30,7 +30,7 @@ def single_frame(
     Parameters
     ----------
     actor : Actor
-        With joints; an absent actor gives a missing frame.
+        Actor with joints; an absent actor gives a missing frame.
     rate : float
         Nominal frames per second of the animation.
     number : int
@@ -41,7 +41,7 @@ def single_frame(
     Returns
     -------
     SampledAnimation
-        Its ``motion`` holds the frame as well: one key per DOF for rigs with keyed clips.
+        Its ``motion`` contains the frame as well: one key per DOF for rigs with keyed clips.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def upright_single_frame(
     time: float = 0.0,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Return an actor's current pose, rotated upright where its own world is upside down.
+    """Return an actor's current pose, rotated upright if its own world is upside down.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ def upright_single_frame(
     Returns
     -------
     animation : SampledAnimation
-        One frame.
+        Animation of one frame.
     up : "y", "z", "-y" or "-z"
-        Up axis of the frame; the last two only if ``keeps_world`` is True.
+        Up axis of the frame; negative axes occur only if ``keeps_world`` is True.
     """
     up, hangs = own_up(scene, actor)
     if keeps_world or not hangs:
@@ -109,7 +109,7 @@ def pose_frames(
     Parameters
     ----------
     figure : Figure
-        With or without a skeleton.
+        Figure with or without a skeleton.
     pose : Pose or None
         Pose of the figure; None for a figure without a skeleton.
     is_present : bool
@@ -125,7 +125,8 @@ def pose_frames(
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         if (pose.scales != skeleton.rest_scales).any():
-            # Frames cannot store joint scales, so the pose's become those of the skeleton.
+            # Frames cannot store joint scales, so the scales of the pose become those of the
+            # skeleton.
             skeleton = replace(skeleton, rest_scales=pose.scales)
             figure = replace(figure, skeleton=skeleton)
         moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]

@@ -20,11 +20,11 @@ class SkeletonMotion:
     figure : Figure
         A skeleton without a mesh.
     clip : SampledClip
-        Its motion.
+        Motion of the figure.
     unit_note : Phrase or None
-        How the figure's unit was guessed; None if it was not.
+        Explains how the figure's unit was estimated; None if it was not.
     up_notes : tuple of Phrase
-        How the up axis was guessed, and any contrary evidence.
+        Explain how the up axis was estimated, and give any contrary evidence.
     """
 
     figure: Figure

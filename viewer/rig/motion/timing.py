@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 __all__ = ["FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
 
 SLOWEST, FASTEST = 1e-6, 1e6
-"""Frames per second: outside these limits, times of long motions lose precision."""
+"""Limits of the frame rate, outside which the times of long motions lose precision."""
 
 RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames per second"
 """The limits as text, for messages."""
@@ -38,13 +38,14 @@ class Timing:
     frame_rate : float
         Frames per second.
     rows : (F,) int32
-        Row of each frame in the data, -1 for a missing one.
+        Row of each frame in the data, -1 for a missing frame.
     first_frame : int
         Number of the first frame in the file.
     start : float
         Seconds of the first frame.
     holds : bool
-        Before the first and after the last frame: True holds the end frames, False means absent.
+        Behaviour before the first and after the last frame: True holds the end frames, False means
+        absent.
     """
 
     frame_rate: float
@@ -100,7 +101,7 @@ class Timing:
             return nothing, nothing, np.zeros(len(times))
         place = (times - self.start) * self.frame_rate
         nearest = np.round(place)
-        # Snapping undoes rounding in time * rate: exactly on a frame, its stored data is returned.
+        # Snapping undoes rounding in time * rate: exactly at a frame, its stored data is returned.
         place = np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
         outside = (place < 0.0) | (place > self.n_frames - 1)
         place = np.clip(place, 0.0, self.n_frames - 1)
@@ -110,7 +111,7 @@ class Timing:
         if interpolate:
             return self._bridged(place)
         before, after = self.rows[frame], self.rows[following]
-        # The frame before a gap is held until the gap begins; the one after it does not start
+        # The frame before a gap is held until the gap begins; the frame after it does not start
         # early.
         fraction = np.where(after < 0, 0.0, fraction)
         after = np.where(after < 0, before, after)

@@ -17,7 +17,7 @@ __all__ = ["CUSTOM", "guess_up"]
 CUSTOM = "z"
 """Default up axis without evidence: EasyMocap's calibration board usually lies on the floor."""
 
-_ENOUGH = 64  # frames per person; more would not change the result
+_ENOUGH = 64  # frames per person; more frames would not change the result
 _LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
 _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
@@ -28,14 +28,14 @@ def guess_up(actors: Iterable[Actor]) -> str:
     Parameters
     ----------
     actors : iterable of Actor
-        Bodies with sampled clips and captured keypoints, as far as they have been read; other
+        Bodies with sampled clips, and captured keypoints, as far as they have been read; other
         actors and all placements are ignored.
 
     Returns
     -------
     str
-        ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``; ``CUSTOM`` where there is no evidence, or
-        people lie along x.
+        ``"y"``, ``"z"``, ``"-y"`` or ``"-z"``; ``CUSTOM`` if there is no evidence, or people lie
+        along x.
     """
     directions = [np.zeros((0, 3))]
     for actor in actors:
@@ -47,7 +47,7 @@ def guess_up(actors: Iterable[Actor]) -> str:
     lengths = np.linalg.norm(steps, axis=1)
     mean = (steps[lengths > 0.0] / lengths[lengths > 0.0, None]).sum(axis=0)
     axis = int(np.abs(mean).argmax())
-    if axis == 0:  # also if all sums are 0
+    if axis == 0:  # also the case if all sums are 0
         return CUSTOM
     return ("-" if mean[axis] < 0.0 else "") + "xyz"[axis]
 
@@ -65,7 +65,7 @@ def _of_body(actor: Actor, clip: SampledClip) -> Floats:
 
 
 def _of_points(actor: Actor, clip: PointClip) -> Floats:
-    """Return the vectors from hips to head where both are seen: (N, 3)."""
+    """Return the vectors from hips to head in frames where both are visible: (N, 3)."""
     layout, points = actor.figure.points, clip.points[:_ENOUGH]
     names = () if layout is None else layout.names
     low, high = (_middle(points, names, choices) for choices in (_LOW, _HIGH))
@@ -78,7 +78,7 @@ def _of_points(actor: Actor, clip: PointClip) -> Floats:
 def _middle(
     points: Floats, names: tuple[str, ...], choices: tuple[tuple[str, ...], ...]
 ) -> Floats | None:
-    """Return the mean of the first set of keypoints that the layout has: (N, 4)."""
+    """Return the mean of the first set of keypoints that exists in the layout: (N, 4)."""
     for choice in choices:
         if set(choice) <= set(names):
             chosen = points[:, [names.index(name) for name in choice]]

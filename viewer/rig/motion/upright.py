@@ -26,7 +26,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
     scene : Scene
         Provides the up axis.
     actor : Actor
-        Placed in the scene.
+        Actor placed in the scene.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
 
 
 def upright_actor(scene: Scene, actor: Actor) -> Actor:
-    """Return an actor whose figure states the up axis of its pose, rotated upright if upside down.
+    """Return an actor whose figure records the up axis of its pose, rotated if upside down.
 
     A body in a z-up capture stands along z, regardless of the up axis of its model.
 
@@ -59,7 +59,7 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     Returns
     -------
     Actor
-        With the same placement, which no longer applies; the actor itself if nothing changes.
+        Actor with the same placement, which no longer applies; the actor itself if nothing changes.
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)

@@ -20,7 +20,7 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Provides the DOF table.
     dof : int
         Row of the DOF.
     value : float
@@ -39,7 +39,7 @@ def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str =
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Provides the DOF table.
     dof : int
         Row of the DOF.
     value : float

@@ -52,7 +52,7 @@ class Reach:
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
-    """Return the joints that may rotate to move one: its nearest ancestors with free rotations.
+    """Return the joints that may rotate to move a joint: its nearest ancestors with free rotations.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
     joint : int
         The joint to move; its own rotations do not move it.
     length : int
-        Maximum number of joints; those without a free rotation do not count.
+        Maximum number of joints; joints without a free rotation do not count.
 
     Returns
     -------
@@ -82,9 +82,9 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
 def place_jacobian(skeleton: Skeleton, pose: Pose, world: Floats, joint: int, rows: Ints) -> Floats:
     """Return the Jacobian of a joint's position with respect to rotation DOFs of its ancestors.
 
-    With the parent's linear part A, the joint's own rotation axis a in the parent's frame (after
-    the rows that are applied later) and the arm y from the rotating joint, the column of a DOF is
-    A (a x A^-1 y); this also holds with scales.
+    With the parent's linear part A, the rotation axis a in the parent's frame (after the rows that
+    are applied later) and the vector y from the rotating joint to the moved joint, the column of a
+    DOF is A (a x A^-1 y); this also holds with scales.
 
     Parameters
     ----------
@@ -124,14 +124,14 @@ def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Float
     skeleton : Skeleton
         Provides the DOF table.
     pose : Pose
-        Radians; DOFs that are applied later rotate the axes of those before.
+        Radians; DOFs that are applied later rotate the axes of earlier ones.
     joint : int
         The joint that has the DOFs.
 
     Returns
     -------
     dict of int to (3,)
-        By row of the DOF table: unit vectors in the parent's frame.
+        Unit vectors in the parent's frame, by row of the DOF table.
     """
     own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION))
     after = quaternion_to_matrix(pose.rotations[joint])
@@ -153,7 +153,7 @@ def reach(
     skeleton : Skeleton
         Provides the hierarchy, the DOFs and their limits.
     pose : Pose
-        Start of the search; not changed.
+        Start of the search; not modified.
     joint : int
         The joint to move.
     target : (3,)
@@ -166,8 +166,8 @@ def reach(
     Returns
     -------
     Reach
-        Never farther from the target than the start, unless the start is outside its limits,
-        in which case it is clamped first.
+        A pose that is not farther from the target than the start. A start outside its limits is
+        clamped first.
 
     Raises
     ------
@@ -219,7 +219,7 @@ class _Solver:
         return self.target - self.world[self.joint, :3, 3]
 
     def _improve(self, error: Floats) -> bool:
-        """Take one step that reduces the error; return whether there was one."""
+        """Take one step that reduces the error; return whether one was found."""
         jacobian = place_jacobian(self.skeleton, self.pose, self.world, self.joint, self.rows)
         start = self.pose.dofs[self.rows].copy()
         distance = np.linalg.norm(error)
@@ -242,7 +242,7 @@ class _Solver:
         free: Bools = np.ones(len(start), dtype=bool)
         damp = (self.damping * self.size) ** 2 * np.eye(3)
         for _ in range(len(start)):
-            # DOFs stopped at a limit move by a known amount; the free ones solve for the rest.
+            # DOFs stopped at a limit move by a known amount; the step is solved for the others.
             part = jacobian[:, free]
             left = error - jacobian[:, ~free] @ step[~free]
             step[free] = part.T @ np.linalg.solve(part @ part.T + damp, left)
@@ -260,8 +260,8 @@ class _Solver:
     def _bend(self, error: Floats) -> bool:
         """Bend a chain that is collinear with its target, where no small rotation moves it closer.
 
-        Each DOF is tried in the direction with more room to its limits; the bend
-        after which the next step comes closest is kept.
+        Each DOF is tried in the direction with more room to its limits; the bend after which the
+        next step comes closest to the target is kept.
         """
         start, damping = self.pose.dofs[self.rows].copy(), self.damping
         best, nearest = None, float(np.linalg.norm(error))

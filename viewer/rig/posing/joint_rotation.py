@@ -1,10 +1,10 @@
-"""Fit a joint's DOFs to a given rotation, within their limits.
+"""Fitting of a joint's DOFs to a given rotation, within their limits.
 
-A joint's rotation relative to its parent is R(quaternion) E_n ... E_1, each E about one axis.
-Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan angles); the
-one within the limits that is closer to the present values is taken. Otherwise each DOF is set in
-turn to its optimum with the others fixed, repeatedly: with M the product of the factors around E_k
-and of the target rotation's transpose, the trace to maximise is
+A joint's rotation relative to its parent is R(quaternion) E_n ... E_1, where each E rotates about
+one axis. Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan
+angles); the solution within the limits that is closer to the current values is taken. Otherwise
+each DOF is set in turn to its optimum with the others fixed, repeatedly: with M the product of the
+factors around E_k and of the target rotation's transpose, the trace to maximise is
 
     trace(M E_k(t)) = M_kk + (M_ii + M_jj) cos t + (M_ij - M_ji) sin t,   (i, j) = (k + 1, k + 2)
 """
@@ -39,7 +39,7 @@ class RotationFit:
     dofs : (D,)
         DOFs of the whole skeleton; only rotations of the joint have changed.
     error : float
-        Angle between the target rotation and the one reached, radians.
+        Angle between the target rotation and the resulting rotation, radians.
     limited : (N,) int32
         Rotation DOFs of the joint that are at a limit, if there is an error.
     """
@@ -55,7 +55,7 @@ def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Provides the DOF table.
     joint : int
         The joint that has the DOFs.
     free : bool
@@ -87,7 +87,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     skeleton : Skeleton
         Provides the DOFs and their limits.
     pose : Pose
-        Among equally good solutions, the one closest to its DOFs is taken; not modified.
+        Current pose, not modified; among equally good solutions, the closest to its DOFs is taken.
     joint : int
         The joint to rotate.
     rotation : (3, 3)
@@ -96,7 +96,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     Returns
     -------
     RotationFit
-        Exact if limits and axes allow it.
+        The fit, exact if limits and axes allow it.
     """
     rows = rotation_dofs(skeleton, joint)
     low, high = skeleton.dof_limits[rows].T
@@ -120,7 +120,7 @@ class _Solver:
         self.present = np.clip(present, low, high)
 
     def best(self) -> Floats:
-        """Return the angles: exact and closest to the present ones, else closest to the goal."""
+        """Return the angles: exact and closest to the current ones, or else closest to the goal."""
         exact = self._exact()
         within = [
             values
@@ -133,7 +133,7 @@ class _Solver:
         starts = [self.present, *(np.clip(values, self.low, self.high) for values in exact)]
         found = [self._improved(start.copy()) for start in starts]
         errors = [self.error(values) for values in found]
-        # The present values are tried first: they win unless others are clearly better.
+        # The current values are tried first: they are kept unless others are clearly better.
         return found[int(np.argmin(np.round(errors, 7)))]
 
     def error(self, values: Floats) -> float:
@@ -152,7 +152,7 @@ class _Solver:
         return product
 
     def _exact(self) -> list[Floats]:
-        """Return both closed-form solutions for three different axes, none otherwise."""
+        """Return both closed-form solutions for three different axes; none for other axes."""
         if len(self.axes) != 3 or len(set(self.axes)) != 3:
             return []
         # Axes are renamed to x, y, z; an odd permutation is a reflection, which negates angles.
@@ -163,7 +163,7 @@ class _Solver:
         return [self._wrapped(sign * values) for values in pair]
 
     def _wrapped(self, values: Floats) -> Floats:
-        """Add multiples of 2 pi: nearest to the present values, or within limits if possible."""
+        """Add multiples of 2 pi: nearest to the current values, within the limits if possible."""
         near = values - _TURN * np.round((values - self.present) / _TURN)
         inside = near - _TURN * np.round((near - np.clip(near, self.low, self.high)) / _TURN)
         # A range that crosses -pi or pi may contain the value one full rotation away.
@@ -174,7 +174,7 @@ class _Solver:
         return np.where(is_inside, near, inside)
 
     def _improved(self, values: Floats) -> Floats:
-        """Optimise each value with the others fixed, until none changes any more."""
+        """Optimise each value with the others fixed, until none changes."""
         count = len(values)
         for _ in range(_SWEEPS):
             before = values.copy()
@@ -190,7 +190,7 @@ class _Solver:
         return values
 
     def _best_one(self, place: int, around: Floats, now: float) -> float:
-        """Return the angle that maximises the trace, within the limits and closest to now."""
+        """Return the angle within the limits that maximises the trace, nearest to the current."""
         axis = self.axes[place]
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]

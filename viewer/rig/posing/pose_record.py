@@ -38,7 +38,7 @@ PARTS = {
 }
 """Rotation vectors of single joints under the names used by smplx."""
 
-_BODY = 21  # joints of body_pose in models with fingers or a face; SMPL alone has two more
+_BODY = 21  # joints of body_pose in models with fingers or a face; only SMPL has two more
 _LONGEST_BODY = 23
 _SMALLEST, _LARGEST = 1e-6, 1e6  # scales that can be drawn in float32
 _FARTHEST = 1e9  # figure units
@@ -52,7 +52,7 @@ class PoseRecord:
     Attributes
     ----------
     dofs : mapping of str to float
-        By label, ``"left_knee.x"``: lengths and radians.
+        Lengths and radians by label, such as ``"left_knee.x"``.
     vector : (N,) or None
         The model's own pose vector.
     parts : mapping of str to array
@@ -65,13 +65,14 @@ class PoseRecord:
     scale : float or None
         Scale of the figure, after skinning.
     flat_hands : bool or None
-        Whether hand poses are relative to the flat hand. None: only coefficients add the mean.
+        Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
+        only.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; None: unless there are 45 values.
+        Whether hand poses are coefficients; if None, they are unless there are 45 values.
     joint_rotations : JointRotations or None
-        Used instead of the values by a figure with different DOFs: joints of the same names are
-        rotated equally; its placement, size and shape are unchanged. Figures with the same DOFs
-        use everything else, as far as they have the blend shapes.
+        Used by figures with different DOFs instead of the DOF values: joints with the same names
+        get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
+        use all other parts, as far as they have the blend shapes.
     line_of : callable or None
         Returns the line in the source file, given a part and the name of a DOF in it, as in
         ``PosePartError``.
@@ -118,12 +119,12 @@ def _part(part: str, name: str = "") -> Iterator[None]:
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
-    """Return a pose by DOF names and as the model's own vector, both complete.
+    """Return a complete pose both by DOF names and as the model's own vector.
 
     Parameters
     ----------
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     pose : Pose
         Pose of that figure.
     """
@@ -153,12 +154,12 @@ def apply_record(
     record : PoseRecord
         The record to apply.
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     pose : Pose
-        Changed, except for parts that the record does not mention.
+        Modified, except for properties that are not in the record.
     drop_excess : bool
-        Drop coefficients that a figure with fewer shapes lacks, as with files of related models,
-        instead of raising an error. Records with ``joint_rotations`` always drop them.
+        Ignore coefficients that the figure does not have, as in files of related models, instead of
+        raising an error. They are always ignored in records with ``joint_rotations``.
 
     Returns
     -------
@@ -212,7 +213,7 @@ def _take_over(work: Pose, pose: Pose) -> None:
 
 
 def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
-    """Return a message about parts of a record that a figure with different DOFs ignores."""
+    """Return a message about parts of a record that do not apply if the DOFs differ."""
     moves = DOF_KINDS[:3]
     moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
     shifts = record.joint_rotations is not None and record.joint_rotations.shifts.any()
@@ -229,7 +230,7 @@ def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
 
 
 def _keep_drawable(before: Pose, pose: Pose) -> list[Diagnostic]:
-    """Restore a placement or scale that cannot be drawn; return messages about it."""
+    """Restore the placement or scale if it cannot be drawn; return messages about it."""
     notes = []
     scale = pose.figure_scale
     if not _SMALLEST <= scale <= _LARGEST:
@@ -364,7 +365,7 @@ def _apply_hand(
     assert skeleton is not None
     side = _HAND_PARTS[name]
     if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
-        hand = figure.hands[0]  # MANO models one hand, left or right
+        hand = figure.hands[0]  # MANO is a model of one hand, left or right
     first = f"{side}_index1" if side else "index1"
     if hand is None and len(values) == 45 and first in skeleton.names:
         start = skeleton.names.index(first)

@@ -40,7 +40,7 @@ class PoseLayout:
     starts : (J,) int32
         Index of the first of each joint's three rotation values.
     is_euler : (J,) bool
-        True: angles about z, y, x with R = Rz Ry Rx. False: a rotation vector.
+        True for angles about z, y, x with R = Rz Ry Rx, False for a rotation vector.
     translation, scale : int
         Index of the figure's translation (three values) and scale (one); -1 for none.
     """
@@ -63,12 +63,12 @@ def rotation_rows(skeleton: Skeleton) -> Ints:
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Provides the DOF table.
 
     Returns
     -------
     (J, 3) int32
-        -1 for all three of a joint that does not have exactly these three rotations.
+        Rows; all three are -1 for a joint that does not have exactly these rotations.
     """
     rows = np.full((skeleton.n_joints, 3), -1, dtype=np.int32)
     rotations = np.flatnonzero(skeleton.dof_kinds >= 3)
@@ -90,7 +90,7 @@ def set_joint_rotations(
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Provides the DOF table.
     pose : Pose
         Modified in place.
     joints : (N,)
@@ -185,7 +185,7 @@ def read_vector(layout: PoseLayout | None, skeleton: Skeleton, pose: Pose, vecto
     Raises
     ------
     RigError
-        If the number of values is not the model's.
+        If the number of values is wrong for the model.
     """
     wanted = skeleton.n_dofs if layout is None else layout.n_numbers
     if len(vector) != wanted:

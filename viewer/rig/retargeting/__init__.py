@@ -1,1 +1,1 @@
-"""Retarget motions and poses from one skeleton to another."""
+"""Retargeting of motions and poses from one skeleton to another."""

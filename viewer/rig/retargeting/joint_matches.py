@@ -28,11 +28,11 @@ class Matches:
     partners : (J,) int32
         Joint of the source for each joint of the target, -1 for none.
     names : tuple of J str
-        SMPL names of the target's joints; empty where there is no equivalent.
+        SMPL names of the target's joints; empty if there is no equivalent.
     is_hierarchy : bool
-        Whether both have the same names and hierarchy.
+        Whether both skeletons have the same names and hierarchy.
     notes : tuple of Diagnostic
-        Messages about the joints that were matched, that stay at rest, and that are unused.
+        Messages about matched joints, joints at rest, and unused joints.
     """
 
     partners: Ints
@@ -52,7 +52,7 @@ def match_joints(
     Parameters
     ----------
     source, target : Skeleton
-        The skeleton of the motion, and the one that it is retargeted to.
+        The skeleton of the motion, and the skeleton to which it is retargeted.
     mapping : mapping of str to str, optional
         Joint names of the source to joint names of the target.
     titles : (str, str)
@@ -111,7 +111,7 @@ def _match_equal(
     names: tuple[tuple[str, ...], ...],
     meanings: tuple[tuple[str, ...], ...] | str,
 ) -> None:
-    """Match unmatched joints of equal names whose meaning is unknown in both skeletons."""
+    """Match joints with equal names whose meaning is unknown in both skeletons."""
     used = set(partners.tolist())
     known = {
         name: joint

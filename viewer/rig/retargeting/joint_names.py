@@ -37,7 +37,7 @@ _WORDS = {
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
 _AMBIGUOUS = {"foot", "shoulder", "hand"}  # different joints in different conventions
-# Removed in front of a side or a word.
+# Removed before a side or a word.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
 _SIDED = {"hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist", "hand", "eye"}
@@ -51,8 +51,8 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # fraction of the joints; a first word that more of them share is a prefix
-_MOST = 2000  # joints; a skeleton with more is not a body
+_SHARED = 0.6  # fraction of the joints; a first word that more joints share is a prefix
+_MOST = 2000  # number of joints; a skeleton with more is not a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
@@ -61,17 +61,17 @@ _Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names that every program can read: unique, and made of ``[A-Za-z0-9_]`` only.
+    """Return names that every program can read: unique, and consisting of ``[A-Za-z0-9_]`` only.
 
     Parameters
     ----------
     names : sequence of J str
-        May repeat, be empty, or contain any characters.
+        Names, which may repeat, be empty, or contain any characters.
 
     Returns
     -------
     tuple of J str
-        Names that are already valid are unchanged.
+        Valid names; those that were valid are unchanged.
 
     >>> plain_names(["hip", "hip", "", "left knee", "é"])
     ('hip', 'hip_2', 'joint2', 'left_knee', 'e')
@@ -98,12 +98,12 @@ def plain_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the side and the remaining word of every name, for any program's convention.
+    """Return the side and the remaining word of every name, in any program's convention.
 
     Parameters
     ----------
     names : sequence of J str
-        As in the file.
+        Names as in the file.
 
     Returns
     -------
@@ -127,14 +127,14 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     Parameters
     ----------
     names : sequence of J str
-        As in the file.
+        Names as in the file.
     parents : (J,)
         -1 for a root.
 
     Returns
     -------
     tuple of J str
-        Empty for joints without an equivalent; no name occurs twice.
+        Unique names; empty for joints without an equivalent.
 
     >>> import numpy as np
     >>> canonical_names(["Hips", "LeftUpLeg", "LeftFoot"], np.array([-1, 0, 1]))
@@ -165,7 +165,7 @@ _CHAINS = ("spine", "neck")
 
 
 def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
-    """Return the joints of a spine that are named, and their names."""
+    """Return the joints of a spine that get a name, and the names."""
     if len(spine) <= 1:
         return spine, _SPINES[: len(spine)]
     if len(spine) == 2:
@@ -187,7 +187,7 @@ def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
 def _without_neck(
     spine: list[int], necks: list[int], result: list[str], parents: Ints
 ) -> list[int]:
-    """Return the spine up to the chest; joints after it are neck and head (Rigify)."""
+    """Return the spine up to the chest; later joints are neck and head (Rigify)."""
     arms = [result.index(name) for name in _ARMS if name in result]
     paths = [_ancestors(joint, parents) for joint in arms]
     chest = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
@@ -234,12 +234,12 @@ def _key(tokens: list[str]) -> _Key:
     """Return the side, taken from either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
-    tokens = [token for token in tokens if token != "c"]  # VRM's centre joints
+    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
             return _SIDES[tokens[end]], _word(rest)
-    # Blender puts numbers after the side: f_index.01.L, but also thigh.L.001.
+    # Blender adds numbers after the side: f_index.01.L, but also thigh.L.001.
     if len(tokens) > 2 and tokens[-2] in _SIDES and tokens[-1].isdigit():
         return _SIDES[tokens[-2]], _word([*tokens[:-2], tokens[-1]])
     if len(tokens) > 2 and tokens[1] in _SIDES and not tokens[0].isdigit():

@@ -23,7 +23,7 @@ _NEAR = 0.02
 def mirror_axis(figure: Figure) -> int:
     """Return the axis across which a figure is symmetric: 0 for x, 1 for y.
 
-    With a symmetry map it is the axis with the smallest error; else y for z-up figures, whose
+    With a symmetry map, it is the axis with the smallest error; otherwise y for z-up figures, whose
     left is +y, and x for y-up figures.
     """
     if figure.symmetry is None or figure.mesh is None:
@@ -54,10 +54,10 @@ def _mirror_distances(figure: Figure, axis: int) -> Floats:
 
 
 def joint_partners(figure: Figure) -> Ints:
-    """Return each joint's mirror counterpart, itself for a central joint: (J,) int32.
+    """Return each joint's mirror counterpart, the joint itself if it is central: (J,) int32.
 
-    The counterpart is the joint nearest to the mirrored position, among those at the same depth of
-    the hierarchy.
+    The counterpart is the joint nearest to the mirrored position among the joints at the same depth
+    of the hierarchy.
 
     Raises
     ------
@@ -88,20 +88,20 @@ def joint_partners(figure: Figure) -> Ints:
 def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     """Return the mirrored pose, with left and right exchanged.
 
-    World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes its
-    counterpart's; rest rotations may therefore differ between the sides.
+    World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes that
+    of its counterpart; rest rotations may therefore differ between the sides.
 
     Parameters
     ----------
     figure : Figure
-        With a symmetric skeleton.
+        Figure with a symmetric skeleton.
     pose : Pose
         Not changed.
 
     Returns
     -------
     Pose
-        With the same shape; the figure's translation is mirrored too.
+        Mirrored pose with the same shape; the figure's translation is mirrored too.
 
     Raises
     ------

@@ -6,9 +6,9 @@ world rotations W of the pose and W0 of the skeleton with all DOFs at 0,
 
     W_target = C W_source W0_source^T C^T W0_target
 
-where C rotates the source's up axis to the target's. Only the rotations W_source W0_source^T are
-needed from the source: they accompany a pose in files and on the clipboard. Figures with
-the source's skeleton take its DOFs instead, and its base rotations and translations.
+where C rotates the source's up axis to the target's. Of the source, only the rotations W_source
+W0_source^T are needed: they accompany a pose in files and on the clipboard. Figures with the
+source's skeleton take its DOFs, base rotations and translations instead.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ class JointRotations:
     figure : str
         Name of the figure.
     names : tuple of J str
-        Names of its joints.
+        Names of the joints.
     relative : (J, 4)
-        Relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
+        Rotations relative to the rest pose, in the figure's axes: quaternions (x, y, z, w).
     shifts : (J, 3)
         Translations in addition to the DOFs, in the parent joint's frame.
     up : str
@@ -63,7 +63,7 @@ class JointRotations:
     layout : str
         Result of ``dof_layout``: figures with the same layout use the DOF values directly.
     rotations : (J, 4) or None
-        Base rotations, before the DOFs, as in ``Pose``; None: those of the rest pose.
+        Base rotations, before the DOFs, as in ``Pose``; None for those of the rest pose.
     """
 
     figure: str
@@ -81,7 +81,7 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
     Parameters
     ----------
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     pose : Pose
         Pose of that figure.
     """
@@ -101,14 +101,14 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
 
 
 def dof_layout(figure: Figure) -> str:
-    """Return a digest of the meaning of a figure's DOFs: equal digests allow exchanging DOF values.
+    """Return a digest of the meaning of a figure's DOFs: if equal, values can be exchanged.
 
     Blend shapes are ignored: their number does not change any joint's rotation.
 
     Parameters
     ----------
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     """
     skeleton = figure.require_skeleton()
     # Adding 0 turns -0 into 0.
@@ -132,7 +132,7 @@ def has_layout_of(source: JointRotations, figure: Figure) -> bool:
     source : JointRotations
         Joint rotations of the pose.
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     """
     skeleton = figure.require_skeleton()
     # Files may be edited by hand: an equal digest does not guarantee lists of the right length.
@@ -142,7 +142,7 @@ def has_layout_of(source: JointRotations, figure: Figure) -> bool:
 def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
     """Restore the base rotations and translations beneath the DOFs, in place.
 
-    They differ from the rest pose where a motion rotates a joint about axes that its DOFs lack.
+    They differ from the rest pose if a motion rotates a joint about axes for which it has no DOFs.
     The stored world rotations are ignored: they are out of date once the DOFs are edited.
 
     Parameters
@@ -150,12 +150,12 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
     skeleton : Skeleton
         Skeleton of a figure with the source's layout.
     pose : Pose
-        Its DOFs are not changed.
+        Pose whose DOFs are not changed.
     source : JointRotations
         Provides the base rotations and translations.
     is_whole : bool
-        Whether the source's pose is applied with every DOF: joints that it does not mention are
-        then reset to rest instead of keeping their values.
+        Whether all DOFs of the source's pose are applied: joints that it does not contain are then
+        reset to the rest pose instead of keeping their values.
     """
     if source.rotations is not None:
         pose.rotations[:] = source.rotations
@@ -171,7 +171,7 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
     Parameters
     ----------
     source, target : sequence of str
-        Joint names; empty and repeated ones match nothing.
+        Joint names; empty and repeated names match nothing.
 
     Returns
     -------
@@ -196,7 +196,7 @@ def rotate_joints(
     source : JointRotations
         Joint rotations of the other figure.
     target : Figure
-        With a skeleton.
+        Figure with a skeleton.
     start : Pose
         Pose of the target; not modified. Provides unmatched joints, placement, size, shape
         and joint translations.
@@ -204,9 +204,9 @@ def rotate_joints(
     Returns
     -------
     pose : Pose
-        Pose of the target, within its limits.
+        Pose of the target, within the limits.
     notes : list of Diagnostic
-        Messages about the number of matched joints, unmatched ones, and unreachable rotations.
+        Messages about the number of matched joints, unmatched joints, and unreachable rotations.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def _rotate_joints(
     world = np.empty((skeleton.n_joints, 3, 3))
     present = joint_rotations(skeleton, start)
     for joint, parent in enumerate(skeleton.parents.tolist()):
-        # The target rotation of the parent, not the limited one, preserves local rotations.
+        # The target rotation of the parent preserves local rotations; the limited one would not.
         above = world[parent] if parent >= 0 else np.eye(3)
         world[joint] = wanted.get(joint, above @ present[joint])
         if joint in wanted:

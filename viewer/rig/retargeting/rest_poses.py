@@ -21,7 +21,7 @@ __all__ = ["RestPose", "alignment", "is_same_rest", "rest_of"]
 
 # Cosine of the maximum angle between the bones of equal rest poses.
 _SAME = np.cos(np.radians(20.0))
-# Cosine of the maximum difference at which a torso or foot keeps its own bend.
+# Cosine of the maximum difference for which a torso or foot keeps its own bend.
 _NATURAL = np.cos(np.radians(25.0))
 # Cosine of the maximum angle of an upright body from the up axis.
 _UPRIGHT = np.cos(np.radians(25.0))
@@ -38,7 +38,7 @@ class RestPose:
     Attributes
     ----------
     points : (J, 3)
-        World positions, in the common axes of two skeletons.
+        World positions, in the common axes of the two skeletons.
     rotations : (J, 3, 3)
         World rotations, in the skeleton's own axes.
     up : (3,)
@@ -56,9 +56,9 @@ def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:
     Parameters
     ----------
     skeleton : Skeleton
-        Any.
+        Skeleton.
     to_common : (3, 3)
-        Rotation from its own axes to the common ones.
+        Rotation from its own axes to the common axes.
     up : "y" or "z"
         Up axis of the common axes.
     """
@@ -78,7 +78,7 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
     source, target : RestPose
         Rest poses of skeletons with the same hierarchy.
     matches : Matches
-        Every joint has a match.
+        Matches; every joint has one.
     parents : (J,)
         Parents of the target's joints.
     """
@@ -95,16 +95,16 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     """Return the rotations from the target's rest pose to the source's at every matched joint.
 
     Limbs and fingers: the bone is rotated to the source's direction by the smallest rotation from
-    the body's orientation, so without twist. Hands with fingers also align the knuckle line.
-    Trunk and feet only follow the body, unless their directions differ by more than 25 degrees.
-    The last joint of a limb follows the one before it.
+    the body's orientation, and therefore without twist. For hands with fingers, the knuckle line is
+    also aligned. Trunk and feet only follow the body, unless their directions differ by more than
+    25 degrees. The last joint of a limb follows the joint before it.
 
     Parameters
     ----------
     source, target : RestPose
-        In common axes.
+        Rest poses in the common axes.
     matches : Matches
-        The joint pairs.
+        Matched joints.
     parents : (J,)
         Parents of the target's joints.
 
@@ -156,10 +156,12 @@ def _at_joint(
         if knuckles is not None:
             return knuckles
     if len(children) > 1:
-        # Least squares over all directions (Kabsch); the reference decides what they leave open.
+        # Least squares over all directions (Kabsch); the reference determines the remaining
+        # freedom.
         sums = np.einsum("ka,kb->ab", theirs, mine) + _SHORT * reference
         return nearest_rotations(sums)[0]
-    # Fingers start from the hand's rotation; limbs from the body's, so that twist does not add up.
+    # Fingers start from the hand's rotation, limbs from the body's, so that twist does not
+    # accumulate.
     start = reference if part.startswith(_FINGERS) else stands
     return _arc(start @ mine[0], theirs[0]) @ start
 
@@ -219,7 +221,7 @@ def _standing(source: RestPose, target: RestPose, matches: Matches) -> Floats:
 
 
 def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
-    """Return the axes of a body: to its left, along its height, and forward."""
+    """Return the axes of a body: left, up along its height, and forward."""
     sides = [
         places[f"left_{part}"] - places[f"right_{part}"]
         for part in ("hip", "shoulder", "collar", "knee", "elbow")

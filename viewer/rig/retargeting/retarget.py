@@ -1,7 +1,8 @@
-"""Retarget a motion to another skeleton: joints matched by name, rest poses aligned.
+"""Retargeting of a motion to another skeleton: joints matched by name, rest poses aligned.
 
-World rotations are transferred, not local ones, so that unmatched joints between two matched ones
-are included. With everything in the figure's axes, and rest rotations R_s and R_t of both::
+World rotations are transferred, not local ones, so that the rotations of unmatched joints between
+matched joints are included. With all rotations in the figure's axes, and rest rotations R_s and R_t
+of source and target::
 
     W_t(frame) = W_s(frame) R_s^-1 B R_t
 
@@ -32,7 +33,7 @@ from viewer.rig.skeleton import Skeleton, joint_label
 __all__ = ["retarget", "scaled_motion"]
 
 _ROUNDING = 1e-9  # a ratio this close to 1 counts as 1
-_STILL = 1e-6  # fraction of the skeleton's size; position channels that move less are ignored
+_STILL = 1e-6  # fraction of the skeleton's size; position channels with less motion are ignored
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _ARMS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -46,9 +47,9 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
     Parameters
     ----------
     motion : SkeletonMotion
-        In any unit.
+        Motion in any unit.
     factor : float
-        Positive.
+        Scale factor, positive.
     unit : str
         Unit of the scaled lengths, as in ``Figure.unit``.
 
@@ -93,15 +94,15 @@ def retarget(
     motion : SkeletonMotion
         Skeleton and clip, up along y or z.
     figure : Figure
-        With a skeleton; its unmatched joints stay in their rest pose.
+        Figure with a skeleton; its unmatched joints stay in their rest pose.
     mapping : mapping of str to str, optional
-        From the motion's joint names to the figure's.
+        Maps the motion's joint names to the figure's.
 
     Returns
     -------
     clip : SampledClip
-        For this figure. A skinned figure moves as a whole (``figure_translations``), a skeleton
-        without a skin at its root.
+        Clip for this figure. A skinned figure moves as a whole (``figure_translations``), a
+        skeleton without a skin moves at its root.
     notes : list of Diagnostic
         Messages about matched and unmatched joints, and the scale of the path.
 
@@ -244,7 +245,8 @@ def _shifts(
             wanted = scale * places[:, job.matches.partners[root]] @ job.to_target.T
             shifts[:, root] = wanted - job.target.rest_translations[root]
         return shifts, []
-    # Only the root translates, by what the joints between root and anchor do not contribute.
+    # Only the root translates, by the part that the joints between root and anchor do not
+    # contribute.
     anchor = _anchor(job)
     path = _path(job.target.parents, anchor)
     linear = np.eye(3)
@@ -277,7 +279,7 @@ def _source_places(job: _Job, worlds: Floats) -> Floats:
 
 
 def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:
-    """Transfer translations of joints below the root, in place: the parents' axes may differ."""
+    """Transfer translations of joints below the root, in place; the parents' axes may differ."""
     if job.clip.translations is None:
         return
     source, target = job.rests
@@ -291,7 +293,7 @@ def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:
 
 
 def _dropped_translations(job: _Job) -> list[Diagnostic]:
-    """Return messages about source joints whose translations the target does not take."""
+    """Return messages about source joints whose translations are not transferred."""
     moves = job.clip.translations
     if moves is None:
         return []
@@ -311,7 +313,7 @@ def _dropped_translations(job: _Job) -> list[Diagnostic]:
 
 
 def _anchor(job: _Job) -> int:
-    """Return the joint that follows the source's path: the pelvis, else the first matched one."""
+    """Return the joint that follows the source's path: the pelvis, or the first matched joint."""
     matched = job.matches.partners >= 0
     names = job.matches.names
     if "pelvis" in names and matched[names.index("pelvis")]:

@@ -47,7 +47,7 @@ __all__ = [
     "strongest",
 ]
 
-_NOISE = 1e-9  # relative to the figure's size for lengths, else absolute
+_NOISE = 1e-9  # relative to the figure's size for lengths, otherwise absolute
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +70,15 @@ class Quantity:
     moves : bool
         Whether the values depend on the pose.
     about : str
-        ``"joint"`` or ``"field"`` if the quantity refers to one, which its name may specify; else
-        empty.
+        ``"joint"`` or ``"field"`` if the quantity refers to one, which its name may specify; empty
+        otherwise.
     isolines : bool
         Whether isolines are drawn by default.
     least : float
-        Minimum of the automatic range's upper end.
+        Minimum upper end of the automatic range.
     robust : bool
         Whether the automatic range excludes the largest hundredth of the non-zero values, so that
-        one degenerate triangle does not use up the whole colour map.
+        one degenerate triangle does not dominate the colour map.
     """
 
     title: str
@@ -158,7 +158,7 @@ def split_name(name: str) -> tuple[str, str]:
     Raises
     ------
     RigError
-        If there is no such quantity, or it takes no joint or field and one is given.
+        If there is no such quantity, or a joint or field is given for a quantity without one.
     """
     key, colon, about = name.partition(":")
     if key not in SCALARS:
@@ -187,7 +187,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     name : str
         A key of ``SCALARS``, with a joint or field if the quantity has one.
     figure : Figure
-        With a mesh.
+        Figure with a mesh.
     pose : Pose or None
         None for the mesh in the bind pose.
     skinning : Skinning
@@ -196,8 +196,8 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     Returns
     -------
     (V,)
-        In figure units or the quantity's own unit. If the figure lacks the part that the quantity
-        needs: 0, or -1 for categorical quantities.
+        Values in figure units or the quantity's own unit; if the figure lacks the part that the
+        quantity needs, 0, or -1 for categorical quantities.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
         Asked(figure, pose, skinning, index, about)
     )
     if quantity.moves:
-        # Without this, rounding errors would span the whole colour map if the pose has no effect.
+        # Otherwise, rounding errors would span the whole colour map if the pose has no effect.
         size = box_size(bounding_box(mesh.positions)) if quantity.unit == "length" else 1.0
         values[np.abs(values) < _NOISE * size] = 0.0
     return values
@@ -236,7 +236,7 @@ def categories(name: str, figure: Figure) -> tuple[str, ...]:
 
 
 def menu_title(key: str, skinning: Skinning) -> str:
-    """Return the label of a quantity in menus, with the number of influences it depends on, if any.
+    """Return the label of a quantity in menus, with the number of influences on which it depends.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def missing_part(name: str, figure: Figure) -> str:
 
 
 def _missing(needs: str, figure: Figure) -> str:
-    """Return the name of a part if a figure lacks it, else an empty string."""
+    """Return the name of a part if a figure lacks it, otherwise an empty string."""
     has = {
         "weights": figure.skin is not None,
         "a skin": figure.is_attached,

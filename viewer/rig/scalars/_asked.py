@@ -19,9 +19,9 @@ class Asked:
     Attributes
     ----------
     figure : Figure
-        Has the part that the quantity needs.
+        Figure with the part that the quantity needs.
     pose : Pose or None
-        Not None for quantities that depend on the pose.
+        Pose; not None for quantities that depend on it.
     skinning : Skinning
         How the mesh is drawn.
     joint : int
@@ -38,10 +38,10 @@ class Asked:
 
     @property
     def skin(self) -> Skin:
-        """The effective influences: as stored, or pruned and normalised as the options say."""
+        """The effective influences: as stored, or pruned and normalised as requested."""
         return skin_used(self.figure.require_skin(), self.skinning)
 
 
 def influences_kept(skinning: Skinning) -> int:
-    """Return the number of influences to compare with: the chosen limit, or else four."""
+    """Return the number of influences to compare with: the chosen limit, or four."""
     return skinning.max_influences or _FOUR

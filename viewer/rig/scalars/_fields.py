@@ -7,7 +7,7 @@ from viewer.rig.figure import Figure
 
 
 def field_of(figure: Figure, name: str, is_class: bool) -> VertexField | None:
-    """Return a figure's field or class by its case-insensitive name, the first for an empty one."""
+    """Return a figure's field or class by its case-insensitive name; if empty, the first one."""
     suited = [field for field in figure.fields if bool(field.names) == is_class]
     named = [field for field in suited if not name or field.name.lower() == name.lower()]
     return named[0] if named else None

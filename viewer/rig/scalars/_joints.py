@@ -12,7 +12,7 @@ def joint_of(figure: Figure, text: str) -> int:
     """Return the joint of a case-insensitive name, ``"NAME#INDEX"``, ``"#INDEX"`` or ``"INDEX"``.
 
     Without a skeleton, the joints of a skin have indices only. Raises RigError if there is no such
-    joint, with similar names, or if several joints have that name.
+    joint, with suggestions, or if several joints have that name.
     """
     skeleton = figure.skeleton
     count = 0 if figure.skin is None else figure.skin.n_joints
@@ -21,7 +21,7 @@ def joint_of(figure: Figure, text: str) -> int:
     if skeleton is None:
         if is_index:
             return int(index)
-        raise RigError(f'no joint "{text}"; without a skeleton there are #0 to #{count - 1}')
+        raise RigError(f'no joint "{text}"; without a skeleton, joints are #0 to #{count - 1}')
     names = {name.lower() for name in skeleton.names}
     if is_index and text not in names:
         return int(index)

@@ -21,13 +21,13 @@ def joint_influences(figure: Figure) -> Floats:
 
 
 def most_influential(figure: Figure) -> int:
-    """Return the joint with the largest sum of weights, -1 if no joint has influence."""
+    """Return the joint with the largest sum of weights, or -1 if no joint has influence."""
     sums = joint_influences(figure)
     return int(sums.argmax()) if sums.any() else -1
 
 
 def informative_field(figure: Figure) -> str:
-    """Return the name of the first numeric field that is not 0 everywhere; empty without one."""
+    """Return the name of the first numeric field that is not 0 everywhere, or an empty string."""
     fields = [field for field in figure.fields if not field.names]
     return next((field.name for field in fields if field.values.any()), "")
 

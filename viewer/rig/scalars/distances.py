@@ -15,21 +15,21 @@ __all__ = ["asymmetry", "correctives", "methods", "normalized", "pruning"]
 
 
 def pruning(asked: Asked) -> Floats:
-    """Return the distance between all influences and the strongest few: (V,), figure units."""
+    """Return the distance between skinning with all influences and with few: (V,), figure units."""
     count = influences_kept(asked.skinning)
-    # Relative to normalised weights, as normalising has its own quantity.
+    # The reference has normalised weights, as the effect of normalising is a separate quantity.
     whole = replace(asked.skinning, max_influences=0, normalize=True)
     return _distance(asked, whole, replace(asked.skinning, max_influences=count))
 
 
 def normalized(asked: Asked) -> Floats:
-    """Return the distance between weights as stored and scaled to a sum of 1: (V,)."""
+    """Return the distance between skinning with weights as stored and normalised: (V,)."""
     stored = replace(asked.skinning, normalize=False, max_influences=0)
     return _distance(asked, stored, replace(stored, normalize=True))
 
 
 def methods(asked: Asked) -> Floats:
-    """Return the largest distance between a method and the reference: (V,), figure units."""
+    """Return the largest distance between any method and the reference: (V,), figure units."""
     first, *others = (replace(asked.skinning, method=name) for name in PURE)
     return np.max([_distance(asked, first, other) for other in others], axis=0)
 
@@ -43,7 +43,7 @@ def correctives(asked: Asked) -> Floats:
 def asymmetry(asked: Asked) -> Floats:
     """Return each vertex's distance from its counterpart's mirror image: (V,), figure units."""
     figure, pose = asked.figure, asked.pose
-    assert figure.symmetry is not None and pose is not None  # the quantity needs them
+    assert figure.symmetry is not None and pose is not None  # required by the quantity
     positions = deform(figure, pose, asked.skinning)[0]
     # A translation of the whole figure does not affect its symmetry.
     positions -= pose.figure_translation

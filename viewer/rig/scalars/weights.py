@@ -31,9 +31,9 @@ def weight(asked: Asked) -> Floats:
 
 
 def dominant(asked: Asked) -> Floats:
-    """Return the joint with the largest weight at each vertex: (V,), integral; -1 without one.
+    """Return the joint with the largest weight at each vertex: (V,), integral; -1 for none.
 
-    Among equal weights the joint listed first wins.
+    Among equal weights, the joint listed first is chosen.
     """
     skin = asked.skin
     strongest = limit_influences(skin, 1)

@@ -90,9 +90,10 @@ class Skinning:
     method : str
         A key of ``METHODS``.
     blend_factor : float
-        For methods between two others, 0 to 1; in ``"mix"``, the share of DQS.
+        For methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
     max_influences : int
-        Keep only this many of the strongest influences, scaled to a sum of 1; 0 for all, as stored.
+        Keep only this many of the strongest influences, scaled to a sum of 1; 0 keeps all as
+        stored.
     normalize : bool
         Scale each vertex's weights to a sum of 1.
     correctives : bool
@@ -114,7 +115,7 @@ def deform(
     Parameters
     ----------
     figure : Figure
-        With a mesh. Without skeleton or skin the mesh is returned in the bind pose.
+        Figure with a mesh. Without skeleton or skin the mesh is returned in the bind pose.
     pose : Pose, optional
         DOFs in lengths and radians; the file's own pose if omitted.
     method : str or Skinning
@@ -126,7 +127,7 @@ def deform(
         Figure units.
     normals : (V, 3)
         Unit length. They are the rest normals of the shaped mesh, transformed by the joints: the
-        effect of correctives on normals is left out.
+        effect of correctives on normals is ignored.
 
     Raises
     ------
@@ -144,8 +145,8 @@ def deform(
         raise RigError(f"figure {figure.name} has no mesh to deform")
     if how.method not in METHODS:
         raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
-    if pose is not None:
-        figure = shaped(figure, pose.shape_weights)
+    weights = figure.rest_shape_weights if pose is None else pose.shape_weights
+    figure = shaped(figure, weights)
     mesh = figure.require_mesh()
     if figure.skeleton is None or figure.skin is None:
         moved, normals = mesh.positions, unit(mesh.normals)
@@ -204,11 +205,11 @@ def deform_frames(
     Parameters
     ----------
     figure : Figure
-        With mesh, skeleton and skin.
+        Figure with mesh, skeleton and skin.
     poses : sequence of F Pose
-        All are shaped by the weights of the first.
+        Poses; all are shaped by the weights of the first.
     skinning : Skinning, optional
-        Its method must be ``"lbs"``.
+        Options whose method must be ``"lbs"``.
 
     Returns
     -------
@@ -243,7 +244,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     Parameters
     ----------
     figure : Figure
-        With a skeleton.
+        Figure with a skeleton.
     pose : Pose
         DOFs in lengths and radians.
 
@@ -261,7 +262,7 @@ _varied: Memo[Skin, Skin] = Memo(kept=4)
 
 
 def skin_used(skin: Skin, skinning: Skinning) -> Skin:
-    """Return the effective influences: as stored, or pruned and normalised as the options say."""
+    """Return the effective influences: as stored, or pruned and normalised as requested."""
     count, normalize = skinning.max_influences, skinning.normalize
     if not count and not normalize:
         return skin

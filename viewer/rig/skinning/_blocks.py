@@ -1,7 +1,7 @@
 """Weights as dense blocks: a few hundred vertices times the joints that influence any of them.
 
-Vertices close in a file have mostly the same joints, so the blocks stay small, and one product of
-two dense matrices per block is several times faster than summing a flat list in numpy.
+Vertices that are close in a file mostly have the same joints, so the blocks stay small, and one
+product of two dense matrices per block is several times faster than summing a flat list in numpy.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from viewer.rig.skin import Skin, has_influence
 
 # Vertices per block: smaller blocks need more calls, larger ones contain more zeros (bench_deform).
 _VERTICES = 512
-# Weights cached per skin, 128 MB; only files with a random vertex order need more.
+# Weights cached per skin (128 MB); only files with a random vertex order need more.
 _MOST = 1 << 24
 
 
@@ -30,7 +30,7 @@ class Block:
     rows : slice
         Indices of the vertices.
     joints : (B,) int32
-        Joints that influence any of them.
+        Joints that influence any of these vertices.
     weights : (B, n)
         Weight of each joint for each vertex; 0 without influence.
     free : (F,) int32
@@ -47,7 +47,7 @@ _kept: Memo[Skin, tuple[Block, ...] | None] = Memo()
 
 
 def blocks_of(skin: Skin) -> Iterator[Block]:
-    """Yield a skin's blocks; cached as long as the skin lives unless they are unusually large."""
+    """Yield a skin's blocks, cached as long as the skin lives unless they are unusually large."""
     kept = _kept.get(skin, None, lambda: _within_limit(skin))
     yield from _blocks(skin) if kept is None else kept
 
@@ -72,7 +72,7 @@ def _blocks(skin: Skin) -> Iterator[Block]:
         joints, columns = np.unique(skin.joints[span], return_inverse=True)
         owners = np.repeat(np.arange(last - first), np.diff(skin.starts[first : last + 1]))
         weights = np.zeros((len(joints), last - first))
-        # A vertex may list a joint twice: the weights add up.
+        # A vertex may list a joint twice: the weights are summed.
         np.add.at(weights, (columns, owners), skin.weights[span])
         free = np.flatnonzero(is_free[first:last]).astype(np.int32)
         yield Block(slice(first, last), joints, weights, free)

@@ -15,11 +15,11 @@ def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
 
     The columns a, b, c of A give the cofactor matrix [b x c, c x a, a x b] = det(A) A^-T, which
     stays finite where A is singular. Its sign is changed to that of the inverse transpose, so that
-    outward normals stay outward under a reflected joint (glTF 2.0, section 3.7.4, likewise
-    reverses the winding and not the normals). Shapes: (3, 3, N) and (N, 3) to (N, 3), any length.
+    outward normals stay outward under a reflected joint (likewise, glTF 2.0, section 3.7.4,
+    reverses the winding, not the normals). Shapes: (3, 3, N) and (N, 3) to (N, 3), any length.
     """
     largest = np.abs(matrices).max(axis=(0, 1))
-    # Only directions matter, and products of entries near 1 neither overflow nor underflow.
+    # Only directions matter, and products of entries near 1 do not overflow or underflow.
     a, b, c = np.swapaxes(matrices / np.where(largest > 0.0, largest, 1.0), 0, 1)
     cofactors = _cross(b, c), _cross(c, a), _cross(a, b)
     x, y, z = np.ascontiguousarray(normals.T)

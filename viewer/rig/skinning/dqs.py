@@ -24,7 +24,7 @@ from viewer.rig.skinning._normals import inverse_transposed
 __all__ = ["deform", "linear_maps", "split_palette"]
 
 _CHUNK = 1 << 16  # vertices per chunk, which bounds the memory for large meshes
-_RIGID = 1e-12  # a stretch this close to the identity is rounding error
+_RIGID = 1e-12  # a stretch this close to the identity is a rounding error
 _TINY = 1e-12  # a shorter blended quaternion defines no rotation
 
 
@@ -33,9 +33,9 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Stretch linearly, then move by the normalised weighted sum of unit dual quaternions.
 
-    Weights are divided by their sum. Quaternions are negated where necessary to
-    lie in the hemisphere of the strongest influence (eq. 14 and its text: antipodality). Normals
-    are transformed by the inverse transpose of the blended stretch, then by the blended rotation.
+    Weights are divided by their sum. Quaternions are negated if necessary to lie in the hemisphere
+    of the strongest influence (eq. 14 and its text: antipodality). Normals are transformed by the
+    inverse transpose of the blended stretch, then by the blended rotation.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
     other = np.abs(gram - np.eye(3)).max(axis=(1, 2)) > _RIGID
     other |= np.linalg.det(linear) < 0.0
     rotations[other], stretches[other] = nearest_rotations(linear[other])
-    # S keeps the centres, so D has to move each one as M does.
+    # S keeps the centres fixed, so D must move each centre as M does.
     places = np.einsum("jab,jb->ja", linear, centers) + palette[:, :3, 3]
     translations = places - np.einsum("jab,jb->ja", rotations, centers)
     real = matrix_to_quaternion(rotations)
@@ -139,7 +139,7 @@ def split_palette(palette: Floats, centers: Floats) -> tuple[Floats, Floats]:
 def _blended(
     skin: Skin, duals: Floats, stretches: Floats
 ) -> Iterator[tuple[np.ndarray, Floats, Floats]]:
-    """Yield the vertices that move, with unit dual quaternions and stretches, chunk by chunk."""
+    """Yield moving vertices with their unit dual quaternions and stretches, chunk by chunk."""
     for first in range(0, skin.n_vertices, _CHUNK):
         rows = slice(first, min(first + _CHUNK, skin.n_vertices))
         starts = skin.starts[rows.start : rows.stop + 1]

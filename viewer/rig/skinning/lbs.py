@@ -15,7 +15,7 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["blended_matrices", "deform", "move"]
 
-_CHUNK = 1 << 14  # matrices per chunk, which fit the processor's cache and bound the memory
+_CHUNK = 1 << 14  # matrices per chunk, which fit into the processor's cache and limit the memory
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 
@@ -46,7 +46,7 @@ def deform(
         Unit length.
     """
     moved, rotated = move(positions, skin, palette, normals)
-    assert rotated is not None  # as normals were passed in
+    assert rotated is not None  # normals were given
     return moved, unit(rotated)
 
 
@@ -67,7 +67,7 @@ def move(
     palette : (J, 4, 4)
         Skinning matrices.
     normals : (V, 3), optional
-        Optional because they double the work.
+        Normals, optional because they double the work.
 
     Returns
     -------

@@ -60,7 +60,7 @@ Words = NDArray[np.uint64]
 
 
 def is_number(word: bytes) -> bool:
-    """Return whether a word is a finite number that a float32 can hold.
+    """Return whether a word is a finite number that a float32 can represent.
 
     >>> is_number(b"-.5"), is_number(b"1_000"), is_number(b"1e999")
     (True, False, False)
@@ -69,7 +69,7 @@ def is_number(word: bytes) -> bool:
 
 
 def to_number(word: bytes) -> float | None:
-    """Return a word's value, or None if it is not a finite number that a float32 can hold.
+    """Return a word's value, or None if it is not a finite number that a float32 can represent.
 
     A number other than 0 stays different from 0, however small.
 
@@ -86,7 +86,7 @@ def to_number(word: bytes) -> float | None:
 
 
 def is_infinite(word: bytes) -> bool:
-    """Return whether a word is NaN, infinity, or a number that a float32 cannot hold.
+    """Return whether a word is NaN, infinity, or a number that a float32 cannot represent.
 
     >>> is_infinite(b"-nan"), is_infinite(b"1e999"), is_infinite(b"-1.#IND"), is_infinite(b"up")
     (True, True, True, False)
@@ -95,7 +95,7 @@ def is_infinite(word: bytes) -> bool:
 
 
 def is_too_large(word: bytes) -> bool:
-    """Return whether a word is a number that a float32 cannot hold.
+    """Return whether a word is a number that a float32 cannot represent.
 
     >>> is_too_large(b"-1e300"), is_too_large(b"inf")
     (True, False)

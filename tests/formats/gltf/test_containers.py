@@ -1,0 +1,197 @@
+"""Containers of glTF: chunks and lengths of GLB, JSON, and buffers inside and beside the file."""
+
+import json
+import struct
+from pathlib import Path
+
+import pytest
+from formats.gltf.files import File, glb, read, refused, source_of, warned
+
+from viewer.errors import FormatError
+from viewer.formats import Source
+from viewer.formats._gltf.node_file import read_nodes
+
+TEXT = b'{"asset": {"version": "2.0"}, "nodes": [{"name": "a"}]}'
+
+
+def triangle() -> File:
+    file = File(nodes=[{"mesh": 0}])
+    file.mesh()
+    return file
+
+
+def test_text_and_binary_files_have_the_same_contents() -> None:
+    for data in (triangle().json(), triangle().glb(), b"\xef\xbb\xbf" + triangle().json()):
+        [mesh] = read(data).meshes
+        assert mesh.primitives[0].positions.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        assert warned(data) == []
+
+
+def test_a_binary_file_may_end_with_a_control_z() -> None:
+    data = glb([(b"JSON", TEXT + b" "), (b"odd\x1a", b"\x1a" * 4)])
+    assert source_of(data).data == data and warned(data) == []
+
+
+def test_unknown_chunks_are_skipped_and_repeated_ones_named() -> None:
+    file = triangle()
+    text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
+    chunks = [(b"JSON", text), (b"NOTE", b"?"), (b"BIN\0", file.binary), (b"BIN\0", b"more")]
+    assert len(read(glb(chunks)).meshes[0].primitives[0].positions) == 3
+    assert warned(glb(chunks)) == [("G001.chunk-again", "")]
+
+
+@pytest.mark.parametrize("padding", [b"\0\0\0", b"   ", b"\n\t\0"])
+def test_json_chunk_may_be_padded_with_anything_empty(padding: bytes) -> None:
+    assert read(glb([(b"JSON", TEXT + padding)])).tree.names == ("a",)
+
+
+def test_padding_that_is_not_counted_is_found() -> None:
+    file = triangle()
+    text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
+    text += b" " * ((1 - len(text)) % 4)  # one more than a multiple of 4
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + b"\0\0\0"
+    chunks += struct.pack("<I4s", 36, b"BIN\0") + file.binary
+    data = struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    assert len(read(data).meshes) == 1 and warned(data) == []
+
+
+def test_wrong_lengths_are_warned_of_where_nothing_is_lost() -> None:
+    data = triangle().glb()
+    longer = data[:8] + struct.pack("<I", len(data) + 8) + data[12:]
+    shorter = data[:8] + struct.pack("<I", 0) + data[12:]
+    for changed in (longer, shorter, data + b"tail"):
+        assert len(read(changed).meshes) == 1
+        assert warned(changed) == [("G001.length", "")]
+
+
+def test_truncated_binary_chunk_is_an_error_where_data_are_missing() -> None:
+    data = triangle().glb()[:-12]
+    source = source_of(data)
+    with pytest.raises(FormatError) as caught:
+        read_nodes(source)
+    assert caught.value.diagnostic.pointer == "/bufferViews/0"
+    assert [found.key for found in source.diagnostics] == [
+        "G001.length",
+        "G001.chunk-length",
+        "G001.buffer",
+    ]
+
+
+def test_binary_chunk_may_be_longer_than_its_buffer() -> None:
+    file = triangle()
+    text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
+    data = glb([(b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", file.binary + bytes(400))])
+    assert len(read(data).meshes) == 1 and warned(data) == []
+
+
+@pytest.mark.parametrize(
+    ("data", "key"),
+    [
+        (b"glTF", "F002.glb-header"),
+        (struct.pack("<4sII", b"glTF", 1, 20) + bytes(8), "F002.gltf-version"),
+        (glb([(b"BIN\0", b"1234")]), "F002.glb-json"),
+        (glb([(b"JSON", TEXT)])[:40], "F002.glb-chunk"),
+        (glb([(b"JSON", b"    ")]), "F002.gltf-no-json"),
+        (b'{"nodes": [1,]}', "F002.gltf-json"),
+        (b"[" * 100_000, "F002.json-nesting"),
+        (b'{"a":' * 100_000, "F002.json-nesting"),
+        (b'{"scene": ' + b"1" * 5000 + b"}", "F002.gltf-digits"),
+        ('{"asset": {}}'.encode("utf-16"), "F002.gltf-utf-16"),
+        (b"[1]", "F002.gltf-type"),
+        (b'{"asset": {"version": "1.0"}}', "F002.gltf-version"),
+        (b'{"asset": {"version": "2.0", "minVersion": "2.1"}}', "F002.gltf-version"),
+        (b'{"asset": {"version": 2.0}}', "F002.gltf-type"),
+    ],
+)
+def test_broken_containers_are_refused(data: bytes, key: str) -> None:
+    assert refused(data)[0] == key
+
+
+def test_syntax_errors_have_a_line() -> None:
+    with pytest.raises(FormatError) as caught:
+        read(b'{\n"nodes": [\n{,\n')
+    assert str(caught.value).startswith("a.gltf:3: expected JSON, found a syntax error")
+
+
+def test_deviations_from_json_are_warnings() -> None:
+    head = b'{"asset": {"version": "2.0"}, '
+    assert warned(head + b'"extras": NaN, "nodes": [], "nodes": [{}]}') == [
+        ("G001.constants", ""),
+        ("G001.repeated", ""),
+    ]
+    assert warned(head + b'"nodes": [{"name": "a\xff"}]}') == [("G001.text", "")]
+    assert read(head + b'"nodes": [{"name": "a\xff"}]}').tree.names == ("a\ufffd",)
+    assert warned(b"{}") == [("G001.no-asset", "/")]
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "data:application/octet-stream;base64,AAAAAAAAgD8=",
+        "data:;base64,AAAAAAAAgD8",
+        "data:;base64,AAAA%41AAAgD8=",
+        "data:application/gltf-buffer;BASE64, AAAAAAAA gD8= ",
+        "data:,%00%00%00%00%00%00%80%3F",
+    ],
+)
+def test_data_uris(uri: str) -> None:
+    file = File(nodes=[{"mesh": 0}])
+    file.root["buffers"] = [{"uri": uri, "byteLength": 8}]
+    file.root["bufferViews"] = [{"buffer": 0, "byteLength": 8}]
+    accessor = {"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR"}
+    file.root["accessors"] = [accessor]
+    from viewer.formats._gltf.document import open_document
+
+    document = open_document(source_of(json.dumps(file.root).encode()))
+    assert document.accessors.floats(0, ("SCALAR",), "")[:, 0].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("uri", "key"),
+    [
+        ("data:;base64", "F002.gltf-data-uri"),
+        ("data:;base64,AA?A", "F002.gltf-base64"),
+        ("data:;base64,A", "F002.gltf-base64"),
+        ("https://example.org/a.bin", "F002.gltf-scheme"),
+        ("file:///etc/passwd", "F002.gltf-scheme"),
+        ("../a.bin", "F002.gltf-outside"),
+        ("%2e%2e/a.bin", "F002.gltf-outside"),
+        ("/etc/passwd", "F002.gltf-outside"),
+        ("C:\\a.bin", "F002.gltf-outside"),
+        (7, "F002.gltf-type"),
+    ],
+)
+def test_uris_that_cannot_be_read(uri: object, key: str) -> None:
+    file = triangle()
+    file.root["buffers"] = [{"uri": uri, "byteLength": 36}]
+    assert refused(file) == (key, "/buffers/0/uri")
+
+
+@pytest.mark.parametrize(
+    ("name", "uri"), [("a b.bin", "a%20b.bin"), ("ä.bin", "%C3%A4.bin"), ("50%25.bin", "50%25.bin")]
+)
+def test_files_beside_the_document(tmp_path: Path, name: str, uri: str) -> None:
+    file = triangle()
+    (tmp_path / name).write_bytes(file.binary)
+    source = Source(tmp_path / "a.gltf", file.json(uri))
+    assert len(read_nodes(source).meshes) == 1
+    assert source.also_read == [tmp_path / name]
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"gone\.bin: cannot be read"):
+        read(triangle().json("gone.bin"), tmp_path / "a.gltf")
+
+
+def test_buffer_without_data_is_refused() -> None:
+    file = triangle()
+    file.root["buffers"] = [{"byteLength": 36}]
+    assert refused(file) == ("F002.gltf-no-data", "/buffers/0")
+
+
+def test_extensions_that_are_required_or_used() -> None:
+    file = File(extensionsUsed=["ODD_a", "KHR_mesh_quantization", "ODD_b"])
+    assert warned(file) == [("F007.gltf-extensions", "/extensionsUsed")]
+    file.root["extensionsRequired"] = ["KHR_mesh_quantization", "ODD_b"]
+    with pytest.raises(FormatError, match=r"found ODD_b$"):
+        read(file)

@@ -1,0 +1,231 @@
+"""Meshes: modes, shared vertices, attributes, influences and morph targets."""
+
+import numpy as np
+import pytest
+from formats.gltf.files import TRIANGLE, File, read, refused, skinned, warned
+
+from viewer.formats._nodes.content import Primitive
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+
+
+def only(file: File) -> Primitive:
+    [primitive] = read(file).meshes[0].primitives
+    return primitive
+
+
+@pytest.mark.parametrize(
+    ("mode", "triangles"),
+    [
+        (4, [[0, 1, 2]]),
+        (5, [[0, 1, 2], [1, 3, 2]]),
+        (6, [[1, 2, 0], [2, 3, 0]]),
+    ],
+)
+def test_modes_without_indices(mode: int, triangles: list[list[int]]) -> None:
+    file = File()
+    file.mesh(SQUARE)
+    file.primitive["mode"] = mode
+    assert only(file).triangles.tolist() == triangles
+
+
+def test_degenerate_triangles_of_strips_are_left_out() -> None:
+    file = File()
+    file.mesh(SQUARE)
+    file.primitive.update(mode=5, indices=file.accessor([0, 1, 2, 2, 1, 1, 3], "B"))
+    # 0 1 2; 2 2 1, 2 1 1 and 1 1 3 have no area; 1 2 2 neither.
+    assert only(file).triangles.tolist() == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize("kind", ["B", "H", "I"])
+def test_indices(kind: str) -> None:
+    file = File()
+    file.mesh(SQUARE)
+    file.primitive["indices"] = file.accessor([3, 1, 0, 0, 2, 3, 1], kind)
+    assert only(file).triangles.tolist() == [[3, 1, 0], [0, 2, 3]]
+    assert warned(file) == [("G002.corners", "/meshes/0/primitives/0/indices")]
+
+
+def test_points_and_lines_are_named_once() -> None:
+    file = File()
+    file.mesh()
+    file.primitive["mode"] = 0
+    file.root["meshes"][0]["primitives"].append({**file.primitive, "mode": 3})
+    assert read(file).meshes[0].primitives == ()
+    assert warned(file) == [("F007.gltf-undrawn", "/meshes/0/primitives/0")]
+
+
+def test_primitives_that_share_vertices_keep_those_that_they_use() -> None:
+    file = File()
+    file.mesh(SQUARE, TEXCOORD_0=file.accessor([[0, 0], [1, 0], [0, 1], [1, 1]]))
+    first = file.primitive
+    first["indices"] = file.accessor([0, 1, 2], "B")
+    second = {**first, "indices": file.accessor([3, 1, 2], "B")}
+    file.root["meshes"][0]["primitives"].append(second)
+    one, two = read(file).meshes[0].primitives
+    assert one.positions.tolist() == SQUARE[:3] and two.positions.tolist() == SQUARE[1:]
+    assert one.triangles.tolist() == [[0, 1, 2]] and two.triangles.tolist() == [[2, 0, 1]]
+    assert two.uvs[0].tolist() == [[1, 1], [0, 0], [1, 0]]
+
+
+def test_unused_vertices_of_other_primitives_are_kept() -> None:
+    file = File()
+    file.mesh(SQUARE)
+    file.primitive["indices"] = file.accessor([3, 1, 0], "B")
+    assert only(file).positions.tolist() == SQUARE
+
+
+def test_texture_coordinates_begin_at_the_bottom() -> None:
+    file = File()
+    uvs = file.accessor([[0, 0], [255, 0], [0, 51]], "B", normalized=True)
+    file.mesh(TEXCOORD_1=uvs)
+    first, second = only(file).uvs
+    assert second == pytest.approx(np.array([[0, 1], [1, 1], [0, 0.8]]), abs=1e-15)
+    assert first.shape == (3, 2)  # materials refer to sets by number
+
+
+def test_colors() -> None:
+    file = File()
+    file.mesh(COLOR_0=file.accessor([[0.5, 0.25, 2], [0, 0, 0], [1, 1, 1]]))
+    assert only(file).colors.tolist() == [[0.5, 0.25, 2, 1], [0, 0, 0, 1], [1, 1, 1, 1]]
+    file = File()
+    file.mesh(COLOR_0=file.accessor([[255, 0, 51, 255]] * 3, "B"))
+    assert only(file).colors[0] == pytest.approx([1, 0, 0.2, 1])
+    assert warned(file) == [("G002.normalized", "/accessors/0")]
+
+
+def test_quantised_attributes() -> None:
+    file = File(extensionsRequired=["KHR_mesh_quantization"])
+    positions = file.accessor([[0, 0, 0, 0], [2, 0, 0, 0], [0, -3, 0, 0]], "h")
+    file.root["accessors"][positions]["type"] = "VEC3"
+    file.root["bufferViews"][0]["byteStride"] = 8
+    normals = file.accessor([[0, 0, 127, 0]] * 3, "b", normalized=True)
+    file.root["accessors"][normals]["type"] = "VEC3"
+    file.root["bufferViews"][1]["byteStride"] = 4
+    attributes = {"POSITION": positions, "NORMAL": normals}
+    file.add("meshes", {"primitives": [{"attributes": attributes}]})
+    primitive = only(file)
+    assert primitive.positions.tolist() == [[0, 0, 0], [2, 0, 0], [0, -3, 0]]
+    assert primitive.normals.tolist() == [[0, 0, 1]] * 3
+    assert warned(file) == []
+
+
+def test_all_sets_of_influences_are_side_by_side() -> None:
+    file = skinned()
+    attributes = file.primitive["attributes"]
+    attributes["JOINTS_1"] = file.accessor([[1, 0, 9, 0]] * 3, "H")
+    attributes["WEIGHTS_1"] = file.accessor([[51, 0, 0, 0]] * 3, "B", normalized=True)
+    primitive = only(file)
+    assert primitive.joints.tolist() == [[0, 1, 0, 0, 1, 0, 0, 0]] * 3
+    assert primitive.weights[0] == pytest.approx([0.25, 0.75, 0, 0, 0.2, 0, 0, 0])
+    assert warned(file) == []
+
+
+def test_joints_without_weights_are_ignored() -> None:
+    file = skinned()
+    file.primitive["attributes"]["JOINTS_1"] = file.accessor([[1, 0, 0, 0]] * 3, "B")
+    assert only(file).joints.shape == (3, 4)
+    assert warned(file) == [("G004.influence-sets", "/meshes/0/primitives/0/attributes")]
+
+
+def test_joints_must_be_those_of_the_skin() -> None:
+    file = skinned()
+    joints = file.accessor([[0, 1, 0, 0], [0, 1, 0, 0], [0, 2, 7, 0]], "B")
+    file.primitive["attributes"]["JOINTS_0"] = joints
+    pointer = "/meshes/0/primitives/0/attributes/JOINTS_0"
+    assert refused(file) == ("W010.gltf-joint", pointer)
+    with pytest.raises(Exception, match=r"vertex 2: expected a joint below 2 \(skin 0\), found 2$"):
+        read(file)
+
+
+def targets(file: File, **members: object) -> None:
+    """Give the first mesh two morph targets, one of them sparse."""
+    offsets = {"componentType": 5126, "count": 3, "type": "VEC3"}
+    offsets["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": file.view(b"\1"), "componentType": 5121},
+        "values": {"bufferView": file.view(np.array([1, 2, 3], "<f4").tobytes())},
+    }
+    first = {"POSITION": file.accessor([[0, 0, 1]] * 3), "NORMAL": file.accessor([[1, 0, 0]] * 3)}
+    second = {"POSITION": file.add("accessors", offsets)}
+    file.primitive["targets"] = [first, second]
+    file.root["meshes"][0] |= members
+
+
+def test_morph_targets() -> None:
+    file = File(nodes=[{"mesh": 0, "weights": [0.5, 2]}])
+    file.mesh()
+    targets(file, weights=[0, 0.25], extras={"targetNames": ["up", "aside"]})
+    content = read(file)
+    [mesh] = content.meshes
+    assert mesh.target_names == ("up", "aside") and mesh.shape_weights.tolist() == [0, 0.25]
+    assert content.tree.shape_weights[0].tolist() == [0.5, 2]
+    [primitive] = mesh.primitives
+    assert primitive.targets.tolist() == [[[0, 0, 1]] * 3, [[0, 0, 0], [1, 2, 3], [0, 0, 0]]]
+    assert primitive.normal_targets.tolist() == [[[1, 0, 0]] * 3, [[0, 0, 0]] * 3]
+
+
+def test_names_of_morph_targets_elsewhere() -> None:
+    file = File()
+    file.mesh()
+    targets(file)
+    assert read(file).meshes[0].target_names == ("", "")
+    file.primitive["extras"] = {"targetNames": ["up", "aside"]}
+    assert read(file).meshes[0].target_names == ("up", "aside")
+    del file.primitive["extras"]
+    file.primitive["targets"][1]["extras"] = {"name": "aside"}
+    assert read(file).meshes[0].target_names == ("", "aside")
+
+
+def test_wrong_number_of_morph_weights_is_warned_of() -> None:
+    file = File()
+    file.mesh()
+    targets(file, weights=[1])
+    assert read(file).meshes[0].shape_weights.tolist() == [1, 0]
+    assert warned(file) == [("G002.weights", "/meshes/0/weights")]
+
+
+def test_primitives_must_have_the_same_morph_targets() -> None:
+    file = File()
+    file.mesh()
+    targets(file)
+    without = {"attributes": file.primitive["attributes"]}
+    file.root["meshes"][0]["primitives"].append(without)
+    assert refused(file) == ("F002.gltf-targets", "/meshes/0/primitives/1/targets")
+
+
+def test_numbers_that_are_not_finite() -> None:
+    file = File()
+    file.mesh([*TRIANGLE[:2], [0, np.nan, 0]])
+    assert refused(file)[0] == "F003.gltf-positions"
+    file = File()
+    file.mesh(NORMAL=file.accessor([[0, 0, 1], [0, np.inf, 0], [0, 0, 1]]))
+    assert only(file).normals.tolist() == [[0, 0, 1], [0, 0, 0], [0, 0, 1]]
+    assert warned(file) == [("G002.finite", "/meshes/0/primitives/0/attributes/NORMAL")]
+    file = skinned()
+    weights = file.accessor([[np.nan, 1, 0, 0]] * 3)
+    file.primitive["attributes"]["WEIGHTS_0"] = weights
+    assert refused(file)[0] == "W003.gltf-weights"
+
+
+@pytest.mark.parametrize(
+    ("members", "key", "pointer"),
+    [
+        ({"mode": 7}, "F002.gltf-type", "/mode"),
+        ({"attributes": 3}, "F002.gltf-type", "/attributes"),
+        ({"attributes": {"POSITION": 5}}, "F002.gltf-index", "/attributes/POSITION"),
+        ({"indices": 0}, "F002.gltf-kind", "/indices"),
+        ({"indices": 1}, "F002.gltf-corner", "/indices"),
+        ({"indices": 2}, "F002.gltf-whole", "/indices"),
+        ({"material": 0}, "F002.gltf-index", "/material"),
+        ({"targets": [{"POSITION": 1}]}, "F002.gltf-vertices", "/targets/0/POSITION"),
+        ({"targets": 1}, "F002.gltf-type", "/targets"),
+    ],
+)
+def test_invalid_primitives(members: dict[str, object], key: str, pointer: str) -> None:
+    file = File()
+    file.mesh()
+    file.accessor([0, 1, 3, 0], "B")
+    file.accessor([0.0, 1.0, 2.0])
+    file.primitive.update(members)
+    assert refused(file) == (key, f"/meshes/0/primitives/0{pointer}")

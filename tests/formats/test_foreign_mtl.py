@@ -1,0 +1,181 @@
+"""Material libraries as other programs write them: names, defaults, and images in odd places."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from viewer.formats import Source, obj
+from viewer.media.image import encode_png
+
+FACE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
+GREY, NORMAL, SOLID = (128, 64, 32, 255), (128, 128, 255, 255), (255, 255, 255, 255)
+
+
+def rows(*colors) -> np.ndarray:
+    return np.array([colors], dtype=np.uint8)
+
+
+IMAGES = {
+    "skin.png": rows(GREY, GREY),
+    "my skin.png": rows(GREY, GREY),
+    "textures/skin.png": rows(SOLID),
+    "normal.png": rows(NORMAL, (200, 128, 230, 255)),
+    "height.png": rows((90, 90, 90, 255), (200, 200, 200, 255)),
+    "leaf.png": rows((0, 255, 0, 255), (0, 255, 0, 0)),
+    "cut.png": rows((0, 0, 0, 255), (255, 255, 255, 255)),
+    "soft.png": rows((90, 90, 90, 255), (160, 160, 160, 255)),
+}
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Return a function that reads the material ``a`` of a library, and the keys of warnings."""
+    (tmp_path / "textures").mkdir()
+    for name, image in IMAGES.items():
+        (tmp_path / name).write_bytes(encode_png(image))
+
+    def made(text, name="a", library="m.mtl", uses=None, stored="m.mtl"):
+        data = text if isinstance(text, bytes) else text.encode()
+        (tmp_path / stored).write_bytes(data)
+        face = f"mtllib {library}\n{FACE}usemtl {uses or name}\nf 1/1 2/1 3/1\n"
+        (tmp_path / "a.obj").write_text(face)
+        source = Source.open(tmp_path / "a.obj")
+        (material,) = obj.read(source).mesh.materials
+        return material, [one.key for one in source.diagnostics]
+
+    return made
+
+
+MOVED = ["F005.mtl-moved"]
+
+
+@pytest.mark.parametrize(
+    ("written", "used", "said"),
+    [
+        ("skin.png", "skin.png", []),
+        (".\\textures\\skin.png", ".\\textures\\skin.png", []),
+        ("textures\\skin.png", "textures/skin.png", []),
+        ("my skin.png", "my skin.png", []),
+        ('"my skin.png"', "my skin.png", []),
+        ("'skin.png'", "skin.png", []),
+        ("SKIN.PNG", "skin.png", MOVED),
+        ("Textures/Skin.png", "textures/skin.png", MOVED),
+        ("C:\\Users\\me\\my skin.png", "my skin.png", MOVED),
+        ("/home/me/maps/skin.png", "skin.png", MOVED),
+        ("../maps/skin.png", "skin.png", MOVED),
+        ("//server/maps/skin.png", "skin.png", MOVED),
+        ("file:///C:/maps/skin.png", "skin.png", MOVED),
+        ("-bm\t1\tskin.png", "skin.png", []),
+        ("-S 1 1 1 -O 0 0 0 -MM 0 1 skin.png", "skin.png", []),
+        ("-blendu on -blendv off -cc off -texres 512 skin.png", "skin.png", []),
+        ("-type sphere skin.png", "skin.png", []),
+    ],
+)
+def test_images_are_found_under_the_names_that_programs_write(read, written, used, said):
+    """Maya and 3ds Max write the path of their computer, Windows backslashes and any case."""
+    material, keys = read(f"newmtl a\nmap_Kd {written}\n")
+    assert material.image is not None and keys == said
+    assert material.texture.replace("\\", "/") == used.replace("\\", "/")
+
+
+def test_images_that_are_nowhere_keep_their_warning(read):
+    assert read("newmtl a\nmap_Kd C:\\maps\\gone.png\n")[1] == ["F005.texture-refused"]
+    assert read("newmtl a\nmap_Kd gone.png\n")[1] == ["F005.texture"]
+
+
+@pytest.mark.parametrize(
+    ("library", "stored"),
+    [
+        ("m.mtl", "m.mtl"),
+        ("my model.mtl", "my model.mtl"),
+        ('"my model.mtl"', "my model.mtl"),
+        ("C:\\work\\m.mtl", "m.mtl"),
+        ("./m.mtl", "m.mtl"),
+        ("M.MTL", "m.mtl"),
+    ],
+)
+def test_libraries_are_found_under_the_names_that_programs_write(read, library, stored):
+    material, keys = read("newmtl a\nKd 1 0 0\n", library=library, stored=stored)
+    assert material.base_color == (1.0, 0.0, 0.0, 1.0) and keys == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"\xef\xbb\xbfnewmtl a\nKd 1 0 0\n",
+        b"newmtl a\r\nKd 1 0 0\r\n",
+        b"newmtl a\rKd 1 0 0\r",
+        b"\tnewmtl\ta  \n\t\tKd\t1\t0\t0 1 # red\n",
+        b"# comment\nKd 0 1 0\nnewmtl a\nkd 1e0 0.0e+00 0.\nKa 0 0 0\nillum 4\nNi 1.45\nTf 1 1 1\n",
+        b"newmtl a\nKd 1.0000001 0 0\n",
+        b"newmtl a\nKd 1 0 0\nKd 0 1 0\nmap_Kd\nmap_Kd \n\nnewmtl a\nKd 0 0 1\n",
+    ],
+)
+def test_text_is_read_as_programs_and_editors_leave_it(read, text):
+    material, keys = read(text)
+    assert material.base_color == (1.0, 0.0, 0.0, 1.0) and keys == []
+
+
+def test_names_of_materials_may_contain_blanks(read):
+    material, keys = read("newmtl old skin (2)\nKd 1 0 0\n", uses="old skin (2)")
+    assert material.base_color == (1.0, 0.0, 0.0, 1.0) and keys == []
+
+
+@pytest.mark.parametrize("head", ["# Blender 4.2.0 MTL File: 'a.blend'", "# 3ds Max Wavefront OBJ"])
+def test_maps_of_blender_and_3ds_max_replace_values(read, head):
+    """They write the default of an input beside the image that is connected to it."""
+    text = "newmtl a\nKd 0.8 0.8 0.8\nmap_Kd skin.png\nPr 0.5\nmap_Pr skin.png\nKs 0 0 0\n"
+    replaced, _ = read(f"{head}\n{text}")
+    assert (replaced.base_color, replaced.roughness) == (None, 1.0)
+    scaled, _ = read(text)
+    assert (scaled.base_color, scaled.roughness) == ((0.8, 0.8, 0.8, 1.0), 0.5)
+    plain, _ = read(f"{head}\nnewmtl a\nKd 0.8 0.8 0.8\nPr 0.5\n")
+    assert (plain.base_color, plain.roughness) == ((0.8, 0.8, 0.8, 1.0), 0.5)
+
+
+def test_a_metallic_map_beside_pm_0_counts(read):
+    material, _ = read("newmtl a\nPm 0\nmap_Pm skin.png\nPr 0\nmap_Pr skin.png\n")
+    assert (material.metallic, material.roughness) == (1.0, 0.0)
+
+
+def test_bump_maps_are_drawn_if_they_hold_normals(read):
+    material, keys = read("newmtl a\nmap_Bump -bm 0.5 normal.png\n")
+    assert keys == [] and material.normal_scale == 0.5
+    assert material.normal_texture.name == "normal.png"
+    material, keys = read("newmtl a\nbump height.png\n")
+    assert keys == ["F007.mtl-statements"] and material.normal_texture is None
+    both, _ = read("newmtl a\nmap_bump normal.png\nnorm -bm 2 normal.png\n")
+    assert both.normal_scale == 2.0
+
+
+@pytest.mark.parametrize(
+    ("lines", "mode", "alpha"),
+    [
+        ("map_Kd leaf.png", "opaque", [255, 0]),
+        ("map_Kd leaf.png\nmap_d leaf.png", "mask", [255, 0]),
+        ("map_Kd skin.png\nmap_d cut.png", "mask", [0, 255]),
+        ("map_Kd skin.png\nmap_d soft.png", "blend", [90, 160]),
+        ("map_Kd skin.png\nmap_d skin.png", "opaque", [255, 255]),
+        ("map_Kd skin.png\nmap_d cut.png\nd 0.5", "blend", [0, 255]),
+        ("map_Kd skin.png\nTr 1\nillum 2", "opaque", [255, 255]),
+        ("map_Kd skin.png\nd 1.0\nTr 1.0", "opaque", [255, 255]),
+    ],
+)
+def test_opacity_of_images_is_a_mask_where_it_is_nearly_all_or_nothing(read, lines, mode, alpha):
+    material, keys = read(f"newmtl a\n{lines}\n")
+    assert (keys, material.alpha_mode) == ([], mode)
+    assert_array_equal(material.image[0, :, 3], alpha)
+
+
+def test_ambient_maps_stand_in_for_missing_diffuse_ones(read):
+    alone, keys = read("newmtl a\nmap_Ka skin.png\n")
+    assert (alone.texture, keys) == ("skin.png", [])
+    both, _ = read("newmtl a\nmap_Ka my skin.png\nmap_Kd skin.png\n")
+    assert both.texture == "skin.png"
+
+
+def test_statements_that_are_not_drawn_are_named(read):
+    text = "newmtl a\nmap_Tr cut.png\nrefl -type sphere sky.png\nPs 0.1\naniso 0.5\nmap_Ns a.png\n"
+    assert read(text)[1] == ["F007.mtl-statements"]

@@ -1,0 +1,45 @@
+"""Names of keys in menus, buttons and tooltips, which follow the keys that the user has chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from viewer.app.core.state import AppState
+
+__all__ = ["KeyNames", "key_name", "with_key"]
+
+
+@dataclass(slots=True)
+class KeyNames:
+    """Keys changed by the user.
+
+    Attributes
+    ----------
+    changed : dict
+        Label of a key in the table of keys to the name of the key that replaces it.
+    """
+
+    changed: dict[str, str] = field(default_factory=dict)
+
+
+def key_name(state: AppState, usual: str) -> str:
+    """Return the current name of a key, given its label in the table of keys.
+
+    Of several keys for one action, the first is named.
+    """
+    return state.of(KeyNames).changed.get(usual, usual).partition(" or ")[0]
+
+
+def with_key(state: AppState, text: str, usual: str) -> str:
+    """Return the text of a button or tooltip, followed by the name of its key.
+
+    Parameters
+    ----------
+    state : AppState
+        Holds the names.
+    text : str
+        Effect of the key.
+    usual : str
+        Its label in the table of keys.
+    """
+    return f"{text} ({key_name(state, usual)})"

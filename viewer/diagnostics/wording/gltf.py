@@ -1,0 +1,114 @@
+"""Messages about ``.gltf``, ``.glb`` and ``.vrm`` files."""
+
+from viewer.diagnostics.codes import Code
+
+CODES = {
+    "G001": Code("warning", "inconsistent glTF container", "export the file again"),
+    "G002": Code("warning", "inconsistent glTF mesh data", "export the file again"),
+    "G003": Code("warning", "inconsistent glTF nodes", "correct the nodes or export again"),
+    "G004": Code("warning", "inconsistent glTF skin", "bind the mesh again or export again"),
+    "G005": Code("warning", "invalid glTF animation", "export the animation again"),
+}
+
+MESSAGES = {
+    # Containers and JSON
+    "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
+    "F002.gltf-version": "expected glTF 2.0, found version {found}",
+    "F002.glb-json": "expected a JSON chunk, found none",
+    "F002.glb-chunk": "{kind} chunk: expected {expected:#byte}, found {found}",
+    "F002.gltf-no-json": "expected a JSON object, found no text",
+    "F002.gltf-utf-16": "expected JSON in UTF-8, found UTF-16 text",
+    "F002.gltf-json": "expected JSON, found a syntax error: {reason:text} (character {at})",
+    "F002.gltf-digits": "expected numbers of at most {most} digits, found a longer one",
+    "G001.chunk-again": "ignored another {kind:text} chunk",
+    "G001.chunk-length": "{kind:text} chunk: expected {expected:#byte}, found {found}",
+    "G001.trailing": "ignored {n:#byte} after the last chunk",
+    "G001.length": "expected {expected:#byte} as declared by the header, found {found}",
+    "G001.constants": "{n:#number} invalid in JSON (first: {found})",
+    "G001.repeated": "{n:#repeated key} (first: {found:quoted}): only the last value is used",
+    "G001.text": "invalid UTF-8 at byte {at} of the JSON: replaced",
+    # Values
+    "F002.gltf-missing": "expected {wanted} as {member:quoted}, found none",
+    "F002.gltf-type": "expected {wanted}, found {found}",
+    "F002.gltf-index": "expected an index below {count} ({what}), found {found}",
+    # Buffers and images
+    "F002.gltf-scheme": "expected data or a relative file name, found {found:quoted}",
+    "F002.gltf-outside": "{found:quoted} {reason}",
+    "F002.gltf-data-uri": "expected a comma before the data, found {found:quoted}",
+    "F002.gltf-base64": "expected base64 data, found other characters or an incomplete end",
+    "F002.gltf-image": "expected a uri or a bufferView, found neither",
+    "F002.gltf-view": "expected bytes {first} to {end} of buffer {buffer}, found the end of its "
+    "data after {size} bytes",
+    "F002.gltf-no-data": "expected a uri or a binary chunk, found neither",
+    "F002.gltf-decoded": "expected at most {most} bytes of decoded data for a file of this size, "
+    "found {size}",
+    "G001.buffer": "expected {expected:#byte} as declared by byteLength, found {found}",
+    # Accessors
+    "F002.gltf-kind": "expected {wanted:or}, found {found} in accessor {accessor}",
+    "F002.gltf-whole": "expected whole numbers, found {found} in accessor {accessor}",
+    "F002.gltf-stride": "expected a stride of at least {expected} bytes, found {found}",
+    "F002.gltf-accessor": "{count:#element}: expected {expected:#byte} in the buffer view, found "
+    "{found}",
+    "F002.gltf-sparse": "expected at most {most} replaced elements, found {found}",
+    "F002.gltf-sparse-index": "entry {entry}: expected an index below {count}, found {found}",
+    "G002.sparse-order": "sparse indices are not in increasing order",
+    "G002.alignment": "components of {size} bytes are misaligned: at {at}, stride {stride}",
+    "G002.normalized": "expected normalised integers, found none marked as normalised: normalised",
+    # Document
+    "G001.no-asset": "expected an asset with a version, found none: read as glTF 2.0",
+    "F002.gltf-extensions": "expected supported extensions only, found {names:list12}",
+    "F007.gltf-extensions": "ignored unsupported {names:list12}",
+    "F007.gltf-lights": "{n:#light} not used",
+    "F007.gltf-scenes": "{n} scenes: only {found:quoted} is shown",
+    "F007.gltf-empty-scene": "no nodes in the scene: all nodes are shown",
+    # Nodes
+    "F002.gltf-parents": "expected one parent per node, found node {found} below nodes {other} and "
+    "this one",
+    "F002.gltf-cycle": "expected a tree, found a cycle of nodes: {nodes:list}",
+    "F002.gltf-affine": "expected 0 0 0 1 as the last row, found {found}",
+    "G003.child-twice": "node {found} is listed more than once",
+    "G003.rotation": "{n:#rotation} not of unit length (first: {found:.6g}): normalised",
+    "G003.matrix-and": "matrix used, {names:list} ignored",
+    "G003.scene-child": "{n:#node|is|are} not a root (first: node {found}): shown from the root",
+    "G003.camera": "{problem}: default lens used",
+    # Meshes
+    "F002.gltf-vertices": "expected {expected:#element} as in POSITION, found {found}",
+    "F002.gltf-corner": "index {entry}: expected a vertex below {vertices}, found {found}",
+    "F002.gltf-targets": "expected {expected:#morph target} as in the first primitive, found "
+    "{found}",
+    "F003.gltf-positions": "expected finite positions, found {n} others (first: vertex {vertex})",
+    "W003.gltf-weights": "expected finite weights, found {n} others (first: {found} at vertex "
+    "{vertex})",
+    "W010.gltf-joint": "vertex {vertex}: expected a joint below {joints} (skin {skin}), found "
+    "{found}",
+    "G002.finite": "{n:#vertex|has|have} numbers that are not finite (first: vertex {vertex}): "
+    "set to 0",
+    "G002.no-primitives": "mesh without primitives",
+    "G002.no-positions": "no POSITION: not drawn",
+    "G002.corners": "{n} vertex indices are no whole triangles: the last {left} ignored",
+    "G002.weights": "expected {expected:#weight} as there are morph targets, found {found}",
+    "F007.gltf-undrawn": "{n:#primitive} of points or lines not drawn",
+    # Skins
+    "F002.gltf-bind-count": "expected {expected:#matrix} as there are joints, found {found}",
+    "F002.gltf-bind-row": "joint {joint}: expected 0 0 0 1 as the last row, found {found}",
+    "F003.gltf-bind": "joint {joint}: expected a finite inverse bind matrix, found another",
+    "G004.joint-twice": "{n:#joint|is|are} listed more than once",
+    "G004.skeleton": "expected the index of a node, found {found}: ignored",
+    "G004.bind-count": "expected {expected:#matrix} as there are joints, found {found}: the rest "
+    "ignored",
+    "G004.influence-sets": "sets {sets:list} have joints without weights or weights without "
+    "joints: ignored",
+    # Animations
+    "F002.gltf-no-keys": "expected times of at least one key, found none",
+    "F002.gltf-times": "key {index}: expected increasing times, found {found:.6g} after "
+    "{before:.6g}",
+    "F002.gltf-outputs": "expected {expected:#element} for {keys:#key}, found {found}",
+    "F002.gltf-rotation": "key {index}: expected a rotation, found only zeros",
+    "F003.gltf-keys": "key {index}: expected finite numbers, found {found}",
+    "F007.gltf-channels": "{n:#animation channel|changes|change} nothing that is shown: "
+    "{names:list}",
+    "G005.animation": "{problem}: animation left out",
+    "G005.channel-twice": "another channel for {path:text} of node {node}: ignored",
+}
+
+PHRASES: dict[str, str] = {}

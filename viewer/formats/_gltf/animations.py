@@ -1,0 +1,154 @@
+"""Animations of a glTF document: names, ranges and nodes at once, keys when they are played."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from viewer.errors import FormatError
+from viewer.formats._gltf.channels import read_channels, sampler_of
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element, Table
+from viewer.formats._gltf.keys import read_times
+from viewer.formats._gltf.target_paths import Targets
+from viewer.formats._nodes.content import NodeAnimation
+
+__all__ = ["read_animations"]
+
+
+@dataclass(slots=True)
+class _Unused:
+    """Channels that move nothing that is shown."""
+
+    n: int = 0
+    names: dict[str, None] = field(default_factory=dict)
+    pointer: str = ""
+
+
+def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation, ...]:
+    """Return the animations that are valid as far as their keys need not be read.
+
+    An invalid animation is left out with a warning. The keys of the first one are read, because
+    it is the one that is played by default.
+    """
+    table = document.table("animations")
+    unused = _Unused()
+    found: list[NodeAnimation] = []
+    for index in range(len(table)):
+        try:
+            animation = _animation(document, targets, table[index], unused)
+            found.append(animation if found else _checked(animation))
+        except FormatError as problem:
+            _leave_out(document, problem, index)
+    if unused.n:
+        names = list(unused.names)
+        document.source.warn("F007.gltf-channels", unused.pointer, n=unused.n, names=names)
+    return tuple(found)
+
+
+def _leave_out(document: Document, problem: FormatError, index: int) -> None:
+    if document.source.diagnostics.keeps_errors:
+        document.source.diagnostics.add(problem.diagnostic)
+        return
+    pointer = problem.diagnostic.pointer or f"/animations/{index}"
+    document.source.warn("G005.animation", pointer, problem=problem.diagnostic.message)
+
+
+def _checked(animation: NodeAnimation) -> NodeAnimation:
+    channels = animation.read()
+    return NodeAnimation(
+        animation.name, animation.start, animation.end, animation.nodes, lambda: channels
+    )
+
+
+def _animation(
+    document: Document, targets: Targets, animation: Element, unused: _Unused
+) -> NodeAnimation:
+    """Return an animation whose keys have not been read yet."""
+    channels, samplers = animation.table("channels"), animation.table("samplers")
+    plain = _plain_channels(channels.items, samplers.items, targets)
+    nodes, inputs = plain or _any_channels(document, targets, animation, unused)
+    start, end = _range(document, animation, inputs)
+    read = partial(read_channels, document, targets, animation)
+    return NodeAnimation(animation.text("name"), start, end, frozenset(nodes), read)
+
+
+def _plain_channels(
+    channels: list[Any], samplers: list[Any], targets: Targets
+) -> tuple[set[int], set[int]] | None:
+    """Return the nodes and the accessors of times of channels as nearly all files have them.
+
+    None if any channel is invalid or unusual. Files have tens of thousands of channels, so this
+    takes less time than parsing them did.
+    """
+    try:
+        moved = {(item["target"]["node"], item["target"]["path"]) for item in channels}
+        used = {item["sampler"] for item in channels}
+        if set(map(type, used)) - {int} or min(used, default=0) < 0:
+            return None
+        inputs = {samplers[index]["input"] for index in used}
+    except (KeyError, TypeError, IndexError):
+        return None
+    if not all(targets.moves(node, path) for node, path in moved):
+        return None
+    return {node for node, _ in moved}, inputs
+
+
+def _any_channels(
+    document: Document, targets: Targets, animation: Element, unused: _Unused
+) -> tuple[set[int], set[int]]:
+    """Return the nodes and the accessors of times of any channels; raises FormatError."""
+    channels, samplers = animation.table("channels"), animation.table("samplers")
+    nodes: set[int] = set()
+    inputs: set[int] = set()
+    for index in range(len(channels)):
+        moved = targets.of(channels[index])
+        sampler = samplers[sampler_of(channels[index], samplers)]
+        if moved.nodes:
+            nodes.update(moved.nodes)
+            inputs.add(sampler.index("input", len(document.accessors), "accessors"))
+        else:
+            unused.n += 1
+            unused.names.setdefault(moved.path)
+            unused.pointer = unused.pointer or channels[index].pointer
+    return nodes, inputs
+
+
+def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[float, float]:
+    """Return the seconds of the first and the last key, as the accessors declare them."""
+    accessors = document.table("accessors")
+    ends: list[tuple[float, float]] = []
+    for index in inputs:
+        if type(index) is not int or not 0 <= index < len(accessors):
+            samplers = animation.table("samplers")
+            for place in range(len(samplers)):
+                _required_input(document, samplers[place])
+        ends.append(_declared(accessors, index) or _read_range(document, animation, index))
+    start = min((first for first, _ in ends), default=0.0)
+    return start, max((last for _, last in ends), default=0.0)
+
+
+def _required_input(document: Document, sampler: Element) -> None:
+    if sampler.index("input", len(document.accessors), "accessors") < 0:
+        raise sampler.wrong("input", "the index of an accessor")
+
+
+def _declared(accessors: Table, index: int) -> tuple[float, float] | None:
+    """Return the least and greatest value that an accessor declares; None if they are unusual."""
+    try:
+        values = accessors.items[index]
+        low, high = values["min"][0], values["max"][0]
+        return (float(low), float(high)) if -math.inf < low <= high < math.inf else None
+    except (KeyError, TypeError, IndexError, OverflowError):
+        return None
+
+
+def _read_range(document: Document, animation: Element, index: int) -> tuple[float, float]:
+    """Return the first and the last of the times themselves."""
+    samplers = animation.table("samplers")
+    users = (samplers[place] for place in range(len(samplers)))
+    sampler = next(user for user in users if user.values.get("input") == index)
+    times = read_times(document, sampler)
+    return float(times[0]), float(times[-1])

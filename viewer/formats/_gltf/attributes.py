@@ -1,0 +1,167 @@
+"""Vertex attributes of a primitive: positions, normals, texture coordinates and colours."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = ["Attributes", "read_colors", "read_normals", "read_positions", "read_uvs"]
+
+_MOST_UVS = 8  # sets of texture coordinates that are kept
+_NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Attributes:
+    """Attributes of a primitive, or of one of its morph targets.
+
+    Attributes
+    ----------
+    document : Document
+        The document.
+    element : Element
+        Accessor indices by name.
+    n_vertices : int
+        Elements that each accessor must have.
+    rows : (V,) int32 or None
+        Vertices to read, as other primitives use the rest; None for all.
+    decoded : dict
+        Components of the attributes that are compressed with Draco.
+    """
+
+    document: Document
+    element: Element
+    n_vertices: int
+    rows: Ints | None = None
+    decoded: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    @property
+    def n_rows(self) -> int:
+        """Number of vertices that are read, V."""
+        return self.n_vertices if self.rows is None else len(self.rows)
+
+    def accessor(self, name: str) -> int:
+        """Return the accessor of an attribute, -1 if it is missing.
+
+        Raises
+        ------
+        FormatError
+            If it is no accessor, or has another number of elements.
+        """
+        accessors = self.document.accessors
+        index = self.element.index(name, len(accessors), "accessors")
+        if index >= 0 and (found := accessors.count(index)) != self.n_vertices:
+            expected = self.n_vertices
+            raise self.element.fault("F002.gltf-vertices", name, expected=expected, found=found)
+        return index
+
+    def floats(self, name: str, *kinds: str) -> Floats | None:
+        """Return an attribute, (V, C); None if it is missing. Raises as ``accessor`` does."""
+        index = self.accessor(name)
+        if index < 0:
+            return None
+        read, user = self.document.accessors.floats, self.element.at(name)
+        return read(index, kinds, user, self.rows, self.decoded.get(name))
+
+    def fractions(self, name: str, *kinds: str) -> Floats | None:
+        """Return an attribute whose integers are normalised, as ``floats`` does."""
+        index = self.accessor(name)
+        if index < 0:
+            return None
+        read, user = self.document.accessors.fractions, self.element.at(name)
+        return read(index, kinds, user, self.rows, self.decoded.get(name))
+
+    def integers(self, name: str, *kinds: str) -> NDArray[np.int64] | None:
+        """Return an attribute of whole numbers, as ``floats`` does."""
+        index = self.accessor(name)
+        if index < 0:
+            return None
+        read, user = self.document.accessors.integers, self.element.at(name)
+        return read(index, kinds, user, self.rows, self.decoded.get(name))
+
+    def sets(self, name: str) -> list[int]:
+        """Return the numbers of the attributes such as ``TEXCOORD_0``, in ascending order."""
+        found = (_NUMBERED.fullmatch(key) for key in self.element.values)
+        return sorted(int(match[2]) for match in found if match and match[1] == name)
+
+    def vertex(self, row: int) -> int:
+        """Return the index in the file of a vertex that was read."""
+        return row if self.rows is None else int(self.rows[row])
+
+    def finite(self, name: str, values: Floats) -> Floats:
+        """Return values with those that are not finite set to 0, with a warning."""
+        bad = _not_finite(values)
+        if not bad.any():
+            return values
+        first = int(bad.argmax())
+        self.element.warn("G002.finite", name, n=int(bad.sum()), vertex=self.vertex(first))
+        return np.where(bad[:, None], 0.0, values)
+
+
+def read_positions(attributes: Attributes) -> Floats:
+    """Return the positions: (V, 3).
+
+    Raises
+    ------
+    FormatError
+        If they are missing, malformed or not finite.
+    """
+    positions = attributes.floats("POSITION", "VEC3")
+    if positions is None:
+        raise attributes.element.wrong("POSITION", "the index of an accessor")
+    bad = _not_finite(positions)
+    if bad.any():
+        vertex, pointer = attributes.vertex(int(bad.argmax())), attributes.element.at("POSITION")
+        source, n = attributes.element.source, int(bad.sum())
+        source.refuse("F003.gltf-positions", pointer, n=n, vertex=vertex)
+        positions = np.where(bad[:, None], 0.0, positions)
+    return positions
+
+
+def read_normals(attributes: Attributes) -> Floats | None:
+    """Return the normals, (V, 3), if there are any."""
+    normals = attributes.floats("NORMAL", "VEC3")
+    return None if normals is None else attributes.finite("NORMAL", normals)
+
+
+def read_uvs(attributes: Attributes) -> tuple[Floats, ...]:
+    """Return the texture coordinates, each (V, 2), with v = 0 at the bottom row of an image."""
+    numbers = [number for number in attributes.sets("TEXCOORD") if number < _MOST_UVS]
+    found = []
+    for number in range(max(numbers, default=-1) + 1):
+        name = f"TEXCOORD_{number}"
+        uvs = attributes.floats(name, "VEC2")
+        if uvs is None:
+            # Materials refer to sets by number, so a gap in the numbers is kept.
+            uvs = np.zeros((attributes.n_rows, 2))
+        uvs = attributes.finite(name, uvs)
+        found.append(np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]))
+    return tuple(found)
+
+
+def read_colors(attributes: Attributes) -> Floats | None:
+    """Return the vertex colours, linear with opacity: (V, 4); None without."""
+    colors = attributes.fractions("COLOR_0", "VEC3", "VEC4")
+    if colors is None:
+        return None
+    colors = attributes.finite("COLOR_0", colors)
+    if colors.shape[1] == 4:
+        return colors
+    return np.column_stack([colors, np.ones(len(colors))])
+
+
+def _not_finite(values: Floats) -> Bools:
+    """Return a mask of the rows that are not finite: (V,)."""
+    # The sum is quick to compute; only then are rows looked at.
+    if np.isfinite(values.sum()):
+        return np.zeros(len(values), dtype=np.bool_)
+    return np.asarray(~np.isfinite(values).all(axis=1))

@@ -1,0 +1,163 @@
+"""Buffers, buffer views and images of a glTF document, as bytes that are read on first use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.formats._gltf.elements import Element
+from viewer.formats._gltf.uris import is_data_uri, media_type, uri_bytes, uri_path
+from viewer.rig.arrays import Bytes
+
+__all__ = ["Buffers", "EncodedImage", "View"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A part of a buffer.
+
+    Attributes
+    ----------
+    data : (N,) uint8
+        Its bytes, read-only.
+    stride : int
+        Bytes from one element to the next; 0 if elements are tightly packed.
+    offset : int
+        Place of the first byte in the buffer; multiples of 4 are aligned.
+    """
+
+    data: Bytes
+    stride: int
+    offset: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedImage:
+    """An image as it is stored: PNG, JPEG or WebP.
+
+    Attributes
+    ----------
+    name : str
+        Path relative to the document's folder; for embedded images the name of the image, which
+        may be empty.
+    media_type : str
+        As declared, such as ``image/png``; may be empty.
+    data : bytes
+        The encoded image.
+    is_embedded : bool
+        Whether it is part of the document instead of a file of its own.
+    """
+
+    name: str
+    media_type: str
+    data: bytes
+    is_embedded: bool
+
+
+class Buffers:
+    """Bytes of a document.
+
+    Parameters
+    ----------
+    root : Element
+        Root object of the document.
+    binary : memoryview or None
+        Binary chunk of a GLB.
+    spend : callable
+        Counts bytes that are about to be decoded; see ``Document.spend``.
+    """
+
+    def __init__(
+        self, root: Element, binary: memoryview | None, spend: Callable[[int, str], None]
+    ) -> None:
+        self._buffers, self._views = root.table("buffers"), root.table("bufferViews")
+        self._images = root.table("images")
+        self._source, self._binary, self._spend = root.source, binary, spend
+        self._data: dict[int, Bytes] = {}
+        self.n_bytes_read = len(root.source.data)
+        """Size of the document and of the files that it has needed so far."""
+
+    @property
+    def n_views(self) -> int:
+        """Number of buffer views."""
+        return len(self._views)
+
+    @property
+    def n_images(self) -> int:
+        """Number of images."""
+        return len(self._images)
+
+    def data(self, index: int) -> Bytes:
+        """Return the bytes of a buffer: (N,) uint8, read-only; N may differ from ``byteLength``.
+
+        Raises
+        ------
+        FormatError
+            If it has no data, or they cannot be read.
+        """
+        if index not in self._data:
+            self._data[index] = self._read(index)
+        return self._data[index]
+
+    def view(self, index: int) -> View:
+        """Return a buffer view.
+
+        Raises
+        ------
+        FormatError
+            If it is invalid, or its data cannot be read or end before it.
+        """
+        return self._part(self._views[index])
+
+    def image(self, index: int) -> EncodedImage:
+        """Return an image, still encoded.
+
+        Raises
+        ------
+        FormatError
+            If its data are missing, cannot be read, or lie outside the folder.
+        """
+        image = self._images[index]
+        name, kind = image.text("name"), image.text("mimeType")
+        place = image.index("bufferView", self.n_views, "bufferViews")
+        if place >= 0:
+            return EncodedImage(name, kind, self.view(place).data.tobytes(), True)
+        if not image.has("uri"):
+            raise image.fault("F002.gltf-image")
+        uri = image.text("uri")
+        if is_data_uri(uri):
+            return EncodedImage(name, kind or media_type(uri), uri_bytes(image), True)
+        path = uri_path(image)
+        file = path.relative_to(image.source.path.parent).as_posix()
+        return EncodedImage(file, kind, uri_bytes(image), False)
+
+    def _part(self, view: Element) -> View:
+        """Return the bytes that a view, or the compressed form of one, refers to."""
+        number = view.index("buffer", len(self._buffers), "buffers")
+        if number < 0:
+            raise view.wrong("buffer", "the index of a buffer")
+        offset, length = view.whole("byteOffset", 0), view.whole("byteLength")
+        data = self.data(number)
+        if offset + length > len(data):
+            raise view.fault(
+                "F002.gltf-view", first=offset, end=offset + length, buffer=number, size=len(data)
+            )
+        stride = view.whole("byteStride", 0)
+        return View(data[offset : offset + length], stride, offset)
+
+    def _read(self, index: int) -> Bytes:
+        buffer = self._buffers[index]
+        length = buffer.whole("byteLength")
+        if buffer.has("uri"):
+            data: bytes | memoryview = uri_bytes(buffer, length)
+            if not is_data_uri(buffer.text("uri")):
+                self.n_bytes_read += len(data)
+        elif index == 0 and self._binary is not None:
+            data = self._binary
+        else:
+            raise buffer.fault("F002.gltf-no-data")
+        if len(data) < length:
+            buffer.warn("G001.buffer", expected=length, found=len(data))
+        return np.frombuffer(data, dtype=np.uint8)

@@ -1,0 +1,46 @@
+"""Cameras of a glTF document."""
+
+from __future__ import annotations
+
+import math
+
+from viewer.errors import FormatError
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.content import NodeCamera
+
+__all__ = ["read_cameras"]
+
+_ANGLE = math.radians(45.0)  # vertical field of view in place of an invalid one
+
+
+def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
+    """Return all cameras; an invalid one has a usual field of view and is warned of."""
+    table = document.table("cameras")
+    cameras = []
+    for index in range(len(table)):
+        try:
+            cameras.append(_camera(table[index]))
+        except FormatError as problem:
+            # A figure can be seen without its camera.
+            pointer = problem.diagnostic.pointer
+            table.source.warn("G003.camera", pointer, problem=problem.diagnostic.message)
+            cameras.append(NodeCamera("", _ANGLE))
+    return tuple(cameras)
+
+
+def _camera(camera: Element) -> NodeCamera:
+    name = camera.text("name")
+    kind = camera.choice("type", ("perspective", "orthographic"))
+    lens = camera.part(kind)
+    if lens is None:
+        raise camera.wrong(kind, "an object")
+    if kind == "orthographic":
+        height = abs(lens.number("ymag")) * 2.0
+        width = abs(lens.number("xmag")) * 2.0
+        return NodeCamera(name, None, width / height if height else None, height)
+    angle = lens.number("yfov")
+    if not 0.0 < angle < math.pi:
+        raise lens.wrong("yfov", "an angle between 0 and pi")
+    aspect = lens.number("aspectRatio") if lens.has("aspectRatio") else None
+    return NodeCamera(name, angle, aspect if aspect is None or aspect > 0.0 else None)

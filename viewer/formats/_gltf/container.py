@@ -1,0 +1,113 @@
+r"""Containers of glTF: JSON text, or GLB with its chunks.
+
+::
+
+    .glb   "glTF" version:uint32 = 2 length:uint32 chunk…
+    chunk  length:uint32 type:uint32 bytes, padded to 4 bytes
+    types  "JSON" first, then "BIN\0" if there is a binary buffer; others are skipped
+
+Lengths that contradict the size of the file are corrected with a warning where nothing is lost.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from viewer.formats._gltf.json_text import parsed
+from viewer.formats._source import Source
+
+__all__ = ["MAGIC", "Container", "open_container"]
+
+MAGIC = b"glTF"
+"""First bytes of a GLB."""
+
+_HEADER = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<I4s")
+_JSON, _BINARY = b"JSON", b"BIN\0"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Container:
+    """The two parts of a file.
+
+    Attributes
+    ----------
+    root : dict
+        Parsed JSON.
+    binary : memoryview or None
+        Contents of the binary chunk, with its padding; None without one.
+    """
+
+    root: dict[str, Any]
+    binary: memoryview | None
+
+
+def open_container(source: Source) -> Container:
+    """Return the JSON and the binary chunk of a ``.gltf``, ``.glb`` or ``.vrm`` file.
+
+    Raises
+    ------
+    FormatError
+        If it is neither, is truncated in its JSON, or its JSON is invalid.
+    """
+    data = source.data
+    if not data.startswith(MAGIC):
+        return Container(parsed(source, memoryview(data), has_lines=True), None)
+    chunks: dict[bytes, memoryview] = {}
+    for kind, content in _chunks(source):
+        if kind in (_JSON, _BINARY) and kind in chunks:
+            source.warn("G001.chunk-again", kind=_title(kind))
+        chunks.setdefault(kind, content)
+    if _JSON not in chunks:
+        raise source.fault("F002.glb-json")
+    return Container(parsed(source, chunks[_JSON], has_lines=False), chunks.get(_BINARY))
+
+
+def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:
+    """Yield type and content of each chunk."""
+    data = memoryview(source.data)
+    end = _end(source)
+    place = _HEADER.size
+    while place + _CHUNK.size <= end:
+        length, kind = _CHUNK.unpack_from(data, place)
+        place += _CHUNK.size
+        if place + length > end:
+            found = len(data) - place
+            if kind == _JSON and length > found:
+                raise source.fault("F002.glb-chunk", kind="JSON", expected=length, found=found)
+            source.warn("G001.chunk-length", kind=_title(kind), expected=length, found=end - place)
+        # A file whose length is too small may still contain the whole chunk.
+        stop = min(place + length, len(data))
+        yield kind, data[place:stop]
+        place = _next(data, place + length)
+    if place < end and bytes(data[place:end]).strip(b"\0 "):
+        source.warn("G001.trailing", n=end - place)
+
+
+def _end(source: Source) -> int:
+    """Return where the last chunk ends, according to the header or the size of the file."""
+    size = len(source.data)
+    if size < _HEADER.size:
+        raise source.fault("F002.glb-header", found=size)
+    _, version, length = _HEADER.unpack_from(source.data)
+    if version != 2:
+        raise source.fault("F002.gltf-version", found=version)
+    if length != size:
+        source.warn("G001.length", expected=length, found=size)
+    # A longer file has something after it; a truncated one ends early.
+    return length if _HEADER.size + _CHUNK.size <= length < size else size
+
+
+def _next(data: memoryview, place: int) -> int:
+    """Return where the next chunk begins; some writers pad chunks without counting the padding."""
+    padded = place + -place % 4
+    if padded != place and bytes(data[padded + 4 : padded + 8]) in (_JSON, _BINARY):
+        return padded
+    return place
+
+
+def _title(kind: bytes) -> str:
+    return kind.rstrip(b"\0 ").decode("ascii", "backslashreplace")

@@ -1,0 +1,104 @@
+"""A glTF document: its JSON, its buffers and accessors, and the memory that it may take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from viewer.errors import FormatError
+from viewer.formats._gltf.accessors import Accessors
+from viewer.formats._gltf.buffers import Buffers
+from viewer.formats._gltf.container import Container, open_container
+from viewer.formats._gltf.elements import Element, Table
+from viewer.formats._source import Source
+
+__all__ = ["Document", "open_document"]
+
+Content = TypeVar("Content")
+
+_FREE_BYTES = 256 << 20  # decoded bytes that any file may need
+_MOST_GROWTH = (
+    64  # decoded bytes per byte of file; quantised and compressed data grow about 20 times
+)
+
+
+class Document:
+    """An opened glTF file.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records diagnostics.
+    container : Container
+        Its JSON and binary chunk.
+
+    Attributes
+    ----------
+    source : Source
+        The file.
+    root : Element
+        The root object.
+    buffers : Buffers
+        Bytes of buffers, buffer views and images.
+    accessors : Accessors
+        Arrays.
+    """
+
+    def __init__(self, source: Source, container: Container) -> None:
+        self.source = source
+        self.root = Element(source, container.root)
+        self._tables: dict[str, Table] = {}
+        self._decoded = 0
+        self.buffers = Buffers(self.root, container.binary, self.spend)
+        self.accessors = Accessors(self.root.table("accessors"), self.buffers, self.spend)
+
+    def table(self, name: str) -> Table:
+        """Return a list of the root, such as ``"nodes"``; an empty one if it is missing."""
+        if name not in self._tables:
+            self._tables[name] = self.root.table(name)
+        return self._tables[name]
+
+    def spend(self, n_bytes: int, pointer: str) -> None:
+        """Count bytes that are about to be decoded.
+
+        Raises
+        ------
+        FormatError
+            If the file decodes to much more than its size, as files that declare huge arrays do.
+        """
+        self._decoded += n_bytes
+        most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
+        if self._decoded > most:
+            values = {"most": most, "size": self._decoded}
+            raise self.source.fault("F002.gltf-decoded", pointer, **values)
+
+    def kept(self, read: Callable[[], Content], neutral: Content) -> Content:
+        """Return what a function reads; after an error, a neutral value if errors are kept.
+
+        Raises
+        ------
+        FormatError
+            As the function does, if the first error is to be raised.
+        """
+        try:
+            return read()
+        except FormatError as problem:
+            if not self.source.diagnostics.keeps_errors:
+                raise
+            self.source.diagnostics.add(problem.diagnostic)
+            return neutral
+
+    def extras(self) -> Any:
+        """Return the application data of the root; None without any."""
+        return self.root.values.get("extras")
+
+
+def open_document(source: Source) -> Document:
+    """Open a ``.gltf``, ``.glb`` or ``.vrm`` file; its buffers are read on first use.
+
+    Raises
+    ------
+    FormatError
+        If its container or its JSON is invalid.
+    """
+    return Document(source, open_container(source))

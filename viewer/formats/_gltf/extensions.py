@@ -1,0 +1,63 @@
+"""Extensions of glTF that are read, and messages about the others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from viewer.formats._gltf.document import Document
+
+__all__ = ["GEOMETRY", "KNOWN", "check_extensions"]
+
+GEOMETRY = (
+    "KHR_animation_pointer",
+    "KHR_mesh_quantization",
+)
+"""Extensions of geometry and animation."""
+
+_MATERIALS = (
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_texture_transform",
+    "EXT_texture_webp",
+)
+_CHARACTERS = (
+    "VRM",
+    "VRMC_materials_mtoon",
+    "VRMC_node_constraint",
+    "VRMC_springBone",
+    "VRMC_vrm",
+    "VRMC_vrm_animation",
+)
+_WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
+
+KNOWN = frozenset((*GEOMETRY, *_MATERIALS, *_CHARACTERS, *_WITHOUT_EFFECT))
+"""Extensions that a file may require."""
+
+
+def check_extensions(document: Document) -> None:
+    """Refuse a document that requires an unknown extension, and note optional ones once.
+
+    Raises
+    ------
+    FormatError
+        If an unknown extension is required.
+    """
+    required = _names(document, "extensionsRequired")
+    unknown = [name for name in required if name not in KNOWN]
+    if unknown:
+        pointer = document.root.at("extensionsRequired")
+        document.source.refuse("F002.gltf-extensions", pointer, names=unknown)
+    optional = [name for name in _names(document, "extensionsUsed") if name not in KNOWN]
+    optional = [name for name in optional if name not in unknown]
+    if optional:
+        document.root.warn("F007.gltf-extensions", "extensionsUsed", names=optional)
+    lights = document.root.extension("KHR_lights_punctual")
+    if lights is not None and len(lights.table("lights")):
+        document.root.warn("F007.gltf-lights", "extensions", n=len(lights.table("lights")))
+
+
+def _names(document: Document, member: str) -> list[str]:
+    items: Any = document.root.values.get(member, [])
+    if type(items) is not list or set(map(type, items)) - {str}:
+        raise document.root.wrong(member, "a list of names")
+    return list(dict.fromkeys(items))

@@ -1,0 +1,83 @@
+"""JSON of a glTF file: a text that may be hostile, and real files' deviations from the standard."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from typing import Any
+
+from viewer.formats._archive.values import describe
+from viewer.formats._json_places import MOST_DIGITS
+from viewer.formats._source import Source
+from viewer.phrases import printable
+
+__all__ = ["parsed"]
+
+_PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
+    """Return the parsed root object.
+
+    Parameters
+    ----------
+    source : Source
+        The file, which records diagnostics.
+    data : memoryview
+        UTF-8 text, possibly padded.
+    has_lines : bool
+        Whether the text is the whole file, so that errors have a line.
+
+    Raises
+    ------
+    FormatError
+        If it is no valid JSON object.
+    """
+    text = _text(source, bytes(data).rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
+    constants: list[str] = []
+    repeated: list[str] = []
+
+    def constant(word: str) -> float:
+        constants.append(word)
+        return float(word)
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        values = dict(pairs)
+        if len(values) != len(pairs):
+            counts = Counter(key for key, _ in pairs)
+            repeated.extend(key for key, count in counts.items() if count > 1)
+        return values
+
+    decoder = json.JSONDecoder(object_pairs_hook=unique, parse_constant=constant)
+    try:
+        root = decoder.decode(text)
+    except json.JSONDecodeError as problem:
+        place = len(text[: problem.pos].encode(errors="replace")) if has_lines else None
+        reason = printable(problem.msg, 100)
+        raise source.fault("F002.gltf-json", place, reason=reason, at=problem.pos) from None
+    except RecursionError:
+        raise source.fault("F002.json-nesting") from None
+    except ValueError:  # the only other error that decoding raises
+        raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
+    if type(root) is not dict:
+        raise source.fault("F002.gltf-type", "/", wanted="an object", found=describe(root))
+    if constants:
+        source.warn("G001.constants", n=len(constants), found=constants[0])
+    if repeated:
+        source.warn("G001.repeated", n=len(repeated), found=repeated[0])
+    return root
+
+
+def _text(source: Source, data: bytes) -> str:
+    if not data:
+        raise source.fault("F002.gltf-no-json")
+    if data.startswith(_UTF_16):
+        raise source.fault("F002.gltf-utf-16")
+    try:
+        return data.decode()
+    except UnicodeDecodeError as problem:
+        # Names in another encoding are only shown; keys are ASCII.
+        source.warn("G001.text", at=problem.start)
+        return data.decode(errors="replace")

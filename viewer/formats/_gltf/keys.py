@@ -1,0 +1,132 @@
+"""Keys of the samplers of an animation: times, values and tangents."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import FormatError
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.transform_clip import Interpolation, TransformPath
+
+__all__ = ["Keys", "read_keys", "read_times"]
+
+_INTERPOLATIONS: dict[str, Interpolation] = {
+    "LINEAR": "linear",
+    "STEP": "step",
+    "CUBICSPLINE": "cubic",
+}
+_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+_WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
+_TINY = 1e-12  # length of a quaternion that has no direction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keys:
+    """Keys as in ``NodeChannel``."""
+
+    times: Floats
+    values: Floats
+    interpolation: Interpolation
+    tangents: Floats | None
+
+
+def read_times(document: Document, sampler: Element) -> Floats:
+    """Return the times of a sampler's keys: (N,) seconds, increasing, N > 0.
+
+    Raises
+    ------
+    FormatError
+        If there are none, or they are malformed, not finite or not increasing.
+    """
+    accessor = sampler.index("input", len(document.accessors), "accessors")
+    if accessor < 0:
+        raise sampler.wrong("input", "the index of an accessor")
+    times = document.accessors.floats(accessor, ("SCALAR",), sampler.at("input"))[:, 0]
+    if not len(times):
+        raise sampler.fault("F002.gltf-no-keys", "input")
+    if not np.isfinite(times).all():
+        key = int((~np.isfinite(times)).argmax())
+        raise sampler.fault("F003.gltf-keys", "input", index=key, found=float(times[key]))
+    is_later = np.diff(times) > 0.0
+    if not is_later.all():
+        key = int(is_later.argmin()) + 1
+        values = {"found": float(times[key]), "before": float(times[key - 1])}
+        raise sampler.fault("F002.gltf-times", "input", index=key, **values)
+    return times
+
+
+def read_keys(
+    document: Document, sampler: Element, times: Floats, path: TransformPath, n_shapes: int
+) -> Keys:
+    """Return the keys of a sampler.
+
+    Parameters
+    ----------
+    document : Document
+        The document.
+    sampler : Element
+        A sampler.
+    times : (N,)
+        Its times.
+    path : str
+        Property that it moves.
+    n_shapes : int
+        Number of weights per key.
+
+    Raises
+    ------
+    FormatError
+        If the values are malformed, too many or too few, not finite, or no rotations.
+    """
+    names = tuple(_INTERPOLATIONS)
+    interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
+    accessor = sampler.index("output", len(document.accessors), "accessors")
+    if accessor < 0:
+        raise sampler.wrong("output", "the index of an accessor")
+    rows = document.accessors.floats(accessor, (_KINDS[path],), sampler.at("output"))
+    width = _WIDTHS.get(path, n_shapes)
+    per_key = 3 if interpolation == "cubic" else 1
+    expected = len(times) * per_key * width
+    if rows.size != expected:
+        # In elements of the accessor: vectors, or single weights.
+        size = rows.shape[1]
+        counts = (expected // size, len(rows), len(times))
+        raise _wrong_count(sampler, *counts)
+    keys = rows.reshape(len(times), per_key, width)
+    _check_finite(sampler, keys)
+    if path == "rotation":
+        keys = _rotations(sampler, keys, _is_whole(document, accessor))
+    # Stored as in-tangent, value, out-tangent; tangents are slopes per second (3.11.3.3).
+    tangents = keys[:, (0, 2)] if per_key == 3 else None
+    return Keys(times, keys[:, per_key // 2], interpolation, tangents)
+
+
+def _wrong_count(sampler: Element, expected: int, found: int, keys: int) -> FormatError:
+    return sampler.fault("F002.gltf-outputs", "output", expected=expected, found=found, keys=keys)
+
+
+def _check_finite(sampler: Element, keys: Floats) -> None:
+    if np.isfinite(keys.sum()):
+        return
+    bad = ~np.isfinite(keys)
+    if bad.any():
+        key, place, column = (int(axis[0]) for axis in np.nonzero(bad))
+        found = float(keys[key, place, column])
+        raise sampler.fault("F003.gltf-keys", "output", index=key, found=found)
+
+
+def _is_whole(document: Document, accessor: int) -> bool:
+    return document.accessors[accessor].values.get("componentType") != 5126
+
+
+def _rotations(sampler: Element, keys: Floats, is_whole: bool) -> Floats:
+    """Return quaternions of unit length; splines between floating-point keys are kept exactly."""
+    middle = keys.shape[1] // 2
+    lengths = np.linalg.norm(keys[:, middle], axis=1)
+    if (lengths < _TINY).any():
+        raise sampler.fault("F002.gltf-rotation", "output", index=int((lengths < _TINY).argmax()))
+    return keys if middle and not is_whole else keys / lengths[:, None, None]

@@ -1,0 +1,78 @@
+"""Rows of numbers that many objects of a document have, read together."""
+
+from __future__ import annotations
+
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from viewer.formats._gltf.elements import Table
+from viewer.formats._text.numbers import LARGEST
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["member_indices", "member_rows"]
+
+_NUMBERS = ({int}, {float}, {int, float})
+
+
+def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
+    """Return the objects that have a member, and its numbers.
+
+    Parameters
+    ----------
+    table : Table
+        Objects only.
+    name : str
+        Name of the member.
+    width : int
+        Numbers per object.
+
+    Returns
+    -------
+    places : (N,) int32
+        Indices of the objects.
+    rows : (N, width)
+        Finite numbers.
+
+    Raises
+    ------
+    FormatError
+        If a member is anything but ``width`` finite numbers.
+    """
+    places = [place for place, values in enumerate(table.items) if name in values]
+    items = [table.items[place][name] for place in places]
+    rows = _array(items, width)
+    if rows is None:
+        # At least one is invalid: the slow way finds it.
+        for place in places:
+            table[place].numbers(name, width)
+    return np.array(places, dtype=np.int32), np.zeros((0, width)) if rows is None else rows
+
+
+def _array(items: list[Any], width: int) -> Floats | None:
+    """Return lists of numbers as an array, None if any is something else."""
+    if set(map(type, items)) - {list} or set(map(len, items)) - {width}:
+        return None
+    if items and set(map(type, chain.from_iterable(items))) not in _NUMBERS:
+        return None
+    try:
+        rows = np.array(items, dtype=np.float64).reshape(-1, width)
+    except OverflowError:  # a whole number beyond double precision
+        return None
+    return rows if (np.abs(rows) <= LARGEST).all() else None
+
+
+def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
+    """Return a member that is an index below ``count`` for each object, -1 without it: (N,).
+
+    Raises
+    ------
+    FormatError
+        If a member is something else; see ``Element.index``.
+    """
+    result = np.full(len(table), -1, dtype=np.int32)
+    for place, values in enumerate(table.items):
+        if name in values:
+            result[place] = table[place].index(name, count, what)
+    return result

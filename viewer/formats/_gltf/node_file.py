@@ -1,0 +1,91 @@
+"""Contents of glTF 2.0 files: ``.gltf`` with files beside it, ``.glb``, and ``.vrm`` characters.
+
+::
+
+    asset         {"version": "2.0", …}
+    scenes        root nodes; scene is the default one
+    nodes         children; matrix, or translation, rotation, scale; mesh, skin, camera, weights
+    meshes        primitives of vertex attributes, indices, material and morph targets
+    skins         joints (nodes) and inverseBindMatrices
+    animations    channels (node and path) with samplers: LINEAR, STEP or CUBICSPLINE
+    accessors     typed arrays in bufferViews of buffers: the binary chunk, data URIs or files
+
+Errors name the element by its JSON pointer. Specification: Khronos Group, glTF 2.0, ISO/IEC 12113.
+"""
+
+from __future__ import annotations
+
+from viewer.formats._gltf.animations import read_animations
+from viewer.formats._gltf.bindings import checked_bindings
+from viewer.formats._gltf.cameras import read_cameras
+from viewer.formats._gltf.document import Document, open_document
+from viewer.formats._gltf.extensions import check_extensions
+from viewer.formats._gltf.meshes import read_meshes
+from viewer.formats._gltf.nodes import read_tree
+from viewer.formats._gltf.scenes import shown_roots
+from viewer.formats._gltf.skins import read_skins
+from viewer.formats._gltf.target_paths import Targets
+from viewer.formats._nodes.content import NodeFile
+from viewer.formats._source import Source
+from viewer.rig.material import Material
+
+__all__ = ["read_nodes"]
+
+
+def read_nodes(source: Source) -> NodeFile:
+    """Return the contents of a glTF file; the keys of animations are read when they are played.
+
+    Parameters
+    ----------
+    source : Source
+        A ``.gltf``, ``.glb`` or ``.vrm`` file.
+
+    Raises
+    ------
+    FormatError
+        If it is invalid, refers to data outside its folder, or requires an extension that is not
+        supported. Errors without effect on what is shown are warnings.
+    """
+    document = open_document(source)
+    _check_version(document)
+    check_extensions(document)
+    tree = read_tree(document)
+    skins = read_skins(document)
+    meshes = checked_bindings(document, tree, read_meshes(document), skins)
+    root = document.root
+    return NodeFile(
+        name=source.path.stem,
+        tree=tree,
+        roots=shown_roots(document, tree),
+        meshes=meshes,
+        skins=skins,
+        materials=tuple(Material(name) for name in _names(document, "materials")),
+        animations=read_animations(document, Targets(tree, meshes)),
+        cameras=read_cameras(document),
+        extensions=_object(document, "extensions"),
+        extras=root.values.get("extras"),
+        asset=_object(document, "asset"),
+    )
+
+
+def _names(document: Document, name: str) -> list[str]:
+    table = document.table(name)
+    return [table[index].text("name") for index in range(len(table))]
+
+
+def _object(document: Document, name: str) -> dict[str, object]:
+    part = document.root.part(name)
+    return {} if part is None else part.values
+
+
+def _check_version(document: Document) -> None:
+    """Refuse documents of another major version, or that need a later minor one."""
+    asset = document.root.part("asset")
+    if asset is None:
+        document.root.warn("G001.no-asset")
+        return
+    version = asset.text("version", "2.0")
+    if version.partition(".")[0] != "2":
+        raise asset.fault("F002.gltf-version", "version", found=version)
+    if asset.text("minVersion", "2.0") != "2.0":
+        raise asset.fault("F002.gltf-version", "minVersion", found=asset.text("minVersion"))

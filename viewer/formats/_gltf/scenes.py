@@ -1,0 +1,48 @@
+"""Scenes of a glTF document: the root nodes that are shown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.content import NodeTree
+
+__all__ = ["shown_roots"]
+
+
+def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
+    """Return the root nodes of the default scene, else of the first; all if there is none.
+
+    Raises
+    ------
+    FormatError
+        If the scene does not exist, or its list of nodes is malformed.
+    """
+    scenes = document.table("scenes")
+    default = document.root.index("scene", len(scenes), "scenes")
+    every = tuple(np.nonzero(tree.parents < 0)[0].tolist())
+    if not len(scenes):
+        return every
+    scene = scenes[max(default, 0)]
+    if len(scenes) > 1:
+        name = scene.text("name") or str(max(default, 0))
+        document.root.warn("F007.gltf-scenes", "scenes", n=len(scenes), found=name)
+    roots = _roots(scene, tree)
+    if not roots and every:
+        scene.warn("F007.gltf-empty-scene")
+    return roots or every
+
+
+def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
+    nodes = scene.indices("nodes", tree.n_nodes, "nodes")
+    children = [node for node in nodes if tree.parents[node] >= 0]
+    if children:
+        scene.warn("G003.scene-child", "nodes", n=len(children), found=children[0])
+    found = []
+    for node in nodes:
+        # Transforms of the ancestors apply, so the tree is shown from its root.
+        while tree.parents[node] >= 0:
+            node = int(tree.parents[node])
+        found.append(node)
+    return tuple(dict.fromkeys(found))

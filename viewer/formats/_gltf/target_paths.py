@@ -1,0 +1,106 @@
+"""Targets of animation channels: the nodes and the property that a channel moves."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, cast
+
+from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.content import NodeMesh, NodeTree
+from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformPath
+
+__all__ = ["Moved", "Targets"]
+
+_NODE_POINTER = re.compile(r"/nodes/([0-9]{1,9})/(translation|rotation|scale|weights)")
+_MESH_POINTER = re.compile(r"/meshes/([0-9]{1,9})/weights")
+_INDEX = re.compile(r"/[0-9]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """What a channel moves.
+
+    Attributes
+    ----------
+    path : str
+        Entry of ``TRANSFORM_PATHS``; for anything else a name for messages.
+    nodes : tuple of int
+        Empty if it moves nothing that is shown.
+    """
+
+    path: str
+    nodes: tuple[int, ...]
+
+    @property
+    def transform_path(self) -> TransformPath:
+        """The path of a channel that moves nodes."""
+        return cast("TransformPath", self.path)
+
+
+class Targets:
+    """Nodes that channels can move.
+
+    Parameters
+    ----------
+    tree : NodeTree
+        All nodes.
+    meshes : tuple of NodeMesh
+        All meshes, whose morph targets have weights.
+    """
+
+    def __init__(self, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
+        self._tree, self._meshes = tree, meshes
+        self._with_shapes = {
+            node
+            for node, mesh in enumerate(tree.meshes.tolist())
+            if mesh >= 0 and meshes[mesh].target_names
+        }
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return self._tree.n_nodes
+
+    def n_shapes(self, node: int) -> int:
+        """Return the number of morph targets of a node's mesh."""
+        mesh = int(self._tree.meshes[node])
+        return len(self._meshes[mesh].target_names) if mesh >= 0 else 0
+
+    def moves(self, node: Any, path: Any) -> bool:
+        """Return whether a node and a path, as in the file, name something that is shown."""
+        if type(node) is not int or not 0 <= node < self._tree.n_nodes:
+            return False
+        return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
+
+    def of(self, channel: Element) -> Moved:
+        """Return what a channel moves.
+
+        Raises
+        ------
+        FormatError
+            If it has no target, or refers to a missing node.
+        """
+        target = channel.part("target")
+        if target is None:
+            raise channel.wrong("target", "an object")
+        path = target.text("path")
+        if path == "pointer":
+            return self._pointed(target)
+        node = target.index("node", self._tree.n_nodes, "nodes")
+        return Moved(path, (node,) if self.moves(node, path) else ())
+
+    def _pointed(self, target: Element) -> Moved:
+        """Return what a pointer of KHR_animation_pointer refers to."""
+        extension = target.extension("KHR_animation_pointer")
+        pointer = "" if extension is None else extension.text("pointer")
+        if match := _NODE_POINTER.fullmatch(pointer):
+            node, path = int(match[1]), match[2]
+            return Moved(path, (node,) if self.moves(node, path) else ())
+        if match := _MESH_POINTER.fullmatch(pointer):
+            mesh = int(match[1])
+            # Weights of a node override those of its mesh.
+            users = (node for node in self._with_shapes if self._tree.meshes[node] == mesh)
+            nodes = (node for node in users if node not in self._tree.shape_weights)
+            return Moved("weights", tuple(sorted(nodes)))
+        return Moved(_INDEX.sub("", pointer).removeprefix("/")[:60] or "pointer", ())

@@ -1,0 +1,105 @@
+"""Morph targets of meshes: offsets of positions and normals, names and default weights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewer.formats._gltf.attributes import Attributes
+from viewer.formats._gltf.elements import Element, Table
+from viewer.rig.arrays import Floats
+
+__all__ = ["n_targets", "read_targets", "shape_weights", "target_names"]
+
+
+def n_targets(mesh: Element, primitives: Table) -> int:
+    """Return the number of morph targets of a mesh.
+
+    Raises
+    ------
+    FormatError
+        If its primitives have different numbers.
+    """
+    counts = [len(primitives[place].table("targets")) for place in range(len(primitives))]
+    for place, found in enumerate(counts):
+        if found != counts[0]:
+            raise primitives[place].fault(
+                "F002.gltf-targets", "targets", expected=counts[0], found=found
+            )
+    return counts[0] if counts else 0
+
+
+def read_targets(attributes: Attributes, targets: Table) -> tuple[Floats | None, Floats | None]:
+    """Return the offsets of positions and normals of a primitive: (S, V, 3) each, or None.
+
+    Raises
+    ------
+    FormatError
+        If they are malformed.
+    """
+    if not len(targets):
+        return None, None
+    offsets = _offsets(attributes, targets, "POSITION")
+    if offsets is None:
+        offsets = np.zeros((len(targets), attributes.n_rows, 3))
+    return offsets, _offsets(attributes, targets, "NORMAL")
+
+
+def _offsets(attributes: Attributes, targets: Table, name: str) -> Floats | None:
+    """Return the offsets of one attribute; None if no target has it."""
+    used = [place for place in range(len(targets)) if targets[place].has(name)]
+    if not used:
+        return None
+    document, rows = attributes.document, attributes.rows
+    size = len(targets) * attributes.n_rows * 3 * 8
+    document.spend(size, targets.pointer)
+    result = np.zeros((len(targets), attributes.n_rows, 3))
+    for place in used:
+        target = Attributes(document, targets[place], attributes.n_vertices, rows)
+        values = target.floats(name, "VEC3")
+        if values is not None:
+            result[place] = target.finite(name, values)
+    return result
+
+
+def shape_weights(mesh: Element, count: int) -> Floats:
+    """Return the default weights of the morph targets: (S,).
+
+    Raises
+    ------
+    FormatError
+        If they are no numbers.
+    """
+    weights = mesh.numbers("weights")
+    if weights is None:
+        return np.zeros(count)
+    if len(weights) != count:
+        mesh.warn("G002.weights", "weights", expected=count, found=len(weights))
+    return np.concatenate([weights[:count], np.zeros(max(0, count - len(weights)))])
+
+
+def target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
+    """Return the names of the morph targets, empty strings without.
+
+    Names are application data: of the mesh, of a primitive, or of the targets themselves.
+    """
+    candidates = [_listed(mesh)]
+    for place in range(len(primitives)):
+        targets = primitives[place].table("targets")
+        candidates += [_listed(primitives[place]), [_extra(item, "name") for item in targets.items]]
+    for names in candidates:
+        if len(names) == count and any(type(name) is str and name for name in names):
+            return tuple(name if type(name) is str else "" for name in names)
+    return ("",) * count
+
+
+def _listed(element: Element) -> list[Any]:
+    names = _extra(element.values, "targetNames")
+    return names if type(names) is list else []
+
+
+def _extra(values: Any, name: str) -> Any:
+    """Return application data of an object; None without."""
+    extras = values.get("extras") if type(values) is dict else None
+    return extras.get(name) if type(extras) is dict else None

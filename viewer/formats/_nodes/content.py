@@ -1,0 +1,270 @@
+"""Contents of a file of nodes, as its reader returns them, before figures are made of them.
+
+Nothing is converted: names, transforms, weights and keys are those of the file, in its unit and
+axes. Indices are valid, numbers are finite, and the parents form a forest: readers see to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.material import Material
+from viewer.rig.motion.transform_clip import Interpolation, TransformPath
+
+__all__ = [
+    "NodeAnimation",
+    "NodeCamera",
+    "NodeChannel",
+    "NodeFile",
+    "NodeMesh",
+    "NodeSkin",
+    "NodeTree",
+    "Primitive",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeTree:
+    """All nodes of a file, in file order, as parallel arrays.
+
+    Attributes
+    ----------
+    names : tuple of N str
+        As in the file; may repeat or be empty.
+    parents : (N,) int32
+        -1 for a root; a parent may come after its children.
+    translations, rotations, scales : (N, 3), (N, 4), (N, 3)
+        Local transform T R S; unit quaternions (x, y, z, w).
+    matrices : dict of (4, 4)
+        Local matrices of the nodes that no T R S expresses, as they shear. Their rows in the
+        three arrays above are those of the identity.
+    meshes, skins, cameras : (N,) int32
+        Index of each node's mesh, skin and camera, -1 for none.
+    shape_weights : dict of (S,)
+        Morph target weights of the nodes that override those of their mesh.
+    extras, extensions : dict
+        Application data and extensions by node, as parsed from JSON.
+    """
+
+    names: tuple[str, ...]
+    parents: Ints
+    translations: Floats
+    rotations: Floats
+    scales: Floats
+    meshes: Ints
+    skins: Ints
+    cameras: Ints
+    matrices: Mapping[int, Floats] = field(default_factory=dict)
+    shape_weights: Mapping[int, Floats] = field(default_factory=dict)
+    extras: Mapping[int, Any] = field(default_factory=dict)
+    extensions: Mapping[int, Any] = field(default_factory=dict)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, N."""
+        return len(self.names)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Primitive:
+    """Triangles with one material; the vertices are used by no other primitive.
+
+    Attributes
+    ----------
+    positions : (V, 3)
+        Mesh space, file units.
+    triangles : (T, 3) int32
+        Counter-clockwise from outside.
+    normals : (V, 3) or None
+        None if the file has none: the surface is flat shaded (glTF) or smoothed by the importer.
+    uvs : tuple of (V, 2)
+        Texture coordinate sets, v = 0 at the bottom row of the image.
+    colors : (V, 4) or None
+        Linear vertex colours with opacity, which multiply the material's base colour.
+    joints, weights : (V, K) int32, (V, K) or None
+        Influences of all sets side by side: indices into the skin's joints. Weights are as
+        stored, unused slots are 0.
+    material : int
+        Index into ``NodeFile.materials``, -1 for none.
+    targets : (S, V, 3) or None
+        Offsets of the positions for each morph target of the mesh.
+    normal_targets : (S, V, 3) or None
+        Offsets of the normals; None if the file has none.
+    """
+
+    positions: Floats
+    triangles: Ints
+    normals: Floats | None = None
+    uvs: tuple[Floats, ...] = ()
+    colors: Floats | None = None
+    joints: Ints | None = None
+    weights: Floats | None = None
+    material: int = -1
+    targets: Floats | None = None
+    normal_targets: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeMesh:
+    """Primitives that share one name and one list of morph targets.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    primitives : tuple of Primitive
+        In file order; empty if the file has points or lines only.
+    target_names : tuple of S str
+        Names of the morph targets; empty strings without a name.
+    shape_weights : (S,)
+        Default weights of the morph targets.
+    extras : Any
+        Application data, as parsed from JSON; None without.
+    """
+
+    name: str
+    primitives: tuple[Primitive, ...]
+    target_names: tuple[str, ...] = ()
+    shape_weights: Floats = field(default_factory=lambda: np.zeros(0))
+    extras: Any = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeSkin:
+    """Joints that deform meshes.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    joints : (M,) int32
+        Node of each joint.
+    inverse_bind : (M, 4, 4)
+        Mesh-to-joint matrices at bind time; identities if the file has none.
+    method : "lbs", "dqs" or "mix"
+        How the file wants its meshes to be deformed.
+    """
+
+    name: str
+    joints: Ints
+    inverse_bind: Floats
+    method: Literal["lbs", "dqs", "mix"] = "lbs"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeChannel:
+    """Keys of one property of one node; see ``viewer.rig.motion.transform_clip``.
+
+    Attributes
+    ----------
+    node : int
+        Node that moves.
+    path : str
+        ``"translation"``, ``"rotation"``, ``"scale"`` or ``"weights"``.
+    times : (N,)
+        Seconds, increasing.
+    values : (N, C)
+        C = 3, 4 (quaternions, not necessarily of unit length), 3, or S.
+    interpolation : str
+        ``"step"``, ``"linear"`` or ``"cubic"``.
+    tangents : (N, 2, C) or None
+        Incoming and outgoing slopes per second; only for ``"cubic"``.
+    """
+
+    node: int
+    path: TransformPath
+    times: Floats
+    values: Floats
+    interpolation: Interpolation = "linear"
+    tangents: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeAnimation:
+    """A named animation, whose keys are read when it is first played.
+
+    Attributes
+    ----------
+    name : str
+        As in the file; may repeat or be empty.
+    start, end : float
+        Seconds of the first and the last key.
+    nodes : frozenset of int
+        Nodes that it moves.
+    read : callable
+        Returns the channels; called at most once, may raise a ``FormatError``.
+    """
+
+    name: str
+    start: float
+    end: float
+    nodes: frozenset[int]
+    read: Callable[[], tuple[NodeChannel, ...]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeCamera:
+    """A perspective or orthographic camera that looks along -z of its node, y up.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    vertical_angle : float or None
+        Vertical field of view in radians; None for an orthographic camera.
+    aspect : float or None
+        Width divided by height, if the file says so.
+    height : float
+        Height of an orthographic camera's view, file units.
+    """
+
+    name: str
+    vertical_angle: float | None
+    aspect: float | None = None
+    height: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeFile:
+    """Everything in a file of nodes.
+
+    Attributes
+    ----------
+    name : str
+        The file's stem.
+    tree : NodeTree
+        All nodes.
+    roots : tuple of int
+        Root nodes of the scene that is shown.
+    meshes, skins, materials, animations, cameras : tuple
+        In file order; referred to by index.
+    up : "y" or "z"
+        Up axis of the file.
+    unit : str
+        Unit of length, a key of ``viewer.rig.units.METRES``; empty if unknown.
+    extensions : dict
+        Parsed JSON of the root's extensions, such as ``VRMC_vrm``.
+    extras : Any
+        Application data of the root, as parsed from JSON; None without.
+    asset : dict
+        Generator, copyright and the like.
+    """
+
+    name: str
+    tree: NodeTree
+    roots: tuple[int, ...]
+    meshes: tuple[NodeMesh, ...] = ()
+    skins: tuple[NodeSkin, ...] = ()
+    materials: tuple[Material, ...] = ()
+    animations: tuple[NodeAnimation, ...] = ()
+    cameras: tuple[NodeCamera, ...] = ()
+    up: Literal["y", "z"] = "y"
+    unit: str = "m"
+    extensions: Mapping[str, Any] = field(default_factory=dict)
+    extras: Any = None
+    asset: Mapping[str, Any] = field(default_factory=dict)

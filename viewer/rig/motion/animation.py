@@ -1,0 +1,45 @@
+"""Named animations of a figure, whose keys are read when they are first played."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viewer.rig.motion.transform_clip import TransformClip
+
+__all__ = ["Animation"]
+
+
+class Animation:
+    """One of the animations that a figure brings along.
+
+    Parameters
+    ----------
+    name : str
+        As in the file; may repeat or be empty.
+    start, end : float
+        Playback range in seconds.
+    read : callable
+        Returns the keys; called at most once, may raise a ``FormatError``.
+    """
+
+    __slots__ = ("_clip", "_read", "end", "name", "start")
+
+    def __init__(
+        self, name: str, start: float, end: float, read: Callable[[], TransformClip]
+    ) -> None:
+        self.name, self.start, self.end, self._read = name, start, end, read
+        self._clip: TransformClip | None = None
+
+    def clip(self) -> TransformClip:
+        """Return the motion; always the same object.
+
+        Raises
+        ------
+        FormatError
+            If the file's keys are invalid, or the file can no longer be read.
+        """
+        if self._clip is None:
+            self._clip = self._read()
+        return self._clip

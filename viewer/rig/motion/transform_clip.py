@@ -1,0 +1,118 @@
+"""Keyed transforms: keys of translation, rotation, scale and shape weights, as in glTF and FBX."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+
+__all__ = [
+    "INTERPOLATIONS",
+    "TRANSFORM_PATHS",
+    "Interpolation",
+    "TransformChannel",
+    "TransformClip",
+    "TransformPath",
+]
+
+TransformPath = Literal["translation", "rotation", "scale", "weights"]
+TRANSFORM_PATHS: tuple[TransformPath, ...] = get_args(TransformPath)
+"""Properties that keys can change."""
+
+Interpolation = Literal["step", "linear", "cubic"]
+INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
+"""Between keys: the earlier value, a line (slerp for rotations), or a cubic Hermite spline."""
+
+_COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TransformChannel:
+    """The keys of one property of one joint, or of the weights of blend shapes.
+
+    Before its first and after its last key a channel keeps the value of that key (glTF 2.0,
+    section 3.11).
+
+    Attributes
+    ----------
+    joint : int
+        Joint that moves; -1 for ``"weights"``.
+    path : str
+        Entry of ``TRANSFORM_PATHS``.
+    times : (N,)
+        Seconds, increasing; N > 0.
+    values : (N, C)
+        Translation relative to the parent joint (rest translation included), quaternion
+        (x, y, z, w) including the rest rotation, scale factors, or shape weights.
+    interpolation : str
+        Entry of ``INTERPOLATIONS``. Linear rotations take the shorter arc; cubic ones are
+        normalised after interpolation.
+    tangents : (N, 2, C) or None
+        Incoming and outgoing slopes, per second; only for ``"cubic"``.
+    shapes : (C,) int32 or None
+        Blend shape of each component; only for ``"weights"``.
+    """
+
+    joint: int
+    path: TransformPath
+    times: Floats
+    values: Floats
+    interpolation: Interpolation = "linear"
+    tangents: Floats | None = None
+    shapes: Ints | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
+
+        if self.path not in TRANSFORM_PATHS or self.interpolation not in INTERPOLATIONS:
+            raise RigError(f"channel: found {self.path!r} with {self.interpolation!r}")
+        put("times", (None,))
+        count = len(self.times)
+        put("values", (count, _COMPONENTS.get(self.path)))
+        if count == 0 or (np.diff(self.times) <= 0).any():
+            raise RigError("times: expected increasing seconds of at least one key")
+        if (self.tangents is not None) != (self.interpolation == "cubic"):
+            raise RigError("tangents: expected for cubic interpolation, and only there")
+        if self.tangents is not None:
+            put("tangents", (count, 2, self.n_components))
+        if (self.shapes is not None) != (self.path == "weights"):
+            raise RigError("shapes: expected for weights, and only there")
+        if self.shapes is not None:
+            put("shapes", (self.n_components,), np.int32)
+
+    @property
+    def n_components(self) -> int:
+        """Number of values per key, C."""
+        return int(self.values.shape[1])
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class TransformClip:
+    """A motion of one figure, as keys of joint transforms and shape weights.
+
+    Attributes
+    ----------
+    name : str
+        Display name.
+    channels : tuple of TransformChannel
+        At most one per joint and path. What has no channel keeps its value in the pose.
+    start, end : float
+        Playback range in seconds.
+    """
+
+    name: str
+    channels: tuple[TransformChannel, ...]
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", float(self.start))
+        object.__setattr__(self, "end", float(self.end))
+        if not (math.isfinite(self.start) and self.start <= self.end < math.inf):
+            raise RigError(f"clip {self.name}: expected a range, found {self.start} to {self.end}")
