@@ -32,10 +32,11 @@ void main() {
     vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : normalize(v_normal);
     // Flip normals that face away. The threshold is well beyond 90 degrees: at exactly 90 degrees
     // rounding would flip pixels at random.
-    normal = dot(normal, face) < -0.1 ? -normal : normal;
+    float side = dot(normal, face) < -0.1 ? -1.0 : 1.0;
+    normal *= side;
     float opacity = u_opacity * v_opacity;
 #ifdef MATERIALS
-    normal = mapped_normal(v_position, normal);
+    normal = mapped_normal(v_position, normal, side);
     opacity *= surface_alpha();
 #endif
     f_color = vec4(encode(shade(v_position, normal, to_eye)) * opacity, opacity);

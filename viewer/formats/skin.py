@@ -220,8 +220,12 @@ def lost_parts(mesh: Mesh) -> list[Phrase]:
     lost = []
     if not all(material.is_plain for material in mesh.materials):
         lost.append(Phrase("part-materials"))
-    if mesh.second_uvs is not None:
+    if mesh.other_uvs:
         lost.append(Phrase("part-second-uvs"))
+    if mesh.colors is not None:
+        lost.append(Phrase("part-vertex-colors"))
+    if mesh.parts:
+        lost.append(Phrase("part-mesh-parts"))
     return lost
 
 

@@ -124,9 +124,9 @@ class DisplayOptions:
         A key of ``MATCAPS``, for the shading ``"matcap"``.
     metallic, roughness : float
         0 to 1, for the shading ``"pbr"`` of materials that do not define them.
-    flat, wireframe, normals, texture, grid, cull : bool
-        Use one normal per triangle; draw edges; draw vertex normals as lines; use the texture;
-        draw the ground grid; cull back faces.
+    flat, wireframe, normals, texture, vertex_colors, grid, cull : bool
+        Use one normal per triangle; draw edges; draw vertex normals as lines; use textures; use
+        vertex colours; draw the ground grid; cull back faces.
     background : str
         An entry of ``BACKGROUNDS`` or ``"#rrggbb"``.
     bones : str
@@ -194,6 +194,7 @@ class DisplayOptions:
     wireframe: bool = False
     normals: bool = False
     texture: bool = True
+    vertex_colors: bool = True
     grid: bool = True
     cull: bool = False
     background: str = "gradient"

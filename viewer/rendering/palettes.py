@@ -6,8 +6,8 @@ import numpy as np
 
 from viewer.rendering.colormap import colormap, oklab
 from viewer.rendering.part_colors import part_colors
-from viewer.rendering.srgb import decode_srgb, encode_srgb
 from viewer.rig.arrays import Bytes, Floats, Ints
+from viewer.rig.srgb import decode_srgb, encode_srgb
 
 __all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
 

@@ -10,10 +10,10 @@ import numpy as np
 from viewer.rendering.colormap import colormap, diverging_map
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
-from viewer.rendering.srgb import decode_srgb
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name
+from viewer.rig.srgb import decode_srgb
 
 __all__ = ["TYPICAL", "ScalarLook", "is_whole", "look_of", "shown_ends", "typical_span"]
 

@@ -7,7 +7,7 @@ import pytest
 from app.captured import people, walk
 
 from viewer.app.playback.tracks import bars, present_spans, ruler_text_place
-from viewer.rendering.srgb import decode_color, encode_color
+from viewer.rig.srgb import decode_color, encode_color
 
 
 @pytest.mark.parametrize(

@@ -105,8 +105,6 @@ def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, An
     """Say what of a mesh has no equivalent."""
     if mesh["color_sets"] > 1:
         source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
-    if len(mesh["uv_sets"]) > 2:
-        source.warn("F007.fbx-uv-sets", mesh=mesh["name"], n=len(mesh["uv_sets"]))
     for shape in mesh["shapes"]:
         if shape["in_betweens"] > 0:
             source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["in_betweens"])

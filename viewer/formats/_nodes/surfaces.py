@@ -128,12 +128,13 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     counts = [len(piece.triangles) for piece in pieces]
     used = sorted({piece.primitive.material for piece in pieces} - {-1})
     slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
+    uvs = _uv_sets(pieces)
     return Mesh(
         positions=np.concatenate([_positions(piece) for piece in pieces]),
         normals=np.concatenate([_normals(piece) for piece in pieces]),
         triangles=triangles.astype(np.int32),
-        uvs=_filled(pieces, lambda primitive: _uv_set(primitive, 0), np.zeros(2)),
-        second_uvs=_filled(pieces, lambda primitive: _uv_set(primitive, 1), np.zeros(2)),
+        uvs=uvs[0] if uvs else None,
+        other_uvs=uvs[1:],
         colors=_filled(pieces, lambda primitive: primitive.colors, np.ones(4)),
         materials=tuple(file.materials[material] for material in used),
         triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
@@ -156,8 +157,15 @@ def _normals(piece: Piece) -> Floats:
     return piece.normals @ np.linalg.inv(piece.baked[:3, :3])
 
 
-def _uv_set(primitive: Primitive, index: int) -> Floats | None:
-    return primitive.uvs[index] if index < len(primitive.uvs) else None
+def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
+    """Return every set of texture coordinates that a primitive has: (V, 2) each."""
+    count = max(len(piece.primitive.uvs) for piece in pieces)
+
+    def of(index: int) -> Callable[[Primitive], Floats | None]:
+        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
+
+    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
+    return tuple(values for values in sets if values is not None)
 
 
 def _filled(

@@ -83,6 +83,11 @@ class IndexSet:
                 runs.append(run)
         return replace(self, runs=tuple(runs))
 
+    @property
+    def is_blended(self) -> bool:
+        """Whether some triangles are blended."""
+        return any(run.surface.is_blended and run.count for run in self.runs)
+
 
 def index_set(
     context: moderngl.Context,

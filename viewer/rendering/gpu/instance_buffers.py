@@ -237,7 +237,8 @@ class InstanceBuffers:
                 (buffer, layout, name)
                 for buffer, layout, name in (
                     (mesh.uvs, "2f4", "in_uv"),
-                    (mesh.second_uvs, "2f4", "in_second_uv"),
+                    (mesh.other_uvs, "4f4", "in_other_uvs"),
+                    (mesh.tints, "4f4", "in_tint"),
                     (mesh.colors, "3f4", "in_color"),
                 )
                 if name in program and buffer is not None

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.rendering.gpu.index_sets import IndexSet, index_set, kept_triangles
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
-from viewer.rendering.gpu.surfaces import needs_materials, upload_surfaces
+from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
 from viewer.rendering.gpu.upload import buffer, float32, offset_texture
 from viewer.rendering.part_colors import part_colors
 from viewer.rig.arrays import Floats, Ints
@@ -79,12 +79,17 @@ class MeshBuffers:
         self.uvs: moderngl.Buffer | None = None
         if mesh.uvs is not None and len(mesh.uvs):
             self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
-        self.second_uvs: moderngl.Buffer | None = None
-        if mesh.second_uvs is not None and self.uvs is not None:
-            self.second_uvs = keep(buffer(self.context, mesh.second_uvs[uv_indices], "f4"))
-        self.has_materials = needs_materials(mesh.materials)
+        sets = drawn_sets(mesh, notes)
+        self.other_uvs: moderngl.Buffer | None = None
+        if self.uvs is not None and len(sets) > 1:
+            rows = np.zeros((len(uv_indices), 4), "f4")
+            for slot, number in enumerate(sets[1:]):
+                rows[:, 2 * slot : 2 * slot + 2] = mesh.other_uvs[number - 1][uv_indices]
+            self.other_uvs = keep(buffer(self.context, rows, "f4"))
+        self.tints = None if mesh.colors is None else self.upload(mesh.colors)
+        self.has_materials = needs_materials(mesh)
         self.surfaces = upload_surfaces(
-            self.context, mesh.materials, self.uvs is not None, notes, self._owner
+            self.context, mesh.materials, sets if self.uvs is not None else (), notes, self._owner
         )
         self.index_set(False, ())
         self.skin(Skinning())

@@ -14,8 +14,8 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.context import is_software
-from viewer.rendering.srgb import decode_srgb, encode_srgb
 from viewer.rig.arrays import Bytes
+from viewer.rig.srgb import decode_srgb, encode_srgb
 
 __all__ = ["add_mipmaps", "halved_pictures"]
 

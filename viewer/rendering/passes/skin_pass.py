@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
@@ -186,6 +187,10 @@ class PosedMesh:
         Its triangles are then clockwise seen from their front.
         """
         return self._is_mirrored != bool(np.linalg.det(placement[:3, :3]) < 0.0)
+
+    def posed_positions(self) -> NDArray[np.float32]:
+        """Return the current positions of the split vertices, relative to the centre: (R, 3)."""
+        return np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6)[:, :3]
 
     def read(self) -> tuple[Floats, Floats]:
         """Return the current posed positions in figure space and normals, (V, 3) each.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rendering.options import Color
 from viewer.rig.arrays import Floats
 
 __all__ = ["decode_color", "decode_srgb", "encode_color", "encode_srgb"]
+
+Color = tuple[float, float, float]
 
 
 def encode_srgb(linear: Floats) -> Floats:
