@@ -121,8 +121,8 @@ MESSAGES = {
     "F007.gltf-channels": "{n:#animation channel|has|have} no visible effect: {names:list}",
     "G005.animation": "{problem}: animation omitted",
     "G005.equal-times": "{n:#key|has|have} the same time as the next key: ignored",
-    "G005.range": "expected keys from {start:.6g} to {end:.6g} s as declared by the accessors, found "
-    "{first:.6g} to {last:.6g} s",
+    "G005.range": "expected keys from {start:.6g} to {end:.6g} s as declared by the accessors, "
+    "found {first:.6g} to {last:.6g} s",
     "G005.channel-twice": "ignored second channel for {path:text} of node {node}",
 }
 
