@@ -228,8 +228,8 @@ def test_first_figure_that_fits_is_posed(folder, capsys):
             '--hide-part: no part is called "TAIL"; there are 3: NOT_BODY, FEET, BACK',
         ),
         ("pig --hide-part FEAT", '--hide-part: no part is called "FEAT"; did you mean FEET?'),
-        ("smpl.npz --hide-part HEAD", "--hide-part: no figure has body parts"),
-        ("arms.skel --hide-part HEAD", "--hide-part: no figure has body parts"),
+        ("smpl.npz --hide-part HEAD", "--hide-part: no figure has parts"),
+        ("arms.skel --hide-part HEAD", "--hide-part: no figure has parts"),
     ],
 )
 def test_unknown_part_is_refused_before_rendering(folder, capsys, arguments, message):

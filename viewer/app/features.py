@@ -50,7 +50,8 @@ class Panel:
         Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
         Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
-        ``"actors"`` a motion or several actors; empty if the panel is always available.
+        ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts; empty if the
+        panel is always available.
     leads : bool
         Whether it is brought in front of the other tabs when a scene makes it available.
     on_demand : bool
@@ -150,6 +151,7 @@ PANELS = {
     "lights": Panel("view", "Lights", "right 2"),
     "stats": Panel("view", "Stats", "right 3"),
     "actors": Panel("actors", "Actors", "right 3", needs="actors"),
+    "parts": Panel("actors", "Parts", "right 3", needs="parts"),
     "timeline": Panel("playback", "Timeline", "bottom", needs="motion", leads=True),
     "curves": Panel("curves", "Curves", "bottom", needs="motion"),
 }
@@ -261,6 +263,7 @@ ACTIONS = (
     Action("Reset the pose of this actor", "posing.pose_actions.reset_actor"),
     Action("Reset shape", "posing.pose_actions.reset_shape"),
     Action("Random shape", "posing.pose_actions.random_shape"),
+    Action("Show all parts", "actors.part_actions.show_all_parts", why="core.reasons.no_parts"),
     Action("Reset lights", "view.display_actions.reset_lights"),
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),

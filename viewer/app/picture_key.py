@@ -72,7 +72,7 @@ class PictureKeys:
             else:
                 self._places[row] = self._places[row].updated(*arrays)
             look = (actor, actor.figure, actor.is_drawn, actor.color, actor.opacity)
-            motion = actor.clip, actor.offset
+            motion = actor.clip, actor.offset, actor.hidden_parts
             pose = None if actor.pose is None else pose_key(actor.pose)
             found.append((look, motion, self._places[row], pose))
         return tuple(found)

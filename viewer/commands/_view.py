@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 
 from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
@@ -121,8 +123,8 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         "--hide-part",
         action="append",
         default=[],
-        metavar="NAME",
-        help="hide a body part; may be repeated",
+        metavar="NAME|GLOB",
+        help="hide parts of meshes or bodies, by name or pattern; may be repeated",
     )
 
 
@@ -271,23 +273,38 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:
-    """Hide body parts, given by name or index, of the first figure that has any.
+    """Hide parts of meshes, and body parts of the first figure that has any, by name.
 
-    Raises ViewerError if no figure has a part of this name; the message lists the known ones.
+    Raises ViewerError if no part has one of the names; the message lists the known ones.
     """
     if not arguments.hide_part:
         return
     parts = next((a.figure.body_parts for a in scene.actors if a.figure.body_parts), None)
-    if parts is None:
-        raise ViewerError("--hide-part: no figure has body parts")
-    names = [name.lower() for name in parts.names]
-    hidden = []
+    of_body = () if parts is None else parts.names
+    of_meshes = [() if a.figure.mesh is None else a.figure.mesh.parts for a in scene.actors]
+    everything = (*of_body, *(name for names in of_meshes for name in names))
+    known = tuple(dict.fromkeys(filter(None, everything)))
+    if not known:
+        raise ViewerError("--hide-part: no figure has parts")
+    hidden: set[int] = set()
     for wanted in arguments.hide_part:
-        if wanted.lower() not in names:
-            hint = name_hint(wanted, parts.names)
+        if not _named(wanted, known):
+            hint = name_hint(wanted, known)
             raise ViewerError(f'--hide-part: no part is called "{printable(wanted, 60)}"; {hint}')
-        hidden.append(names.index(wanted.lower()))
-    options.hidden_parts = tuple(sorted(set(hidden)))
+        hidden |= _named(wanted, of_body)
+        for actor, names in zip(scene.actors, of_meshes, strict=True):
+            actor.hidden_parts |= _named(wanted, names)
+    options.hidden_parts = tuple(sorted(hidden))
+
+
+def _named(wanted: str, names: Sequence[str]) -> set[int]:
+    """Return the indices of the names that a name or pattern matches, regardless of case."""
+    pattern = wanted.lower()
+    return {
+        index
+        for index, name in enumerate(names)
+        if name.lower() == pattern or fnmatchcase(name.lower(), pattern)
+    }
 
 
 def warn_of_missing(scene: Scene, options: DisplayOptions) -> list[str]:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from viewer.formats.rig import NamedFiles
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
+    from viewer.rig.figure_group import FigureGroup
     from viewer.rig.morph_target import MorphTarget
     from viewer.rig.motion.body_motion import BodyMotion
     from viewer.rig.motion.clip import Clip
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
     Content = (
         Figure
+        | FigureGroup
         | Clip
         | PoseRecord
         | SkeletonMotion
@@ -138,6 +140,12 @@ FORMATS = {
     ),
     "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False, is_bare_mesh=True),
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
+    "gltf": Format(
+        "glTF 2.0, VRM",
+        (".glb", ".gltf", ".vrm"),
+        rb"\AglTF|\A\{(?s:.*?)\"asset\"\s*:\s*\{",
+        writes=False,
+    ),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),

@@ -7,27 +7,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading.additions import apply_pose
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.covering import with_texture
+from viewer.loading.placing import place_side_by_side, placed_views, stand_up
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.posing.pose_record import PoseRecord
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
 __all__ = ["assemble", "begin"]
-
-_GAP = 0.25  # between actors side by side, in widths of the wider one
 
 
 def assemble(contents: Contents, settings: MotionSettings | None = None) -> Scene:
@@ -75,7 +71,8 @@ def begin(
     for pair in pairs:
         figure = _join([figures[index] for index in pair])
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
-        cast.add(Actor(figure, called=cast.free_title(called)), figure.up, placed=False)
+        actor = Actor(figure, called=cast.free_title(called))
+        cast.add(actor, figure.up, placed=False, origin=figures[pair[-1]][0])
     _give_morphs(contents, cast)
     if contents.has_motion:
         from viewer.loading.driving import drive
@@ -91,8 +88,9 @@ def begin(
         _assign_picture(path, pixels, cast.actors)
     world_up = next((up for up, placed in zip(cast.ups, cast.placed, strict=True) if placed), None)
     world_up = world_up or next(iter(cast.ups), "y")
-    _stand_up(cast, world_up)
-    _place_side_by_side(cast)
+    stand_up(cast, world_up)
+    place_side_by_side(cast)
+    cast.views += placed_views(cast, contents.views)
     found = (*contents.diagnostics, *cast.diagnostics)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
     scene.files, scene.images = contents.files, cast.images
@@ -200,33 +198,3 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
         raise RigError(Diagnostic("B001.joints", paths[1], values=values))
     facts = (*figures[0].facts, *figures[1].facts)
     return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts)
-
-
-def _stand_up(cast: Cast, world_up: str) -> None:
-    """Rotate actors whose files have a different up axis from the scene."""
-    for actor, up in zip(cast.actors, cast.ups, strict=True):
-        if up != world_up:
-            quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
-            actor.placement = rotation_transform(0, quarter) @ actor.placement
-
-
-def _place_side_by_side(cast: Cast) -> None:
-    """Move each actor whose file gives no position to the right of the previous actors."""
-    loose = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if not placed]
-    placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
-    if len(cast.actors) < 2 or not loose:
-        return
-    # Bounds of the drawn scene exclude stray vertices, which would displace the next actor.
-    spans = [scene_box(Scene([actor]))[:, 0] for actor in loose]
-    if placed:
-        before = scene_box(Scene(placed))[:, 0]
-    else:
-        before, loose, spans = spans[0], loose[1:], spans[1:]
-    edge = before[1]
-    for actor, span in zip(loose, spans, strict=True):
-        low, high = span
-        gap = _GAP * max(high - low, before[1] - before[0])
-        shift = translation_matrix(np.array([edge + gap - low, 0.0, 0.0]))
-        actor.placement = shift @ actor.placement
-        edge += gap + high - low
-        before = span

@@ -177,7 +177,7 @@ class PickPass:
     def _draw_mesh(
         self, index: int, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> None:
-        order = mesh.mesh.index_set(options.reduced, options.hidden_parts).order
+        order = mesh.index_set(options).order
 
         def prepare(program: moderngl.Program, run: MeshRun) -> None:
             def found(_: int, triangle: int, point: Floats) -> Pick:

@@ -107,6 +107,7 @@ def update_meshes(
     meshes = prepare_meshes(buffers, [actor for actor in actors if actor.is_drawn], options)
     for actor, mesh in meshes.singles:
         pose = None if options.show == "binding" else actor.pose
+        mesh.hidden_parts = actor.hidden_parts
         mesh.update(pose, options.skinning)
     return meshes
 

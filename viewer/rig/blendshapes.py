@@ -28,12 +28,15 @@ class BlendShapes:
     normal_offsets : (S, V, 3), or Deferred, or None
         Offsets of the rest normals per unit of weight; None if the normals are recomputed from
         the changed surface.
+    rest_weights : (S,) or None
+        Weights of the file's own pose; None if all are 0.
     """
 
     names: tuple[str, ...]
     offsets: Floats | Deferred
     groups: tuple[str, ...] = ()
     normal_offsets: Floats | Deferred | None = None
+    rest_weights: Floats | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
@@ -48,6 +51,9 @@ class BlendShapes:
         _check_shape("offsets", self.offsets.shape, (len(self.names), self.n_vertices, 3))
         if given is not None:
             _check_shape("normal_offsets", given.shape, self.offsets.shape)
+        if self.rest_weights is not None:
+            weights = frozen("rest_weights", self.rest_weights, (len(self.names),))
+            object.__setattr__(self, "rest_weights", weights if weights.any() else None)
         if len(self.groups) != len(self.names):
             raise RigError(f"groups: expected {len(self.names)}, found {len(self.groups)}")
 

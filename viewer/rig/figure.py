@@ -156,6 +156,14 @@ class Figure:
         return 0 if self.blend_shapes is None else self.blend_shapes.n_shapes
 
     @property
+    def rest_shape_weights(self) -> Floats:
+        """Shape weights of the file's own pose: (S,)."""
+        shapes = self.blend_shapes
+        if shapes is None or shapes.rest_weights is None:
+            return np.zeros(self.n_shapes)
+        return shapes.rest_weights
+
+    @property
     def is_attached(self) -> bool:
         """Whether the mesh follows the skeleton."""
         return self.mesh is not None and self.skin is not None and self.skeleton is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ __all__ = [
     "split_seams",
     "triangle_areas",
     "vertex_normals",
+    "visible_triangles",
+    "visible_vertices",
     "volume",
     "without_seams",
 ]
@@ -309,6 +312,29 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     flat: Bools = lengths == 0.0
     normals[flat] = 0.0, 1.0, 0.0
     return normals / np.where(flat, 1.0, lengths)[:, None]
+
+
+def visible_triangles(mesh: Mesh, hidden: Collection[int]) -> Bools:
+    """Return which triangles are in no hidden part: (T,) bool.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With or without parts.
+    hidden : collection of int
+        Indices of the hidden parts; others than those of the mesh are ignored.
+    """
+    shown: Bools = ~np.isin(mesh.part_indices, list(hidden))
+    return shown
+
+
+def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
+    """Return which vertices are not those of hidden triangles only: (V,) bool."""
+    shown = visible_triangles(mesh, hidden)
+    visible = np.ones(mesh.n_vertices, dtype=np.bool_)
+    visible[mesh.triangles[~shown]] = False
+    visible[mesh.triangles[shown]] = True
+    return visible
 
 
 def _area_vectors(positions: Floats, triangles: Ints) -> Floats:

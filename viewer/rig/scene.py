@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
@@ -78,6 +78,8 @@ class Actor:
         Whether its clip covers the current time.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
+    hidden_parts : frozenset of int
+        Parts of the mesh that are not drawn, by index.
     """
 
     figure: Figure
@@ -92,6 +94,7 @@ class Actor:
     points: Floats | None = None
     is_present: bool = True
     called: str = ""
+    hidden_parts: frozenset[int] = frozenset()
 
     @property
     def title(self) -> str:
@@ -158,9 +161,9 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
 
 
 def figure_pose(figure: Figure) -> Pose:
-    """Return a new pose of a figure with a skeleton: the file's own, all shape weights 0."""
+    """Return a new pose of a figure with a skeleton: the file's own, with its shape weights."""
     pose = rest_pose(figure.require_skeleton())
-    pose.shape_weights = np.zeros(figure.n_shapes)
+    pose.shape_weights = figure.rest_shape_weights.copy()
     return pose
 
 
@@ -271,5 +274,8 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
         parts.append(apply_transform(placement, skeleton_points(shape, actor.pose)))
     if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):
         is_bound = show == "binding"
-        parts.append(figure.mesh.positions if is_bound else deform(figure, actor.pose)[0])
+        points = figure.mesh.positions if is_bound else deform(figure, actor.pose)[0]
+        if actor.hidden_parts:
+            points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
+        parts.append(points)
     return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))

@@ -120,8 +120,10 @@ def skin_from_lists(
 
 
 def bind_positions(skin: Skin) -> Floats:
-    """Return the positions of the joints in the bind pose: (J, 3)."""
-    positions: Floats = np.linalg.inv(skin.inverse_bind)[:, :3, 3].astype(np.float64, copy=False)
+    """Return the positions of the joints in the bind pose: (J, 3); the origin if there is none."""
+    singular = np.linalg.det(skin.inverse_bind) == 0.0
+    matrices = np.where(singular[:, None, None], np.eye(4), skin.inverse_bind)
+    positions: Floats = np.linalg.inv(matrices)[:, :3, 3].astype(np.float64, copy=False)
     return positions
 
 

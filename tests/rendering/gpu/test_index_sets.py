@@ -34,7 +34,7 @@ def test_shuffled_triangles_are_sorted_spatially(ctx):
     made, indices = drawn(ctx, shuffled, np.full(len(shuffled), -1), ball.positions)
     assert np.array_equal(indices, shuffled[made.order])
     assert sorted(made.order) == list(range(len(shuffled)))
-    assert made.n_indices == 3 * len(shuffled)
+    assert made.spans == ((0, 3 * len(shuffled)),)
     # At best one vertex for two triangles, at worst three for each.
     assert shaded(shuffled) > 2.9 * len(shuffled)
     assert shaded(indices) < 0.9 * len(shuffled)
@@ -68,7 +68,7 @@ def test_few_triangles_are_sorted_too(ctx, count):
     points = np.zeros((3, 3))
     triangles = np.array([[0, 1, 2]], dtype=np.int32)[:count]
     made, _ = index_set(ctx, triangles, np.zeros(count), [PLAIN], points), None
-    assert made.n_indices == 3 * count and len(made.order) == count
+    assert made.spans == ((0, 3 * count),) and len(made.order) == count
     made.indices.release()
 
 

@@ -8,6 +8,7 @@ from functools import partial
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
+from viewer.app.actors.part_actions import isolate_part, part_label, set_part_shown
 from viewer.app.core.reasons import no_pose, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, menu_item
@@ -96,6 +97,7 @@ def draw_context_menu(state: AppState) -> None:
     if spot is not None and spot.actor < len(state.scene.actors):
         _draw_joint(state, spot)
         _draw_vertex(state, spot)
+        _draw_part(state, spot)
         _draw_actor(state, spot)
     else:
         _draw_background(state)
@@ -147,6 +149,20 @@ def _draw_vertex(state: AppState, spot: Spot) -> None:
         unpin(state)
     if menu_item(state, "Copy index"):
         imgui.set_clipboard_text(str(spot.vertex))
+
+
+def _draw_part(state: AppState, spot: Spot) -> None:
+    actor = state.scene.actors[spot.actor]
+    mesh = actor.figure.mesh
+    if mesh is None or not 0 <= spot.part < len(mesh.parts) or len(mesh.parts) < 2:
+        return
+    imgui.separator_text(printable(part_label(actor, spot.part), _LONGEST))
+    if menu_item(state, "Hide part"):
+        set_part_shown(actor, spot.part, False)
+    if menu_item(state, "Show only this part"):
+        isolate_part(actor, spot.part)
+    if menu_item(state, "Show all parts", why="" if actor.hidden_parts else "no part is hidden"):
+        actor.hidden_parts = frozenset()
 
 
 def _draw_actor(state: AppState, spot: Spot) -> None:

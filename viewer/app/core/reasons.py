@@ -12,6 +12,7 @@ __all__ = [
     "no_motion",
     "no_new_clip",
     "no_panel",
+    "no_parts",
     "no_pose",
     "no_redo",
     "no_skeleton",
@@ -39,9 +40,17 @@ def no_panel(state: AppState, needs: str) -> str:
     """
     if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
         return no_motion(state)
+    if needs == "parts":
+        return no_parts(state)
     if needs in ("", "actors") or getattr(state.actor.figure, needs) not in (None, ()):
         return ""
     return f"this figure has no {needs.replace('_', ' ')}"
+
+
+def no_parts(state: AppState) -> str:
+    """Return why the parts of the chosen actor cannot be hidden."""
+    mesh = state.actor.figure.mesh
+    return "" if mesh is not None and len(mesh.parts) > 1 else "this figure has one part only"
 
 
 def no_pose(state: AppState) -> str:

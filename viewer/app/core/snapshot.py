@@ -34,6 +34,7 @@ class Look:
     visible: bool
     color: tuple[float, float, float] | None
     placement: bytes
+    hidden_parts: frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,8 @@ def restored_pose(key: PoseKey | None) -> Pose | None:
 def look_of(actor: Actor) -> Look:
     """Return an actor's motion and display settings."""
     placement = actor.placement.tobytes()
-    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement)
+    hidden = actor.hidden_parts
+    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement, hidden)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
@@ -91,6 +93,7 @@ def _looks(actor: Actor, look: Look) -> bool:
         and actor.visible == look.visible
         and actor.offset == look.offset
         and actor.color == look.color
+        and actor.hidden_parts == look.hidden_parts
         and actor.placement.tobytes() == look.placement
     )
 
@@ -137,6 +140,7 @@ def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:
     """Restore the display settings and placements of a snapshot's actors and scene."""
     for actor, look in zip(snapshot.actors, snapshot.looks, strict=True):
         actor.visible, actor.color = look.visible, look.color
+        actor.hidden_parts = look.hidden_parts
         actor.placement = np.frombuffer(look.placement).reshape(4, 4).copy()
     kept = copy.deepcopy(snapshot.options)
     for name in DisplayOptions.__slots__:

@@ -16,11 +16,10 @@ from viewer.errors import ViewerError
 from viewer.export import export, files_written
 from viewer.formats import Source, write
 from viewer.rig.motion.upright import upright_actor
-from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.retargeting.mirror import mirror_pose
-from viewer.rig.scene import figure_pose
+from viewer.rig.scene import Actor, figure_pose
 
 __all__ = [
     "copy_numbers",
@@ -127,31 +126,41 @@ def mirror(state: AppState) -> None:
 
 
 def reset_pose(state: AppState) -> None:
-    """Reset every DOF of every actor to the rest pose of its file, but not the shapes."""
+    """Reset every actor to the pose of its file, morph targets included, but not its shape."""
     for actor in state.scene.actors:
-        if actor.figure.skeleton is not None and actor.pose is not None:
-            weights = actor.pose.shape_weights
-            actor.pose = rest_pose(actor.figure.skeleton)
-            actor.pose.shape_weights = weights
+        _reset(actor)
     state.say_status("Pose reset")
 
 
 def reset_actor(state: AppState) -> None:
-    """Reset the DOFs of the chosen actor to the file's pose; its shape stays."""
-    actor = state.actor
-    if actor.figure.skeleton is not None and actor.pose is not None:
-        weights = actor.pose.shape_weights
-        actor.pose = rest_pose(actor.figure.skeleton)
-        actor.pose.shape_weights = weights
+    """Reset the chosen actor to the file's pose, morph targets included; its shape stays."""
+    if _reset(state.actor):
         pause_for_edit(state)
 
 
+def _reset(actor: Actor) -> bool:
+    """Reset an actor to the pose of its file, and return whether it has one."""
+    figure, old = actor.figure, actor.pose
+    if figure.skeleton is None or old is None:
+        return False
+    actor.pose = figure_pose(figure)
+    groups = () if figure.blend_shapes is None else figure.blend_shapes.groups
+    # Shape coefficients belong to the person, morph targets to the pose.
+    is_kept = np.array([group != "morph" for group in groups[: len(old.shape_weights)]], bool)
+    rows = np.flatnonzero(is_kept)
+    actor.pose.shape_weights[rows] = old.shape_weights[rows]
+    return True
+
+
 def reset_joint(state: AppState, joint: int) -> None:
-    """Reset the DOFs of one joint of the chosen actor to the file's pose."""
-    actor = state.actor
-    if actor.pose is not None and actor.figure.skeleton is not None:
-        dofs = np.flatnonzero(actor.figure.skeleton.dof_joints == joint)
-        actor.pose.dofs[dofs] = actor.figure.skeleton.rest_dofs[dofs]
+    """Reset one joint of the chosen actor to the file's pose."""
+    pose, skeleton = state.actor.pose, state.actor.figure.skeleton
+    if pose is not None and skeleton is not None:
+        dofs = np.flatnonzero(skeleton.dof_joints == joint)
+        pose.dofs[dofs] = skeleton.rest_dofs[dofs]
+        pose.translations[joint] = 0.0
+        pose.rotations[joint] = skeleton.rest_rotations[joint]
+        pose.scales[joint] = skeleton.rest_scales[joint]
         pause_for_edit(state)
 
 
@@ -172,7 +181,7 @@ def random_shape(state: AppState) -> None:
 
 
 def reset_shape(state: AppState) -> None:
-    """Set every coefficient of the chosen actor to 0."""
+    """Set every coefficient of the chosen actor to that of the file."""
     actor = state.actor
     if actor.pose is not None:
         actor.pose.shape_weights = figure_pose(actor.figure).shape_weights

@@ -116,11 +116,14 @@ class Spot:
         Joint drawn at or near the pixel, else the one that moves the surface most; -1 for none.
     vertex : int
         Nearest vertex of the surface; -1 for none.
+    part : int
+        Part of the mesh; -1 for none.
     """
 
     actor: int
     joint: int
     vertex: int
+    part: int = -1
 
 
 def spot_at(
@@ -141,7 +144,17 @@ def spot_at(
         return Spot(state.chosen_actor, near, -1) if near >= 0 else None
     mover = _mover(state, pick) if pick.joint < 0 else None
     joint = pick.joint if mover is None else mover.joint
-    return Spot(pick.actor, joint, found[1] if found and found[0] == pick.actor else -1)
+    vertex = found[1] if found and found[0] == pick.actor else -1
+    return Spot(pick.actor, joint, vertex, _part_of(state, pick))
+
+
+def _part_of(state: AppState, pick: Pick) -> int:
+    """Return the part of the picked triangle; -1 for none, and in the reduced mesh."""
+    figure = state.scene.actors[pick.actor].figure
+    is_reduced = state.options.reduced and figure.reduced is not None
+    if pick.triangle < 0 or figure.mesh is None or is_reduced:
+        return -1
+    return int(figure.mesh.part_indices[pick.triangle])
 
 
 class _Mover(NamedTuple):

@@ -25,6 +25,7 @@ from viewer.diagnostics.wording import (
     meshes,
     morph,
     motion,
+    nodes,
     obj,
     pictures,
     ply,
@@ -38,7 +39,7 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, nodes),
     *(gltf_materials, archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )

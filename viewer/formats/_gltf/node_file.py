@@ -15,6 +15,8 @@ Errors name the element by its JSON pointer. Specification: Khronos Group, glTF 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from viewer.formats._gltf.animations import read_animations
 from viewer.formats._gltf.bindings import checked_bindings
 from viewer.formats._gltf.cameras import read_cameras
@@ -25,9 +27,9 @@ from viewer.formats._gltf.nodes import read_tree
 from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._nodes.content import NodeFile, NodeMesh
 from viewer.formats._source import Source
-from viewer.rig.material import Material
 
 __all__ = ["read_nodes"]
 
@@ -51,7 +53,11 @@ def read_nodes(source: Source) -> NodeFile:
     check_extensions(document)
     tree = read_tree(document)
     skins = read_skins(document)
+    materials = read_materials(document)
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
+    if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
+        meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
+        materials = (*materials, DEFAULT_MATERIAL)
     root = document.root
     return NodeFile(
         name=source.path.stem,
@@ -59,7 +65,7 @@ def read_nodes(source: Source) -> NodeFile:
         roots=shown_roots(document, tree),
         meshes=meshes,
         skins=skins,
-        materials=tuple(Material(name) for name in _names(document, "materials")),
+        materials=materials,
         animations=read_animations(document, Targets(tree, meshes)),
         cameras=read_cameras(document),
         extensions=_object(document, "extensions"),
@@ -68,9 +74,12 @@ def read_nodes(source: Source) -> NodeFile:
     )
 
 
-def _names(document: Document, name: str) -> list[str]:
-    table = document.table(name)
-    return [table[index].text("name") for index in range(len(table))]
+def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
+    """Return a mesh whose primitives without a material have this one."""
+    primitives = (
+        replace(one, material=index) if one.material < 0 else one for one in mesh.primitives
+    )
+    return replace(mesh, primitives=tuple(primitives))
 
 
 def _object(document: Document, name: str) -> dict[str, object]:

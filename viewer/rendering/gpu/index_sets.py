@@ -7,7 +7,8 @@ order of a space-filling curve it is shaded once or twice (``tests/bench/bench_i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -25,11 +26,15 @@ _CURVE_BITS = 10  # per axis
 
 @dataclass(frozen=True, slots=True)
 class MeshRun:
-    """Consecutive triangles with one material: first index, number of indices, surface."""
+    """Consecutive triangles with one material, and of one part until runs are merged.
+
+    First index, number of indices, surface, and part; -1 for several or none.
+    """
 
     first: int
     count: int
     surface: Surface
+    part: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,7 @@ class IndexSet:
     indices : moderngl.Buffer
         Indices of split vertices.
     runs : tuple of MeshRun
-        Consecutive runs, one per material.
+        Drawn runs, in the order of the buffer.
     order : (N,) int32
         Index of the given triangle at each position of the buffer.
     """
@@ -51,9 +56,32 @@ class IndexSet:
     order: Ints
 
     @property
-    def n_indices(self) -> int:
-        """Number of indices of all runs together."""
-        return 3 * len(self.order)
+    def spans(self) -> tuple[tuple[int, int], ...]:
+        """First index and number of indices of all runs; adjacent runs together."""
+        spans: list[tuple[int, int]] = []
+        for run in self.runs:
+            if spans and sum(spans[-1]) == run.first:
+                spans[-1] = spans[-1][0], spans[-1][1] + run.count
+            else:
+                spans.append((run.first, run.count))
+        return tuple(spans)
+
+    def without(self, hidden: Collection[int]) -> IndexSet:
+        """Return the same buffer without the runs of some parts; adjacent runs are merged."""
+        runs: list[MeshRun] = []
+        for run in self.runs:
+            if run.part in hidden:
+                continue
+            before = runs[-1] if runs else None
+            if (
+                before is not None
+                and before.surface is run.surface
+                and before.first + before.count == run.first
+            ):
+                runs[-1] = replace(before, count=before.count + run.count, part=-1)
+            else:
+                runs.append(run)
+        return replace(self, runs=tuple(runs))
 
     @property
     def is_blended(self) -> bool:
@@ -67,8 +95,9 @@ def index_set(
     materials: Ints,
     surfaces: list[Surface],
     positions: Floats | None = None,
+    parts: Ints | None = None,
 ) -> IndexSet:
-    """Upload triangles, sorted by material and along a space-filling curve within each.
+    """Upload triangles, sorted along a space-filling curve within each run.
 
     Parameters
     ----------
@@ -82,13 +111,22 @@ def index_set(
         Surface of each material.
     positions : (R, 3), optional
         Rest positions of the split vertices; without them triangles keep their order.
+    parts : (T,), optional
+        Part of each triangle, -1 for none.
+
+    Returns
+    -------
+    IndexSet
+        With a run for each material of each part, in the order of the file.
     """
-    edges = np.flatnonzero(np.diff(materials)) + 1
+    parts = np.full(len(triangles), -1, dtype=np.int32) if parts is None else parts
+    edges = np.flatnonzero((np.diff(materials) != 0) | (np.diff(parts) != 0)) + 1
     runs = []
     for first, last in zip([0, *edges], [*edges, len(materials)], strict=True):
         index = int(materials[first]) if len(materials) else -1
         surface = PLAIN if index < 0 else surfaces[index]
-        runs.append(MeshRun(3 * int(first), 3 * int(last - first), surface))
+        part = int(parts[first]) if len(parts) else -1
+        runs.append(MeshRun(3 * int(first), 3 * int(last - first), surface, part))
     order: Ints = np.arange(len(triangles), dtype=np.int32)
     if positions is not None and len(triangles):
         run = np.zeros(len(triangles), dtype=np.int64)

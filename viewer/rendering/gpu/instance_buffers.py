@@ -228,7 +228,8 @@ class InstanceBuffers:
     ) -> moderngl.VertexArray:
         """Return the vertex array for a program; without indices it draws single vertices."""
         mesh, skin = self.mesh, self.mesh.skin(self._how)
-        key = (id(indices), id(skin), id(self._rest.positions))
+        listed = None if indices is None else indices.indices
+        key = (id(listed), id(skin), id(self._rest.positions))
 
         def content() -> list[Any]:
             found: list[Any] = self._rest.attributes(program, skin)

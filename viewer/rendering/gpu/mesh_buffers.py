@@ -15,10 +15,12 @@ from viewer.rendering.gpu.upload import buffer, float32, offset_texture
 from viewer.rendering.part_colors import part_colors
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Mesh, bounding_box, split_seams
+from viewer.rig.mesh import Mesh, bounding_box, split_seams, visible_vertices
 from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["MeshBuffers"]
+
+_MOST_VISIBLE = 64  # combinations of hidden parts whose runs are kept
 
 
 class MeshBuffers:
@@ -61,8 +63,10 @@ class MeshBuffers:
         self.center: Floats = bounding_box(mesh.positions).mean(axis=0)
         self._owner = Owner()
         self._index_sets: dict[tuple[bool, tuple[int, ...], bool], IndexSet] = {}
+        self._visible: dict[tuple[int, frozenset[int]], IndexSet] = {}
         self._skins: dict[tuple[int, bool], SkinBuffers] = {}
         self._colors: moderngl.Buffer | None = None
+        self._shown: tuple[frozenset[int], moderngl.Buffer] | None = None
         self._offsets: moderngl.Texture | None = None
         self._product: np.ndarray | None = None
         with self._owner.guard():
@@ -95,28 +99,43 @@ class MeshBuffers:
         return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
 
     def index_set(
-        self, reduced: bool, hidden: tuple[int, ...], as_listed: bool = False
+        self,
+        reduced: bool,
+        hidden: tuple[int, ...],
+        as_listed: bool = False,
+        hidden_parts: frozenset[int] = frozenset(),
     ) -> IndexSet:
         """Return the triangles of the full or the reduced mesh, without hidden body parts.
 
         ``as_listed`` keeps the file's order, which affects how translucent edges blend.
+        ``hidden_parts`` are parts of the mesh, which are left out by drawing the other runs.
         """
         reduced = reduced and self.figure.reduced is not None
         key = (reduced, hidden, as_listed)
         if key not in self._index_sets:
             self._index_sets[key] = self._make_index_set(*key)
-        return self._index_sets[key]
+        whole = self._index_sets[key]
+        if len(self._visible) > _MOST_VISIBLE:
+            self._visible.clear()
+        found = id(whole), hidden_parts
+        if found not in self._visible:
+            self._visible[found] = whole.without(hidden_parts)
+        return self._visible[found]
 
     def _make_index_set(self, reduced: bool, hidden: tuple[int, ...], as_listed: bool) -> IndexSet:
         mesh, coarse = self.figure.require_mesh(), self.figure.reduced
         if reduced and coarse is not None:
             of_figure = coarse.vertices[coarse.triangles]
             split, materials = self.copies[of_figure], np.full(len(of_figure), -1, dtype=np.int32)
+            parts = materials
         else:
             of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
+            parts = mesh.part_indices
         kept = kept_triangles(self.figure, hidden, of_figure)
         rest = None if as_listed else mesh.positions[self.sources]
-        made = index_set(self.context, split[kept], materials[kept], self.surfaces, rest)
+        made = index_set(
+            self.context, split[kept], materials[kept], self.surfaces, rest, parts[kept]
+        )
         self._owner.keep(made.indices)
         return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
@@ -129,6 +148,18 @@ class MeshBuffers:
             buffers = SkinBuffers(self.context, used, self.sources)
             self._skins[key] = self._owner.keep(buffers)
         return self._skins[key]
+
+    def lines_shown(self, hidden_parts: frozenset[int]) -> moderngl.Buffer:
+        """Return 1 for every split vertex of a visible triangle, else 0, as float32."""
+        if self._shown is None or self._shown[0] != hidden_parts:
+            shown = visible_vertices(self.figure.require_mesh(), hidden_parts)
+            values = shown[self.sources].astype(np.float64)
+            if self._shown is None:
+                self._shown = hidden_parts, self._owner.keep(buffer(self.context, values, "f4"))
+            else:
+                self._shown[1].write(float32(values))
+                self._shown = hidden_parts, self._shown[1]
+        return self._shown[1]
 
     @property
     def is_physical(self) -> bool:

@@ -27,9 +27,9 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
     Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
-    translucent actors, and meshes that are drawn several times per frame, in the bind pose or
-    coloured by a scalar. Where back faces are culled, the actors of a group are all mirrored or all
-    not, and joints that are mirrored are drawn singly.
+    translucent actors, actors with hidden parts, and meshes that are drawn several times per
+    frame, in the bind pose or coloured by a scalar. Where back faces are culled, the actors of a
+    group are all mirrored or all not, and joints that are mirrored are drawn singly.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         return []
     groups: dict[tuple[int, bytes, bool], list[Actor]] = {}
     for actor in actors:
-        pose = actor.pose
-        if pose is None or not actor.figure.is_attached or actor.opacity != 1.0:
+        pose, is_plain = actor.pose, actor.opacity == 1.0 and not actor.hidden_parts
+        if pose is None or not actor.figure.is_attached or not is_plain:
             continue
         is_mirrored = False
         if options.cull or _has_single_sides(actor):

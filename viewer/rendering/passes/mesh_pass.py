@@ -14,7 +14,7 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.blended_order import BlendedOrder, SortedTriangles
+from viewer.rendering.passes.blended_order import SortedTriangles
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -47,7 +47,7 @@ class MeshPass:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
         self._arrays: Kept[PosedMesh, VertexArrays] = Kept()
-        self._orders: Kept[PosedMesh, BlendedOrder] = Kept()
+        self._sorted: Kept[PosedMesh, SortedTriangles] = Kept()
 
     def draw(
         self,
@@ -110,11 +110,12 @@ class MeshPass:
         blended: bool,
     ) -> IndexSet | SortedTriangles:
         """Return the triangles to draw; blended ones are sorted."""
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        indices = mesh.index_set(options)
         if not (blended and indices.is_blended):
             return indices
-        order = self._orders.get(mesh, lambda: BlendedOrder(self.context))
-        return order.sorted(mesh, indices, (view.matrix @ placement)[2, :3])
+        found = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
+        found.sort(mesh, indices, (view.matrix @ placement)[2, :3])
+        return found
 
     def draw_shape(
         self,
@@ -130,7 +131,7 @@ class MeshPass:
         program = self.programs.drawing("mesh", fragment=fragment, materials=materials)
         set_model(program, view, placement, mesh.center)
         set_uniforms(program, {"u_has_tint": has_tints(mesh.mesh, options)})
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts)
+        indices = mesh.index_set(options)
         array, is_mirrored = self.array(mesh, program, indices), mesh.is_mirrored_by(placement)
         draw_shapes(array, indices, options, fragment, prepare, is_mirrored=is_mirrored)
 
@@ -165,8 +166,10 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_EDGE_COLOR, opacity)
         self.context.wireframe = True
-        indices = mesh.mesh.index_set(options.reduced, options.hidden_parts, as_listed=True)
-        self.array(mesh, program, indices).render(moderngl.TRIANGLES)
+        indices = mesh.index_set(options, as_listed=True)
+        array = self.array(mesh, program, indices)
+        for first, count in indices.spans:
+            array.render(moderngl.TRIANGLES, vertices=count, first=first)
         self.context.wireframe = False
 
     def draw_normals(
@@ -177,7 +180,11 @@ class MeshPass:
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)
         program["u_length"] = _NORMAL_LENGTH * size
-        content = [(mesh.posed, "3f4 3f4/i", "in_position", "in_normal")]
+        shown = mesh.mesh.lines_shown(mesh.hidden_parts)
+        content = [
+            (mesh.posed, "3f4 3f4/i", "in_position", "in_normal"),
+            (shown, "f4/i", "in_shown"),
+        ]
         array = self._arrays_of(mesh).get(program, lambda: content)
         array.render(moderngl.LINES, vertices=2, instances=mesh.mesh.n_vertices)
 
@@ -201,7 +208,8 @@ class MeshPass:
                     found.append((values, layout, name))
             return found
 
-        return self._arrays_of(mesh).get(program, content, indices.indices, (id(indices),))
+        buffer = indices.indices
+        return self._arrays_of(mesh).get(program, content, buffer, (id(buffer),))
 
     def _arrays_of(self, mesh: PosedMesh) -> VertexArrays:
         return self._arrays.get(mesh, lambda: VertexArrays(self.context))
@@ -209,12 +217,12 @@ class MeshPass:
     def forget(self, mesh: PosedMesh) -> None:
         """Free the vertex arrays of a mesh that is about to be released."""
         self._arrays.drop(mesh)
-        self._orders.drop(mesh)
+        self._sorted.drop(mesh)
 
     def release(self) -> None:
         """Free all vertex arrays and index buffers."""
         self._arrays.keep_only([])
-        self._orders.keep_only([])
+        self._sorted.keep_only([])
 
 
 def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:

@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -24,6 +25,7 @@ from viewer.rendering.gpu.upload import (
     write_rigid,
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, posed_skeleton
@@ -61,6 +63,8 @@ class PosedMesh:
         Origin of the positions in figure space; part of the model matrix.
     scalars : ScalarBuffer
         Values of a scalar quantity, computed when one is shown.
+    hidden_parts : frozenset of int
+        Parts of the mesh that are not drawn.
     """
 
     def __init__(
@@ -84,7 +88,13 @@ class PosedMesh:
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
         self._is_affine = self._is_mirrored = False
+        self.hidden_parts: frozenset[int] = frozenset()
         self.n_updates = 0
+
+    def index_set(self, options: DisplayOptions, as_listed: bool = False) -> IndexSet:
+        """Return the drawn triangles; see ``MeshBuffers.index_set``."""
+        hidden = options.hidden_parts
+        return self.mesh.index_set(options.reduced, hidden, as_listed, self.hidden_parts)
 
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
         """Skin the mesh if pose or method changed since the last call.

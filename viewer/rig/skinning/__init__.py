@@ -145,8 +145,8 @@ def deform(
         raise RigError(f"figure {figure.name} has no mesh to deform")
     if how.method not in METHODS:
         raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
-    if pose is not None:
-        figure = shaped(figure, pose.shape_weights)
+    weights = figure.rest_shape_weights if pose is None else pose.shape_weights
+    figure = shaped(figure, weights)
     mesh = figure.require_mesh()
     if figure.skeleton is None or figure.skin is None:
         moved, normals = mesh.positions, unit(mesh.normals)

@@ -1,0 +1,132 @@
+"""Normals, colours, materials, blend shapes and animations of figures of files of nodes."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tests.formats.nodes.node_files import (
+    affine,
+    file_of,
+    mesh,
+    skin,
+    source,
+    tree_of,
+    triangle,
+    vertices,
+)
+from viewer.formats._nodes.content import NodeAnimation, NodeChannel, Primitive
+from viewer.formats._nodes.figures import figure_group
+from viewer.rig.material import Material
+from viewer.rig.scene import figure_pose
+from viewer.rig.skinning import deform
+
+CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+SIDES = np.array(
+    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+)
+FACES = np.concatenate([SIDES[:, [0, 1, 2]], SIDES[:, [0, 2, 3]]]).astype(np.int32)
+
+
+def figure_of(file):
+    return figure_group(file, source()).figures[0]
+
+
+def test_missing_normals_are_flat_and_coplanar_triangles_share_vertices():
+    cube = Primitive(CUBE, FACES)
+    notes = source()
+    (figure,) = figure_group(file_of(tree_of({"mesh": 0}), meshes=(mesh(cube),)), notes).figures
+    assert figure.mesh.n_vertices == 24
+    corners = figure.mesh.positions[figure.mesh.triangles]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # Unit sides: the cross product is the unit normal.
+    assert_allclose(figure.mesh.normals[figure.mesh.triangles], np.repeat(faces[:, None], 3, 1))
+    (note,) = notes.diagnostics.warnings
+    assert (note.key, note.values["vertices"]) == ("F007.flat-normals", 16)
+
+
+def test_normals_stay_perpendicular_under_a_second_skin_that_shears():
+    first = skin([0], 3)
+    second = type(first)("", first.joints, first.inverse_bind @ affine(9))
+    primitive = triangle(1, 1)
+    a, b, c = primitive.positions
+    normal = np.cross(b - a, c - a)
+    primitive = triangle(1, 1, normals=np.tile(normal, (3, 1)))
+    tree = tree_of({"name": "hip"}, {"mesh": 0, "skin": 0}, {"mesh": 0, "skin": 1})
+    figure = figure_of(file_of(tree, meshes=(mesh(primitive),), skins=(first, second)))
+    moved, normals = deform(figure)
+    for rows in (slice(0, 3), slice(3, 6)):
+        a, b, c = moved[rows]
+        assert_allclose(normals[rows] @ np.stack([b - a, c - a]).T, 0.0, atol=1e-12)
+
+
+def test_vertex_colours_and_materials_of_some_primitives_only():
+    colors = np.full((3, 4), 0.5)
+    primitives = triangle(1, colors=colors, material=2), triangle(2), triangle(3, material=0)
+    materials = tuple(Material(name) for name in "abc")
+    file = file_of(tree_of({"mesh": 0}), meshes=(mesh(*primitives),), materials=materials)
+    found = figure_of(file).mesh
+    assert [material.name for material in found.materials] == ["a", "c"]
+    assert_array_equal(found.triangle_materials, [1, -1, 0])
+    assert_array_equal(found.colors, np.concatenate([colors, np.ones((6, 4))]))
+    assert_array_equal(found.triangle_parts, 0)
+
+
+def faces_with_targets():
+    """Return a file whose two meshes have the targets smile and blink, and one of its own."""
+    random = np.random.default_rng(4)
+    face = triangle(1, 1, targets=random.normal(size=(2, 3, 3)))
+    teeth = triangle(2, 1, targets=random.normal(size=(2, 3, 3)))
+    names = {"target_names": ("smile", "blink"), "shape_weights": np.array([0.25, 0.0])}
+    tree = tree_of(
+        {"name": "hip"},
+        {"name": "face", "mesh": 0, "skin": 0},
+        {"name": "teeth", "mesh": 1, "skin": 0},
+    )
+    return tree, (mesh(face, **names), mesh(teeth, **names)), (skin([0], 3),)
+
+
+def test_targets_of_one_face_share_sliders_and_default_weights_are_the_rest_pose():
+    tree, meshes, skins = faces_with_targets()
+    file = file_of(tree, meshes=meshes, skins=skins)
+    figure = figure_of(file)
+    assert figure.blend_shapes.names == ("smile", "blink")
+    pose = figure_pose(figure)
+    assert pose.shape_weights.tolist() == [0.25, 0.0]
+    for found in (deform(figure)[0], deform(figure, pose)[0]):
+        assert_allclose(found, vertices(file), atol=1e-12)
+    pose.shape_weights[:] = 0.5, -1.5
+    wanted = vertices(file, morphs={1: pose.shape_weights, 2: pose.shape_weights})
+    assert_allclose(deform(figure, pose)[0], wanted, atol=1e-12)
+
+
+def test_animated_targets_have_sliders_of_their_own():
+    tree, meshes, skins = faces_with_targets()
+    reads = []
+
+    def channels():
+        reads.append(1)
+        times, values = np.array([0.0, 1.0]), np.array([[0.0, 1.0], [1.0, 0.5]])
+        moved = np.array([[0.0, 0, 0], [1, 0, 0]])
+        return (
+            NodeChannel(2, "weights", times, values),
+            NodeChannel(0, "translation", times, moved),
+        )
+
+    animation = NodeAnimation("talk", 0.0, 1.0, frozenset([0, 2]), channels)
+    figure = figure_of(file_of(tree, meshes=meshes, skins=skins, animations=(animation,)))
+    assert figure.blend_shapes.names == (
+        *("face.smile", "face.blink"),
+        *("teeth.smile", "teeth.blink"),
+    )
+    assert not reads
+    weights, moved = figure.animations[0].clip().channels
+    assert_array_equal(weights.shapes, [2, 3])
+    assert (moved.path, moved.joint) == ("translation", 0)
+    assert figure.animations[0].clip() is figure.animations[0].clip()
+    assert reads == [1]
+
+
+@pytest.mark.parametrize("key", ["generator", "copyright"])
+def test_asset_is_in_the_facts(key):
+    file = file_of(tree_of({"mesh": 0}), meshes=(mesh(triangle(1)),), asset={key: "somebody"})
+    assert (key, "somebody") in figure_of(file).facts

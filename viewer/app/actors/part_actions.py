@@ -1,0 +1,31 @@
+"""Actions on the parts of an actor's mesh: hide, isolate, show."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.rig.scene import Actor
+
+__all__ = ["isolate_part", "part_label", "set_part_shown", "show_all_parts"]
+
+
+def part_label(actor: Actor, part: int) -> str:
+    """Return the name of a part; its number if it has none."""
+    names = actor.figure.require_mesh().parts
+    return names[part] or f"part {part}"
+
+
+def set_part_shown(actor: Actor, part: int, shown: bool) -> None:
+    """Show or hide one part of an actor."""
+    one = frozenset({part})
+    actor.hidden_parts = actor.hidden_parts - one if shown else actor.hidden_parts | one
+
+
+def isolate_part(actor: Actor, part: int) -> None:
+    """Hide all other parts of an actor."""
+    count = len(actor.figure.require_mesh().parts)
+    actor.hidden_parts = frozenset(range(count)) - {part}
+
+
+def show_all_parts(state: AppState) -> None:
+    """Show all parts of the chosen actor."""
+    state.actor.hidden_parts = frozenset()

@@ -1,0 +1,229 @@
+"""Inverse bind matrices: one per joint, for all skins and rigid meshes of a figure.
+
+A figure has one inverse bind matrix per joint, but each skin of a file has its own, and meshes that
+hang on a node have none. Their vertices are transformed into one binding space by a matrix A with
+IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a second time,
+through an auxiliary joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.formats._nodes.content import NodeSkin
+from viewer.formats._nodes.joints import Joints, rest_worlds
+from viewer.rig.arrays import Bools, Floats, Ints
+
+__all__ = ["Bindings", "bind_rigid", "bind_skins", "inverse_binds"]
+
+# float32 rounding of the entries of a product of two matrices, relative to the largest
+_SAME = 1e-6
+# Matrices that are worse conditioned are not inverted: baking would lose more digits.
+_WORST_CONDITION = 1e5
+_MOST_CANDIDATES = 8
+
+
+@dataclass(slots=True, eq=False)
+class Bindings:
+    """The bindings of a figure so far.
+
+    Attributes
+    ----------
+    joints : Joints
+        Receives auxiliary joints.
+    worlds : (J, 4, 4)
+        Rest transforms of the nodes' joints.
+    matrices : dict of (4, 4)
+        Inverse bind matrix of each bound joint.
+    slots : dict of (M,) int32
+        Joint of each slot of a skin.
+    baked : dict of (4, 4)
+        A of each skin: mesh space to binding space.
+    rigid : dict of (int, (4, 4))
+        Joint of each node with a mesh that hangs on it, and its A.
+    """
+
+    joints: Joints
+    worlds: Floats
+    matrices: dict[int, Floats] = field(default_factory=dict)
+    slots: dict[int, Ints] = field(default_factory=dict)
+    baked: dict[int, Floats] = field(default_factory=dict)
+    rigid: dict[int, tuple[int, Floats]] = field(default_factory=dict)
+
+
+def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
+    """Bind the skins of a figure; the first determines the binding space.
+
+    Parameters
+    ----------
+    joints : Joints
+        Extended by auxiliary joints where skins disagree.
+    skins : dict of NodeSkin
+        By index in the file, in the order in which they take precedence.
+
+    Returns
+    -------
+    Bindings
+        Of the skins.
+    """
+    bindings = Bindings(joints, rest_worlds(joints))
+    for index, skin in skins.items():
+        slots = np.array([joints.carrier[node] for node in skin.joints.tolist()], dtype=np.int32)
+        baked, reach = _baked(bindings, skin.inverse_bind, slots), _reach(skin.inverse_bind)
+        wanted = skin.inverse_bind if _is_identity(baked) else skin.inverse_bind @ _inverse(baked)
+        for place, joint in enumerate(slots.tolist()):
+            known = bindings.matrices.get(joint)
+            if known is None:
+                bindings.matrices[joint] = wanted[place]
+            elif not _agree(known @ baked, skin.inverse_bind[place], reach):
+                slots[place] = extra = joints.add_auxiliary(joint)
+                bindings.matrices[extra] = wanted[place]
+        bindings.slots[index], bindings.baked[index] = slots, baked
+    return bindings
+
+
+def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
+    """Return the matrix A that most of a skin's joints agree on; else the identity."""
+    known = bindings.matrices
+    if not known:
+        return np.eye(4)
+    pairs = [
+        (known[joint], inverse_bind[place])
+        for place, joint in enumerate(slots.tolist())
+        if joint in known
+    ]
+    if not pairs:
+        return _baked_at_rest(bindings, inverse_bind, slots)
+    # A few candidates are enough: skins differ by one matrix, or in a few joints only.
+    some = pairs[:: max(1, len(pairs) // _MOST_CANDIDATES)]
+    candidates = [quotient for pair in some if (quotient := _quotient(*pair)) is not None]
+    candidates = [np.eye(4), *(each for each in candidates if _is_regular(each))]
+    reach = _reach(inverse_bind)
+    counts = [sum(_agree(one @ each, other, reach) for one, other in pairs) for each in candidates]
+    return candidates[int(np.argmax(counts))]
+
+
+def _baked_at_rest(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
+    """Return A of a skin without common joints: both are compared in the rest pose."""
+    first = next(iter(bindings.matrices))
+    space = _inverse_or_none(bindings.worlds[first] @ bindings.matrices[first])
+    rests = bindings.worlds[slots] @ inverse_bind
+    reach = _reach(rests)
+    if space is None or not all(_agree(rests[0], rest, reach) for rest in rests):
+        return np.eye(4)
+    baked = space @ rests[0]
+    is_usable = _is_regular(baked) and not _agree(baked, np.eye(4), reach)
+    return baked if is_usable else np.eye(4)
+
+
+def _quotient(known: Floats, wanted: Floats) -> Floats | None:
+    """Return A with IBM[j] A = IBM_s[j]; None if IBM[j] is singular."""
+    inverse = _inverse_or_none(known)
+    return None if inverse is None else inverse @ wanted
+
+
+def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
+    """Bind the meshes that hang on nodes, in binding space if the matrices can be inverted.
+
+    Parameters
+    ----------
+    bindings : Bindings
+        Extended by the nodes.
+    nodes : list of int
+        Nodes with such a mesh.
+    """
+    if not nodes:
+        return
+    above = _bound_ancestors(bindings)
+    for node in nodes:
+        joint = bindings.joints.carrier[node]
+        baked = _rigid_matrix(bindings, joint, above[joint])
+        if baked is None:
+            joint, baked = bindings.joints.add_auxiliary(joint), np.eye(4)
+            bindings.matrices[joint] = np.eye(4)
+        bindings.rigid[node] = joint, baked
+
+
+def _rigid_matrix(bindings: Bindings, joint: int, above: int) -> Floats | None:
+    """Return A of a mesh on a joint, and bind the joint; None if a matrix is singular.
+
+    In the rest pose the mesh is where its nearest bound ancestor puts it.
+    """
+    known = bindings.matrices.get(joint)
+    if known is not None:
+        return _inverse_or_none(known)
+    baked = bindings.worlds[joint]
+    if above >= 0:
+        space = _inverse_or_none(bindings.worlds[above] @ bindings.matrices[above])
+        baked = baked if space is None else space @ baked
+    matrix = _inverse_or_none(baked)
+    if matrix is None:
+        return None
+    bindings.matrices[joint] = matrix
+    return baked
+
+
+def _bound_ancestors(bindings: Bindings) -> list[int]:
+    """Return the nearest bound ancestor of each joint, else the first bound joint, else -1."""
+    first = next(iter(bindings.matrices), -1)
+    above: list[int] = []
+    for joint, parent in enumerate(bindings.joints.parents):
+        inherited = above[parent] if parent >= 0 else first
+        above.append(joint if joint in bindings.matrices else inherited)
+    return above
+
+
+def inverse_binds(bindings: Bindings) -> Floats:
+    """Return the inverse bind matrix of every joint: (J, 4, 4).
+
+    Joints without influence are bound in the rest pose, or by the identity if that is singular.
+    """
+    worlds = rest_worlds(bindings.joints)
+    above = np.array(_bound_ancestors(bindings))
+    result = np.tile(np.eye(4), (len(worlds), 1, 1))
+    for joint, matrix in bindings.matrices.items():
+        result[joint] = matrix
+    spaces = np.where(above[:, None, None] >= 0, worlds[above] @ result[above], np.eye(4))
+    free = np.ones(len(worlds), dtype=np.bool_)
+    free[list(bindings.matrices)] = False
+    free &= _is_regular(worlds)
+    result[free] = _inverse(worlds[free]) @ spaces[free]
+    return result
+
+
+def _agree(one: Floats, other: Floats, reach: float) -> bool:
+    """Return whether two matrices are equal within float32 rounding; translations of ``reach``."""
+    linear, moved = np.abs(one - other)[:3, :3].max(), np.abs(one - other)[:3, 3].max()
+    return bool(linear <= _SAME * np.abs(one[:3, :3]).max() and moved <= _SAME * reach)
+
+
+def _reach(matrices: Floats) -> float:
+    """Return the largest component of the translations of some matrices."""
+    return float(np.abs(matrices[:, :3, 3]).max(initial=0.0))
+
+
+def _is_identity(matrix: Floats) -> bool:
+    return np.array_equal(matrix, np.eye(4))
+
+
+def _inverse(matrices: Floats) -> Floats:
+    """Return the inverses of affine matrices, whose last rows stay exact: (..., 4, 4)."""
+    inverses = np.zeros_like(matrices)
+    inverses[..., 3, 3] = 1.0
+    inverses[..., :3, :3] = np.linalg.inv(matrices[..., :3, :3])
+    inverses[..., :3, 3:] = -inverses[..., :3, :3] @ matrices[..., :3, 3:]
+    return inverses
+
+
+def _is_regular(matrices: Floats) -> Bools:
+    """Return which affine matrices can be inverted without losing many digits."""
+    scales = np.linalg.svd(matrices[..., :3, :3], compute_uv=False)
+    regular: Bools = scales[..., 0] < _WORST_CONDITION * scales[..., 2]
+    return regular
+
+
+def _inverse_or_none(matrix: Floats) -> Floats | None:
+    """Return the inverse of an affine matrix; None if it is singular or nearly so."""
+    return _inverse(matrix) if _is_regular(matrix) else None

@@ -1,0 +1,113 @@
+"""Figures made of the contents of a file of nodes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from viewer.formats._nodes.bindings import bind_rigid, bind_skins, inverse_binds
+from viewer.formats._nodes.content import NodeFile
+from viewer.formats._nodes.facts import facts_of
+from viewer.formats._nodes.grouping import Members, group_nodes, is_skinned, scene_order
+from viewer.formats._nodes.joints import make_joints, skeleton_of
+from viewer.formats._nodes.motions import Reader, animations_of, read_once
+from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
+from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
+from viewer.formats._nodes.views import views_of
+from viewer.rig.figure import Figure
+from viewer.rig.figure_group import FigureGroup
+
+if TYPE_CHECKING:
+    from viewer.formats._source import Source
+
+__all__ = ["figure_group"]
+
+_MOST_VERTICES = 1 << 27
+
+
+def figure_group(file: NodeFile, source: Source) -> FigureGroup:
+    """Return the figures and cameras of a file of nodes.
+
+    Figure space is the space of the file's scene. Every node that matters is a ball joint about
+    its rest; see ``group_nodes`` for the division into figures.
+
+    Parameters
+    ----------
+    file : NodeFile
+        As read.
+    source : Source
+        Receives notes.
+
+    Raises
+    ------
+    FormatError
+        If the file has nothing to show, or more vertices than fit into memory.
+    """
+    groups = group_nodes(file)
+    if not groups:
+        raise source.fault("F002.no-figure")
+    _check_vertices(file, groups, source)
+    readers = read_once(file.animations)
+    found = [_figure(file, members, readers) for members in groups]
+    _note_normals([piece for _, pieces in found for piece in pieces], source)
+    _note_weights([piece for _, pieces in found for piece in pieces], source)
+    views, left_out = views_of(file.tree, scene_order(file), file.cameras)
+    if left_out:
+        source.warn("F007.orthographic", names=left_out)
+    return FigureGroup(file.name, tuple(figure for figure, _ in found), views)
+
+
+def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Figure, list[Piece]]:
+    """Return one figure, and the primitives that it consists of."""
+    joints = make_joints(file.tree, members.nodes)
+    bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
+    bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
+    pieces = pieces_of(file, members.meshes, bindings)
+    columns = shape_columns(file, members.meshes)
+    figure = Figure(
+        name=members.name or file.name,
+        mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
+        skeleton=skeleton_of(joints),
+        skin=skin_of(pieces, inverse_binds(bindings)) if pieces else None,
+        up=file.up,
+        unit=file.unit,
+        blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
+        facts=facts_of(file, pieces),
+        animations=animations_of(file.animations, readers, joints.own, columns),
+    )
+    return figure, pieces
+
+
+def _is_skinned(file: NodeFile, node: int) -> bool:
+    return is_skinned(file.meshes[int(file.tree.meshes[node])], int(file.tree.skins[node]))
+
+
+def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
+    """Refuse a file whose meshes, repeated by many nodes, would fill the memory."""
+    sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
+    meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
+    count = sum(sizes[mesh] for mesh in meshes)
+    if count > _MOST_VERTICES:
+        raise source.fault("F002.many-vertices", most=_MOST_VERTICES, found=count)
+
+
+def _note_normals(pieces: list[Piece], source: Source) -> None:
+    """Record which primitives have no normals, and how many vertices flat shading adds."""
+    split = [piece for piece in pieces if piece.shading == "flat"]
+    added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
+    if added:
+        source.warn("F007.flat-normals", n=len(split), vertices=added)
+    smooth = [piece for piece in pieces if piece.shading == "smooth"]
+    if smooth:
+        source.warn("F007.smooth-normals", n=len(smooth))
+
+
+def _note_weights(pieces: list[Piece], source: Source) -> None:
+    """Record sums of weights that are not 1, and vertices without weights."""
+    influences = [piece.influences for piece in pieces]
+    deviating = sum(each.n_deviating for each in influences)
+    if deviating:
+        most = max(each.deviation for each in influences)
+        source.warn("F007.weight-sums", n=deviating, most=most)
+    unbound = sum(each.n_unbound for each in influences)
+    if unbound:
+        source.warn("F007.no-weights", n=unbound)

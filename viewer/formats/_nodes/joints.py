@@ -1,0 +1,169 @@
+"""Joints made of nodes, with auxiliary joints where a node shears or has a second binding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.formats._nodes.content import NodeTree
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["Joints", "make_joints", "rest_worlds", "sheared", "skeleton_of"]
+
+_NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(slots=True, eq=False)
+class Joints:
+    """The joints of a figure while its skeleton is made.
+
+    Attributes
+    ----------
+    nodes : list of int
+        Node of each joint; -1 for auxiliary joints.
+    names, parents, translations, rotations, scales : list
+        As in ``Skeleton``.
+    own : dict of int
+        Joint of each node: the one that its animation moves.
+    carrier : dict of int
+        Joint with the whole transform of each node, which children and meshes follow; an
+        auxiliary joint below its own if the node shears.
+    """
+
+    nodes: list[int] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    parents: list[int] = field(default_factory=list)
+    translations: list[Floats] = field(default_factory=list)
+    rotations: list[Floats] = field(default_factory=list)
+    scales: list[Floats] = field(default_factory=list)
+    own: dict[int, int] = field(default_factory=dict)
+    carrier: dict[int, int] = field(default_factory=dict)
+
+    def add(
+        self,
+        node: int,
+        name: str,
+        parent: int,
+        translation: Floats,
+        rotation: Floats,
+        scale: Floats,
+    ) -> int:
+        """Append a joint and return its index."""
+        self.nodes.append(node)
+        self.names.append(name)
+        self.parents.append(parent)
+        self.translations.append(translation)
+        self.rotations.append(rotation)
+        self.scales.append(scale)
+        return len(self.nodes) - 1
+
+    def add_auxiliary(self, parent: int, rotation: Floats = _NO_ROTATION) -> int:
+        """Append a joint that the file does not have, at the origin of its parent."""
+        return self.add(-1, "", parent, np.zeros(3), rotation, np.ones(3))
+
+
+def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
+    """Return joints for some nodes.
+
+    A matrix that shears, M = U S V^T, becomes two joints: T R(U) S(S), and R(V^T) below it.
+
+    Parameters
+    ----------
+    tree : NodeTree
+        All nodes of the file.
+    nodes : list of int
+        Nodes that become joints, parents first.
+
+    Returns
+    -------
+    Joints
+        One per node, and the auxiliary ones of nodes that shear.
+    """
+    joints = Joints()
+    parents = tree.parents.tolist()
+    for node in nodes:
+        parent = joints.carrier.get(parents[node], -1)
+        if node in tree.matrices:
+            _add_sheared(joints, node, tree.names[node], parent, tree.matrices[node])
+            continue
+        joint = joints.add(
+            node,
+            tree.names[node],
+            parent,
+            tree.translations[node],
+            tree.rotations[node],
+            tree.scales[node],
+        )
+        joints.own[node] = joints.carrier[node] = joint
+    return joints
+
+
+def _add_sheared(joints: Joints, node: int, name: str, parent: int, matrix: Floats) -> None:
+    """Add the two joints of a node that shears."""
+    left, scales, right = sheared(matrix[:3, :3])
+    rotation, below = matrix_to_quaternion(np.stack([left, right]))
+    own = joints.add(node, name, parent, matrix[:3, 3], rotation, scales)
+    joints.own[node] = own
+    joints.carrier[node] = joints.add_auxiliary(own, below)
+
+
+def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return rotations U, V^T and factors S with U S V^T = M; a reflection is in a negative factor.
+
+    Parameters
+    ----------
+    linear : (3, 3)
+        M.
+
+    Returns
+    -------
+    left, scales, right : (3, 3), (3,), (3, 3)
+        U, the diagonal of S, and V^T.
+    """
+    left, scales, right = np.linalg.svd(linear)
+    if np.linalg.det(left) < 0.0:
+        left[:, 2] *= -1.0
+        scales[2] *= -1.0
+    if np.linalg.det(right) < 0.0:
+        right[2] *= -1.0
+        scales[2] *= -1.0
+    return left, scales, right
+
+
+def rest_worlds(joints: Joints) -> Floats:
+    """Return the rest transforms of all joints, to figure space: (J, 4, 4)."""
+    local = np.zeros((len(joints.nodes), 4, 4))
+    local[:, 3, 3] = 1.0
+    local[:, :3, 3] = joints.translations
+    rotations = quaternion_to_matrix(np.array(joints.rotations))
+    local[:, :3, :3] = rotations * np.array(joints.scales)[:, None, :]
+    return forward_kinematics(np.array(joints.parents, dtype=np.int32), local)
+
+
+def skeleton_of(joints: Joints) -> Skeleton:
+    """Return the skeleton: every joint of the file is a ball joint about its rest, without limits.
+
+    Returns
+    -------
+    Skeleton
+        With J joints, of which the auxiliary ones have no DOFs.
+    """
+    is_auxiliary = np.array(joints.nodes) < 0
+    balls = np.flatnonzero(~is_auxiliary).astype(np.int32)
+    count = 3 * len(balls)
+    return Skeleton(
+        names=tuple(joints.names),
+        parents=np.array(joints.parents, dtype=np.int32),
+        rest_translations=np.array(joints.translations),
+        rest_rotations=np.array(joints.rotations),
+        rest_scales=np.array(joints.scales),
+        dof_joints=np.repeat(balls, 3),
+        dof_kinds=np.tile(np.arange(3, 6, dtype=np.int32), len(balls)),
+        rest_dofs=np.zeros(count),
+        dof_limits=np.tile([-np.inf, np.inf], (count, 1)),
+        auxiliary=is_auxiliary if is_auxiliary.any() else None,
+    )

@@ -1,0 +1,93 @@
+"""Animations of a file of nodes, as those of its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from viewer.formats._nodes.content import NodeAnimation, NodeChannel
+from viewer.rig.arrays import Ints
+from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
+
+__all__ = ["animations_of", "read_once"]
+
+Reader = Callable[[], tuple[NodeChannel, ...]]
+
+
+def read_once(animations: tuple[NodeAnimation, ...]) -> list[Reader]:
+    """Return functions that return the channels of each animation, which are read only once."""
+    return [_once(animation.read) for animation in animations]
+
+
+def _once(read: Reader) -> Reader:
+    kept: list[tuple[NodeChannel, ...]] = []
+
+    def channels() -> tuple[NodeChannel, ...]:
+        if not kept:
+            kept.append(read())
+        return kept[0]
+
+    return channels
+
+
+def animations_of(
+    animations: tuple[NodeAnimation, ...],
+    readers: list[Reader],
+    joints: Mapping[int, int],
+    columns: Mapping[int, Ints],
+) -> tuple[Animation, ...]:
+    """Return the animations that move a joint or blend shape of a figure, in file order.
+
+    Parameters
+    ----------
+    animations : tuple of NodeAnimation
+        Those of the file.
+    readers : list of callable
+        From ``read_once``; shared by all figures.
+    joints : mapping of int
+        Joint of each node.
+    columns : mapping of (S,) int32
+        Blend shapes of each node's morph targets.
+    """
+    return tuple(
+        Animation(animation.name, animation.start, animation.end, _clip(animation, read))
+        for animation, read in zip(animations, _bound(readers, joints, columns), strict=True)
+        if any(node in joints or node in columns for node in animation.nodes)
+    )
+
+
+def _bound(
+    readers: list[Reader], joints: Mapping[int, int], columns: Mapping[int, Ints]
+) -> list[Callable[[], tuple[TransformChannel, ...]]]:
+    """Return functions that return the channels of one figure."""
+
+    def bound(read: Reader) -> Callable[[], tuple[TransformChannel, ...]]:
+        return lambda: tuple(
+            moved for channel in read() if (moved := _channel(channel, joints, columns)) is not None
+        )
+
+    return [bound(read) for read in readers]
+
+
+def _clip(
+    animation: NodeAnimation, channels: Callable[[], tuple[TransformChannel, ...]]
+) -> Callable[[], TransformClip]:
+    return lambda: TransformClip(animation.name, channels(), animation.start, animation.end)
+
+
+def _channel(
+    channel: NodeChannel, joints: Mapping[int, int], columns: Mapping[int, Ints]
+) -> TransformChannel | None:
+    """Return a channel of a joint or of blend shapes; None if it moves another figure."""
+    is_shape = channel.path == "weights"
+    if channel.node not in (columns if is_shape else joints):
+        return None
+    return TransformChannel(
+        -1 if is_shape else joints[channel.node],
+        channel.path,
+        channel.times,
+        channel.values,
+        channel.interpolation,
+        channel.tangents,
+        columns[channel.node] if is_shape else None,
+    )

@@ -1,0 +1,194 @@
+"""One mesh and skin made of all meshes of a figure, in its binding space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from viewer.formats._nodes.bindings import Bindings
+from viewer.formats._nodes.content import NodeFile, Primitive
+from viewer.formats._nodes.flat_normals import flat_shaded
+from viewer.formats._nodes.influences import Influences, divided, of_rows, on_joint
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.transform import apply_transform
+from viewer.rig.mesh import Mesh
+from viewer.rig.skin import Skin
+
+__all__ = ["Piece", "mesh_of", "pieces_of", "skin_of"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A primitive of the mesh of one node, as part of a figure.
+
+    Attributes
+    ----------
+    node, part : int
+        Its node, and the index of its part.
+    primitive : Primitive
+        As in the file.
+    baked : (4, 4)
+        Mesh space to binding space.
+    influences : Influences
+        Of the V vertices.
+    sources : (V,) int32
+        Vertex of the primitive that each vertex is a copy of: flat shading splits vertices.
+    triangles : (T, 3) int32
+        Of the piece's vertices, counter-clockwise from outside in binding space.
+    normals : (V, 3)
+        Mesh space.
+    shading : "file", "flat" or "smooth"
+        Origin of the normals.
+    """
+
+    node: int
+    part: int
+    primitive: Primitive
+    baked: Floats
+    influences: Influences
+    sources: Ints
+    triangles: Ints
+    normals: Floats
+    shading: str
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, V."""
+        return len(self.sources)
+
+
+def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piece]:
+    """Return the primitives of a figure, part by part.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its meshes and skins.
+    nodes : list of int
+        Nodes with a mesh; each is a part.
+    bindings : Bindings
+        Of all their skins, and of the nodes themselves where a skin does not move their mesh.
+    """
+    pieces = []
+    for part, node in enumerate(nodes):
+        skin = int(file.tree.skins[node])
+        for primitive in file.meshes[int(file.tree.meshes[node])].primitives:
+            if len(primitive.triangles) == 0:
+                continue
+            if skin >= 0 and primitive.joints is not None:
+                baked = bindings.baked[skin]
+                influences = divided(primitive, bindings.slots[skin])
+            else:
+                joint, baked = bindings.rigid[node]
+                influences = on_joint(len(primitive.positions), joint)
+            pieces.append(_piece(node, part, primitive, baked, influences))
+    return pieces
+
+
+def _piece(
+    node: int, part: int, primitive: Primitive, baked: Floats, influences: Influences
+) -> Piece:
+    """Return one piece; triangles that a reflection reverses are turned over again."""
+    sources = np.arange(len(primitive.positions), dtype=np.int32)
+    triangles, normals, shading = primitive.triangles, primitive.normals, "file"
+    if normals is None:
+        sources, triangles, normals, is_flat = flat_shaded(primitive.positions, triangles)
+        shading = "flat" if is_flat else "smooth"
+        if is_flat:
+            split = of_rows(influences, sources)
+            influences = _counted_as(split, influences)
+    if np.linalg.det(baked[:3, :3]) < 0.0:
+        triangles = triangles[:, ::-1]
+    return Piece(node, part, primitive, baked, influences, sources, triangles, normals, shading)
+
+
+def _counted_as(split: Influences, whole: Influences) -> Influences:
+    """Return the influences of split vertices, with the findings about the file's vertices."""
+    found = whole.deviation, whole.n_deviating, whole.n_unbound
+    return Influences(split.counts, split.joints, split.weights, *found)
+
+
+def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
+    """Return the mesh of a figure; what only some primitives have is filled with neutral values.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its meshes and materials.
+    nodes : list of int
+        Nodes with a mesh, one per part.
+    pieces : list of Piece
+        Their primitives.
+    """
+    firsts = np.cumsum([0, *(piece.n_vertices for piece in pieces)])
+    starts = zip(pieces, firsts, strict=False)
+    triangles = np.concatenate([piece.triangles + first for piece, first in starts])
+    counts = [len(piece.triangles) for piece in pieces]
+    used = sorted({piece.primitive.material for piece in pieces} - {-1})
+    slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
+    uv_sets = _uv_sets(pieces)
+    return Mesh(
+        positions=np.concatenate([_positions(piece) for piece in pieces]),
+        normals=np.concatenate([_normals(piece) for piece in pieces]),
+        triangles=triangles.astype(np.int32),
+        uvs=uv_sets[0] if uv_sets else None,
+        other_uvs=uv_sets[1:],
+        colors=_filled(pieces, lambda primitive: primitive.colors, np.ones(4)),
+        materials=tuple(file.materials[material] for material in used),
+        triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
+        parts=tuple(part_name(file, node) for node in nodes),
+        triangle_parts=np.repeat([piece.part for piece in pieces], counts),
+    )
+
+
+def part_name(file: NodeFile, node: int) -> str:
+    """Return the name of a node's part: that of the node, else of its mesh."""
+    return file.tree.names[node] or file.meshes[int(file.tree.meshes[node])].name
+
+
+def _positions(piece: Piece) -> Floats:
+    return apply_transform(piece.baked, piece.primitive.positions[piece.sources])
+
+
+def _normals(piece: Piece) -> Floats:
+    """Return the normals in binding space, n' = A^-T n."""
+    return piece.normals @ np.linalg.inv(piece.baked[:3, :3])
+
+
+def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
+    """Return all sets of texture coordinates, 0 for primitives that do not have a set."""
+    count = max(len(piece.primitive.uvs) for piece in pieces)
+    found = (_filled(pieces, partial(_uv_set, index), np.zeros(2)) for index in range(count))
+    return tuple(uvs for uvs in found if uvs is not None)
+
+
+def _uv_set(index: int, primitive: Primitive) -> Floats | None:
+    return primitive.uvs[index] if index < len(primitive.uvs) else None
+
+
+def _filled(
+    pieces: list[Piece], values_of: Callable[[Primitive], Floats | None], neutral: Floats
+) -> Floats | None:
+    """Return values per vertex, neutral where a primitive has none; None if none has any."""
+    given = [values_of(piece.primitive) for piece in pieces]
+    if all(values is None for values in given):
+        return None
+    rows = [
+        np.tile(neutral, (piece.n_vertices, 1)) if values is None else values[piece.sources]
+        for piece, values in zip(pieces, given, strict=True)
+    ]
+    return np.concatenate(rows)
+
+
+def skin_of(pieces: list[Piece], inverse_bind: Floats) -> Skin:
+    """Return the skin of a figure."""
+    counts = np.concatenate([piece.influences.counts for piece in pieces])
+    return Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.concatenate([piece.influences.joints for piece in pieces]),
+        weights=np.concatenate([piece.influences.weights for piece in pieces]),
+        inverse_bind=inverse_bind,
+    )

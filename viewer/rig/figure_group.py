@@ -1,0 +1,37 @@
+"""Figures of one file, which keep their places relative to each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from viewer.errors import RigError
+from viewer.rig.figure import Figure
+
+if TYPE_CHECKING:
+    from viewer.rig.captures.camera_view import CameraView
+
+__all__ = ["FigureGroup"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FigureGroup:
+    """All figures of a file, in one common space, and its cameras.
+
+    Attributes
+    ----------
+    name : str
+        Title of the file.
+    figures : tuple of Figure
+        At least one; all have the same up axis and unit.
+    views : tuple of CameraView
+        Cameras of the file, in the space of the figures.
+    """
+
+    name: str
+    figures: tuple[Figure, ...]
+    views: tuple[CameraView, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.figures:
+            raise RigError(f"{self.name}: expected at least one figure, found none")
