@@ -14,7 +14,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import Source
-from viewer.formats._numbers import to_number
+from viewer.formats._text.numbers import to_number
 from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats

@@ -146,6 +146,12 @@ FORMATS = {
         rb"\AglTF|\A\{(?s:.*?)\"asset\"\s*:\s*\{",
         writes=False,
     ),
+    "fbx": Format(
+        "FBX",
+        (".fbx",),
+        rb"\AKaydara FBX Binary|\A;\s*FBX|\A(?s:.{0,2000}?)FBXHeaderExtension\s*:",
+        writes=False,
+    ),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Bytes
 __all__ = ["load_image", "read_picture"]
 
 
-def load_image(source: Source, name: str, offset: int) -> Bytes | None:
+def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | None:
     """Return a texture's pixels, or None with a warning that gives its resolved path.
 
     Parameters
@@ -20,8 +20,8 @@ def load_image(source: Source, name: str, offset: int) -> Bytes | None:
         File that references the image.
     name : str
         Name of the image, which must lie below that file's folder, see ``referenced_path``.
-    offset : int
-        Offset of the name in the file.
+    offset : int or str, optional
+        Offset of the name in the file, or a JSON pointer, if known.
 
     Returns
     -------

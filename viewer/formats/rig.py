@@ -15,9 +15,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.formats._numbers import to_number
 from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import to_number
 
 __all__ = ["NamedFiles", "read"]
 

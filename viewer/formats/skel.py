@@ -22,10 +22,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Part, Phrase
-from viewer.formats._numbers import is_infinite, is_number, to_number
 from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
 from viewer.formats._source import Source
-from viewer.formats._words import number_key
+from viewer.formats._text.numbers import is_infinite, is_number, to_number
+from viewer.formats._text.words import number_key
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.posing.dof_text import beyond_text

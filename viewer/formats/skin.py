@@ -26,7 +26,6 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
 from viewer.formats._neutral import neutral_positions
-from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
     check_mesh,
@@ -39,6 +38,7 @@ from viewer.formats._skin.checks import (
 )
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.formats._texture import load_image
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text

@@ -20,7 +20,6 @@ from viewer.diagnostics import Phrase
 from viewer.formats._archive.checking import archive_of, corners_of, finite
 from viewer.formats._archive.values import Archive, Opaque, Sparse, describe
 from viewer.formats._neutral import neutral_positions
-from viewer.formats._numbers import LARGEST
 from viewer.formats._smpl.parts import (
     IGNORED,
     model_hands,
@@ -30,6 +29,7 @@ from viewer.formats._smpl.parts import (
     model_uvs,
 )
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints

@@ -80,6 +80,8 @@ class Lighting:
         if not of_actors:
             return
         self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
+        # The joints of a figure may all be in one place.
+        self._size = self._size or casters.largest_mesh()
         if options.has_shadows and self._size > 0.0:
             self._spheres, (axes, height) = np.concatenate(of_actors), _ground(up, box)
             self._contact = self._contact_pass.draw(
@@ -117,7 +119,7 @@ class Lighting:
                 casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
             )
             # The shadows of the passes are offset on the ground: they must overlap.
-            blur = _BLUR * self._size if n_passes(options) > 1 else 0.0
+            blur = _BLUR * casters.largest_mesh() if n_passes(options) > 1 else 0.0
             shadow = replace(shadow, angle=2.0 * math.pi * sample.phase, blur=blur)
         if options.quality == "final" and self._size > 0.0:
             occlusion = self._occlusion_pass(size).draw(

@@ -88,7 +88,7 @@ def test_align_button_describes_what_it_does(rigging, monkeypatch, fits):
     for label, words in (
         (
             "Align",
-            "finds the best placement by closest points" + also.format(", or all of it stretched,"),
+            "find the best placement by closest points" + also.format(", or all of it stretched,"),
         ),
         ("Refine", "from its current placement, by closest points" + also.format("")),
     ):

@@ -154,7 +154,7 @@ def _draw_head(state: AppState) -> None:
 
 
 def _show_angles(state: AppState, in_degrees: bool) -> None:
-    """Set the unit of angles; curves are fitted again because the scale of their axis changes."""
+    """Set the unit of angles; curves are fitted again because the scale of the axis changes."""
     state.of(Curves).wants_fit |= in_degrees != state.in_degrees
     state.in_degrees = in_degrees
 
@@ -216,7 +216,7 @@ def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool
                 listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
                 if has_own:
                     listed.append((joint, OWN_NUMBERS, depths[joint] + 1))
-    # Parents come before children in a skeleton, but not always right before them.
+    # Parents come before their children in a skeleton, but not always immediately before.
     place = np.argsort(depth_first(skeleton.parents)).tolist()
     return tuple(sorted(listed, key=lambda row: place[row[0]]))
 
@@ -312,7 +312,7 @@ def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> fl
 
 
 def _reach(state: AppState) -> float:
-    """Return the range of sliders without limits for translations: the size of the scene."""
+    """Return the range of sliders for unlimited translations: the size of the scene."""
     return box_size(state.box) or 1.0
 
 

@@ -29,7 +29,7 @@ __all__ = [
 
 
 def choose_tool(state: AppState, tool: str) -> None:
-    """Choose a tool, a key of ``TOOLS``, and show its hint, or why it is disabled."""
+    """Choose a tool, a key of ``TOOLS``, and show a hint, or the reason why it is disabled."""
     why = no_tool(state)
     if tool != "select" and why:
         state.say_status(f"{TOOLS[tool][0]}: {why}")
@@ -42,7 +42,7 @@ def choose_tool(state: AppState, tool: str) -> None:
 
 
 def next_orientation(state: AppState) -> None:
-    """Switch to the next of local, parent and world axes."""
+    """Switch to the next orientation: local, parent or world axes."""
     posing = state.of(Posing)
     names = list(ORIENTATIONS)
     following = names[(names.index(posing.orientation) + 1) % len(names)]
@@ -69,7 +69,7 @@ def key_pose_now(state: AppState) -> None:
 
 
 def selected(state: AppState) -> PosedJoint | None:
-    """Return the selected joint in the scene, None if there is none that can be posed."""
+    """Return the selected joint in the scene; None if there is none that can be posed."""
     actor = state.actor
     if not actor.is_drawn or state.options.show == "binding":
         return None

@@ -36,7 +36,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
     Parameters
     ----------
     state : AppState
-        State that the tools act on.
+        State to which the tools apply.
     legend : Rect or None
         Rectangle of the legend: the tools are placed below it if there is no room next to it.
     """
@@ -82,7 +82,7 @@ def _draw_tools(state: AppState) -> None:
 
 
 def _item_width(count: int) -> float:
-    """Return the width of each of several widgets in a row: all rows are equally wide."""
+    """Return the width of each of several widgets in a row; all rows have the same width."""
     spacing = imgui.get_style().item_spacing.x
     return (_WIDTH * imgui.get_font_size() - spacing * (count - 1)) / count
 

@@ -16,7 +16,7 @@ _WIDEST, _HIGHEST = 320, 200  # pixels
 
 
 class Preview:
-    """Draws the preview into a texture whenever something about it changes.
+    """Draws the preview into a texture whenever the preview changes.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Preview:
         Parameters
         ----------
         state : AppState
-            The state, with the settings; receives the texture.
+            State with the settings; receives the texture.
         key : object
             Identifies the image of the view.
         """
@@ -69,7 +69,7 @@ class Preview:
         return int(target.texture.glo)
 
     def release(self) -> None:
-        """Release everything, as when the window is closed."""
+        """Release all resources, as when the window is closed."""
         self._drawn = None
         self._release_target()
         if self._renderer is not None:

@@ -93,7 +93,7 @@ def _draw_surface(state: AppState) -> None:
         for name in ("metallic", "roughness"):
             value = slider(state, name.capitalize(), getattr(options, name), 0.0, 1.0, flags=_CLAMP)
             setattr(options, name, value)
-            explain("Of materials that do not state it")
+            explain("for materials that do not specify it")
 
 
 def _draw_bones(state: AppState, why: str) -> None:
@@ -130,7 +130,7 @@ def _draw_joint_toggles(state: AppState) -> None:
 
 
 def _draw_extras(state: AppState) -> None:
-    """Draw settings that only some figures have: colours, keypoints, a reduced mesh, body parts."""
+    """Draw settings that apply only to some figures: colours, keypoints, meshes, body parts."""
     options, figure = state.options, state.actor.figure
     if any(one.figure.mesh and one.figure.mesh.colors is not None for one in state.scene.actors):
         options.vertex_colors = checkbox(state, "Vertex colours", options.vertex_colors)
@@ -165,7 +165,7 @@ def _draw_parts(state: AppState, parts: BodyParts) -> None:
 
 
 def _beside(text: str) -> None:
-    """Place a check box with this text in the right half of the last one's line if it fits."""
+    """Place a check box with this text in the right half of the last line if it fits."""
     start, room = imgui.get_cursor_screen_pos().x, imgui.get_content_region_avail().x
     gap = imgui.get_style().item_spacing.x
     begins_free = imgui.get_item_rect_max().x + gap <= start + room * 0.5
@@ -174,7 +174,7 @@ def _beside(text: str) -> None:
 
 
 def _draw_background(state: AppState) -> None:
-    """Draw the choice of a background, with its colour if it is plain."""
+    """Draw the choice of a background, and its colour if it is plain."""
     options = state.options
     is_color = options.background.startswith("#")
     chosen = choice(state, "Background", "#" if is_color else options.background, _BACKGROUNDS)

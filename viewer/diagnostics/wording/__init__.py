@@ -17,6 +17,7 @@ from viewer.diagnostics.wording import (
     comparison,
     easymocap,
     export,
+    fbx,
     gltf,
     gltf_materials,
     joints,
@@ -39,7 +40,7 @@ from viewer.diagnostics.wording import (
 )
 
 TABLES = (
-    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, nodes),
+    *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
     *(gltf_materials, archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )

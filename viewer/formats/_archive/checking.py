@@ -11,8 +11,8 @@ from viewer.diagnostics import Part, Phrase
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
 from viewer.formats._neutral import held_rows, neutral_corners
-from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["archive_of", "are_indices", "corners_of", "finite"]

@@ -8,9 +8,9 @@ from typing import Any
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
-from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._words import number_key
+from viewer.formats._text.numbers import to_number
+from viewer.formats._text.words import number_key
 
 __all__ = ["CHANNELS", "BvhJoint", "Hierarchy", "called", "read_hierarchy"]
 

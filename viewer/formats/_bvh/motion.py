@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._neutral import held_rows
-from viewer.formats._numbers import parse_numbers, to_number
 from viewer.formats._source import Source
-from viewer.formats._words import Words, number_key, read_words, refuse_words
+from viewer.formats._text.numbers import parse_numbers, to_number
+from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["Motion", "read_motion"]

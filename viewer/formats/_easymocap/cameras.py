@@ -31,9 +31,9 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._misfit import remark_on
-from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._words import number_key
+from viewer.formats._text.numbers import to_number
+from viewer.formats._text.words import number_key
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView

@@ -23,8 +23,8 @@ from viewer.formats._json_places import (
     repeated_key,
 )
 from viewer.formats._misfit import MisfitError
-from viewer.formats._numbers import LARGEST
 from viewer.formats._reach import FARTHEST, within_text
+from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 
 __all__ = [

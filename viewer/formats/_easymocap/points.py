@@ -17,7 +17,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows
 from viewer.formats._easymocap.json_frames import RecordError
-from viewer.formats._numbers import LARGEST
+from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.keypoint_layouts import TITLES, joined_layout, keypoint_layout
 from viewer.rig.captures.points import PointLayout

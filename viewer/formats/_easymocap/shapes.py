@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.formats._numbers import LARGEST
+from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["COEFFICIENTS", "hold", "last_given"]

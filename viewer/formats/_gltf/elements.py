@@ -9,8 +9,8 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
-from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import one_of
 from viewer.rig.arrays import Floats
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._gltf.elements import Table
-from viewer.formats._numbers import LARGEST
+from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["member_indices", "member_rows"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -129,13 +128,13 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     counts = [len(piece.triangles) for piece in pieces]
     used = sorted({piece.primitive.material for piece in pieces} - {-1})
     slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
-    uv_sets = _uv_sets(pieces)
+    uvs = _uv_sets(pieces)
     return Mesh(
         positions=np.concatenate([_positions(piece) for piece in pieces]),
         normals=np.concatenate([_normals(piece) for piece in pieces]),
         triangles=triangles.astype(np.int32),
-        uvs=uv_sets[0] if uv_sets else None,
-        other_uvs=uv_sets[1:],
+        uvs=uvs[0] if uvs else None,
+        other_uvs=uvs[1:],
         colors=_filled(pieces, lambda primitive: primitive.colors, np.ones(4)),
         materials=tuple(file.materials[material] for material in used),
         triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
@@ -159,14 +158,14 @@ def _normals(piece: Piece) -> Floats:
 
 
 def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
-    """Return all sets of texture coordinates, 0 for primitives that do not have a set."""
+    """Return every set of texture coordinates that a primitive has: (V, 2) each."""
     count = max(len(piece.primitive.uvs) for piece in pieces)
-    found = (_filled(pieces, partial(_uv_set, index), np.zeros(2)) for index in range(count))
-    return tuple(uvs for uvs in found if uvs is not None)
 
+    def of(index: int) -> Callable[[Primitive], Floats | None]:
+        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
 
-def _uv_set(index: int, primitive: Primitive) -> Floats | None:
-    return primitive.uvs[index] if index < len(primitive.uvs) else None
+    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
+    return tuple(values for values in sets if values is not None)
 
 
 def _filled(

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from viewer.formats._numbers import parse_numbers, word_begins
 from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
+from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["CORNER_KINDS", "FEWEST", "CornerFault", "FaceRows", "fits_corner", "read_faces"]

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._numbers import parse_numbers, word_begins
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["KEYWORDS", "Lines", "NumberRows", "Places", "Rows", "number_rows", "pieces", "rows_of"]

@@ -14,7 +14,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._archive.checking import archive_of, finite
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._table import read_table
+from viewer.formats._text.table import read_table
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 

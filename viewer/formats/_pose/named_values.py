@@ -19,8 +19,8 @@ from viewer.formats._json_places import (
     repeated_key,
     value_place,
 )
-from viewer.formats._numbers import LARGEST
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
-from viewer.formats._numbers import LARGEST
+from viewer.formats._text.numbers import LARGEST
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

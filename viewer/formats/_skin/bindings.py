@@ -7,10 +7,10 @@ import re
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._numbers import parse_numbers
 from viewer.formats._skin.blocks import find_block, unclosed, words_of
 from viewer.formats._source import Source
-from viewer.formats._words import refuse_words
+from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._text.words import refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._numbers import to_number
 from viewer.formats._source import Source
-from viewer.formats._words import Words, read_words
+from viewer.formats._text.numbers import to_number
+from viewer.formats._text.words import Words, read_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["KEYWORDS", "Block", "find_block", "read_count", "to_whole", "unclosed", "words_of"]

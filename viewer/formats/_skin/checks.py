@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.formats._neutral import neutral_corners
-from viewer.formats._numbers import LARGEST
 from viewer.formats._skin.rows import LOST
 from viewer.formats._skin.sections import Sections, check_declared
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, bounding_box

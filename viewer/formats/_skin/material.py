@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
-from viewer.formats._numbers import is_number
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import is_number
 from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
-from viewer.formats._numbers import parse_numbers
 from viewer.formats._skin.blocks import Block, to_whole, words_of
 from viewer.formats._source import Source
-from viewer.formats._words import Words, refuse_words
+from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._text.words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["LOST", "OffsetOf", "read_rows", "whole_corners"]

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from viewer.formats import _numbers
-from viewer.formats._numbers import LARGEST, is_number, parse_numbers, to_number
+from viewer.formats._text import numbers
+from viewer.formats._text.numbers import LARGEST, is_number, parse_numbers, to_number
 
 DIGITS = st.text("0123456789", min_size=1, max_size=24)
 SIGNS = st.sampled_from(["", "+", "-"])
@@ -83,7 +83,7 @@ def test_repr_of_random_floats_round_trips_exactly():
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 7, 8, 9, 16, 17, 31, 64, 100])
 def test_chunk_boundaries_split_no_number(monkeypatch, chunk):
-    monkeypatch.setattr(_numbers, "_CHUNK", chunk)
+    monkeypatch.setattr(numbers, "_CHUNK", chunk)
     rng = random.Random(chunk)
     words = [repr(round(rng.uniform(-1e5, 1e5), rng.randrange(12))) for _ in range(300)]
     text = "".join(word + rng.choice([" ", "\n", "\t\t", " " * 40, "\r\n"]) for word in words)
@@ -95,7 +95,7 @@ def test_chunk_boundaries_split_no_number(monkeypatch, chunk):
 @pytest.mark.parametrize("chunk", [1, 5, 8, 64, 1 << 17])
 @pytest.mark.parametrize("word", [word for word in NO_NUMBERS if word])
 def test_non_number_is_found_at_its_index(monkeypatch, chunk, word):
-    monkeypatch.setattr(_numbers, "_CHUNK", chunk)
+    monkeypatch.setattr(numbers, "_CHUNK", chunk)
     for index in (0, 1, 6):
         text = [*["0", "-1.5", "2e1", "3", "4", "5"][:index], word, "7", "bad", "8"]
         values, bad = parsed(" ".join(text))

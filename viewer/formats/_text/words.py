@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
-from viewer.formats._numbers import is_infinite, is_too_large, parse_words, word_begins
 from viewer.formats._source import Source
+from viewer.formats._text.numbers import is_infinite, is_too_large, parse_words, word_begins
 from viewer.rig.arrays import Floats
 
 __all__ = ["Words", "number_key", "read_words", "refuse_words"]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
-from viewer.formats._numbers import parse_numbers
 from viewer.formats._source import Source
-from viewer.formats._words import Words, number_key, read_words, refuse_words
+from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_numbers", "read_table"]

@@ -1,0 +1,164 @@
+"""A hand-written ASCII ``.fbx``: a strip of two quads that bends at its second joint."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["write_strip"]
+
+_HEAD = """; FBX 7.4.0 project file
+FBXHeaderExtension:  {{
+    FBXHeaderVersion: 1003
+    FBXVersion: 7400
+    Creator: "by hand"
+}}
+GlobalSettings:  {{
+    Version: 1000
+    Properties70:  {{
+        P: "UpAxis", "int", "Integer", "",{up}
+        P: "UpAxisSign", "int", "Integer", "",1
+        P: "FrontAxis", "int", "Integer", "",{front}
+        P: "FrontAxisSign", "int", "Integer", "",{front_sign}
+        P: "CoordAxis", "int", "Integer", "",0
+        P: "CoordAxisSign", "int", "Integer", "",1
+        P: "UnitScaleFactor", "double", "Number", "",{unit}
+        P: "TimeMode", "enum", "", "",11
+    }}
+}}
+"""
+
+_OBJECTS = """
+Objects:  {
+    Geometry: 10, "Geometry::Strip", "Mesh" {
+        Vertices: *18 { a: 0,0,0, 1,0,0, 1,1,0, 0,1,0, 1,2,0, 0,2,0 }
+        PolygonVertexIndex: *8 { a: 0,1,2,-4, 3,2,4,-6 }
+        GeometryVersion: 124
+        LayerElementNormal: 0 {
+            MappingInformationType: "ByPolygonVertex"
+            ReferenceInformationType: "Direct"
+            Normals: *24 { a: 0,0,1,0,0,1,0,0,1,0,0,1,0,0,1,0,0,1,0,0,1,0,0,1 }
+        }
+        LayerElementMaterial: 0 {
+            MappingInformationType: "ByPolygon"
+            ReferenceInformationType: "IndexToDirect"
+            Materials: *2 { a: 0,1 }
+        }
+        Layer: 0 {
+            LayerElement:  { Type: "LayerElementNormal"
+                TypedIndex: 0 }
+            LayerElement:  { Type: "LayerElementMaterial"
+                TypedIndex: 0 }
+        }
+    }
+    Geometry: 11, "Geometry::wide", "Shape" {
+        Version: 100
+        Indexes: *2 { a: 1,2 }
+        Vertices: *6 { a: 0.5,0,0, 0.5,0,0 }
+        Normals: *6 { a: 0,0,0, 0,0,0 }
+    }
+    Model: 20, "Model::Body", "Mesh" { Version: 232 }
+    Model: 21, "Model::low", "LimbNode" { Version: 232 }
+    Model: 22, "Model::high", "LimbNode" {
+        Version: 232
+        Properties70:  { P: "Lcl Translation", "Lcl Translation", "", "A",0,1,0 }
+    }
+    NodeAttribute: 23, "NodeAttribute::low", "LimbNode" { TypeFlags: "Skeleton" }
+    NodeAttribute: 24, "NodeAttribute::high", "LimbNode" { TypeFlags: "Skeleton" }
+    Material: 30, "Material::Red", "" {
+        Version: 102
+        ShadingModel: "phong"
+        Properties70:  { P: "DiffuseColor", "Color", "", "A",1,0,0 }
+    }
+    Material: 31, "Material::Blue", "" {
+        Version: 102
+        ShadingModel: "phong"
+        Properties70:  { P: "DiffuseColor", "Color", "", "A",0,0,1 }
+    }
+    Deformer: 40, "Deformer::Skin", "Skin" { Version: 101 }
+    Deformer: 41, "SubDeformer::low", "Cluster" {
+        Version: 100
+        Indexes: *4 { a: 0,1,2,3 }
+        Weights: *4 { a: 1,1,0.5,0.5 }
+        Transform: *16 { a: 1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1 }
+        TransformLink: *16 { a: 1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1 }
+    }
+    Deformer: 42, "SubDeformer::high", "Cluster" {
+        Version: 100
+        Indexes: *4 { a: 2,3,4,5 }
+        Weights: *4 { a: 0.5,0.5,1,1 }
+        Transform: *16 { a: 1,0,0,0,0,1,0,0,0,0,1,0,0,-1,0,1 }
+        TransformLink: *16 { a: 1,0,0,0,0,1,0,0,0,0,1,0,0,1,0,1 }
+    }
+    Deformer: 43, "Deformer::Shapes", "BlendShape" { Version: 100 }
+    Deformer: 44, "SubDeformer::wide", "BlendShapeChannel" {
+        Version: 100
+        DeformPercent: 25
+        FullWeights: *1 { a: 100 }
+    }
+    AnimationStack: 50, "AnimStack::Bend", "" {
+        Properties70:  {
+            P: "LocalStart", "KTime", "Time", "",0
+            P: "LocalStop", "KTime", "Time", "",46186158000
+        }
+    }
+    AnimationLayer: 51, "AnimLayer::Base", "" { }
+    AnimationCurveNode: 52, "AnimCurveNode::R", "" {
+        Properties70:  { P: "d|Z", "Number", "", "A",0 }
+    }
+    AnimationCurve: 53, "AnimCurve::", "" {
+        Default: 0
+        KeyVer: 4008
+        KeyTime: *2 { a: 0,46186158000 }
+        KeyValueFloat: *2 { a: 0,90 }
+        KeyAttrFlags: *1 { a: 4 }
+        KeyAttrDataFloat: *4 { a: 0,0,0,0 }
+        KeyAttrRefCount: *1 { a: 2 }
+    }
+    AnimationCurveNode: 54, "AnimCurveNode::DeformPercent", "" {
+        Properties70:  { P: "d|DeformPercent", "Number", "", "A",25 }
+    }
+    AnimationCurve: 55, "AnimCurve::", "" {
+        Default: 25
+        KeyVer: 4008
+        KeyTime: *2 { a: 0,46186158000 }
+        KeyValueFloat: *2 { a: 0,100 }
+        KeyAttrFlags: *1 { a: 4 }
+        KeyAttrDataFloat: *4 { a: 0,0,0,0 }
+        KeyAttrRefCount: *1 { a: 2 }
+    }
+}
+Connections:  {
+    C: "OO",20,0
+    C: "OO",21,0
+    C: "OO",22,21
+    C: "OO",23,21
+    C: "OO",24,22
+    C: "OO",10,20
+    C: "OO",30,20
+    C: "OO",31,20
+    C: "OO",40,10
+    C: "OO",41,40
+    C: "OO",42,40
+    C: "OO",21,41
+    C: "OO",22,42
+    C: "OO",43,10
+    C: "OO",44,43
+    C: "OO",11,44
+    C: "OO",51,50
+    C: "OO",52,51
+    C: "OP",52,22, "Lcl Rotation"
+    C: "OP",53,52, "d|Z"
+    C: "OO",54,51
+    C: "OP",54,44, "DeformPercent"
+    C: "OP",55,54, "d|DeformPercent"
+}
+"""
+
+
+def write_strip(folder: Path, up: str = "y", unit: float = 1.0) -> Path:
+    """Write the file; ``unit`` is in centimetres per unit."""
+    front, sign = (2, 1) if up == "y" else (1, -1)
+    head = _HEAD.format(up=1 if up == "y" else 2, front=front, front_sign=sign, unit=unit)
+    path = folder / "strip.fbx"
+    path.write_text(head + _OBJECTS)
+    return path

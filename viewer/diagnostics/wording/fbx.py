@@ -1,0 +1,25 @@
+"""Messages about ``.fbx`` files."""
+
+MESSAGES = {
+    "F001.fbx-extra": "reading .fbx files needs ufbx, which is not installed: pip install ufbx",
+    "F001.fbx-crash": "the FBX library failed on this file: {how:text}",
+    "F001.fbx-slow": "reading took more than {seconds:.0f} s and was stopped",
+    "F002.fbx": "not a readable FBX file: {reason:text}",
+    "F007.fbx-converted": "{what:list} of the file have no equivalent: converted to {to:list}",
+    "F007.fbx-unused": "not used: {items:list12}",
+    "F007.fbx-warning": "FBX library: {text:text}",
+    "F007.fbx-in-betweens": "blend shape {shape:quoted}: {n:#in-between target} not used",
+    "F007.fbx-skins": "mesh {mesh:quoted}: only the first of {n} skin deformers is used",
+    "F007.fbx-no-bone": "mesh {mesh:quoted}: {n:#skin cluster} without a joint not used",
+    "F007.fbx-mixed": "mesh {mesh:quoted} blends both skinning methods per vertex: shown with a "
+    "blend factor of {mean:.2f} everywhere (file: {low:.2f} to {high:.2f})",
+    "F007.fbx-color-sets": "mesh {mesh:quoted}: only the first of {n} colour sets is used",
+    "F007.fbx-opacity": "material {material:quoted}: the opacity texture {texture:quoted} is not "
+    "used, only the alpha of the colour texture",
+}
+
+PHRASES = {
+    "fbx-axes": "y up, right-handed",
+    "ended-by-signal": "it crashed with signal {number}",
+    "ended-with-error": "exit code {code}{error:+: {}}",
+}

@@ -1,0 +1,72 @@
+"""The child process that reads an ``.fbx``: its limits, and the errors it can end with."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import viewer
+from viewer.diagnostics import Phrase
+from viewer.formats._fbx.message import Arrays, unpacked
+from viewer.formats._source import Source
+
+__all__ = ["run_worker"]
+
+_SECONDS = 60.0  # time limit, and for each further ...
+_STEP = 1 << 20  # ... bytes, which take about 0.1 s,
+_SECONDS_PER_STEP = 2.0  # ... so much more
+_MEMORY = 4 << 30  # bytes that the child may use, and for each byte of the file ...
+_MEMORY_PER_BYTE = 64  # ... so many more
+_WORKER = "viewer.formats._fbx.worker"
+
+
+def run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]:
+    """Run the worker on a file, and return its message.
+
+    Raises
+    ------
+    FormatError
+        If the library is missing, refuses the file, crashes, or takes too long.
+    """
+    if find_spec("ufbx") is None:
+        raise source.fault("F001.fbx-extra")
+    size = source.path.stat().st_size
+    seconds = _SECONDS + _SECONDS_PER_STEP * (size / _STEP)
+    command = [sys.executable, "-m", _WORKER, str(source.path.resolve()), *arguments]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=seconds,
+            env=_environment(_MEMORY + _MEMORY_PER_BYTE * size),
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise source.fault("F001.fbx-slow", seconds=seconds) from None
+    message = unpacked(done.stdout) if done.returncode == 0 else None
+    if message is None:
+        raise source.fault("F001.fbx-crash", how=_ending(done.returncode, done.stderr))
+    if "error" in message[1]:
+        raise source.fault("F002.fbx", reason=message[1]["error"])
+    return message
+
+
+def _environment(memory: int) -> dict[str, str]:
+    """Return the child's environment: it finds this package, and uses one thread."""
+    package = str(Path(viewer.__file__).resolve().parents[1])
+    paths = filter(None, (package, os.environ.get("PYTHONPATH", "")))
+    limits = {"VIEWER_FBX_MEMORY": str(memory), "OPENBLAS_NUM_THREADS": "1"}
+    return {**os.environ, **limits, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _ending(code: int, errors: bytes) -> Phrase:
+    """Return how a process ended, as a phrase."""
+    if code < 0:
+        return Phrase("ended-by-signal", number=-code)
+    lines = errors.decode(errors="replace").strip().splitlines()
+    return Phrase("ended-with-error", code=code, error=lines[-1] if lines else "")

@@ -1,0 +1,112 @@
+"""Materials and textures of an ``.fbx``."""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from viewer.errors import FormatError
+from viewer.formats._fbx.message import Arrays
+from viewer.formats._references import referenced_path
+from viewer.formats._source import Source
+from viewer.formats._texture import load_image
+from viewer.media.image import decode_picture
+from viewer.rig.arrays import Bytes
+from viewer.rig.material import Material, Texture
+
+__all__ = ["materials_of"]
+
+_LEAST_ALPHA = 255  # a pixel below this is not opaque
+
+
+def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[Material, ...]:
+    """Return all materials of a message; textures are found inside or beside the file.
+
+    A picture is searched for under the names that the file states, and under its bare file name
+    beside the file, in ``textures`` and in ``<file>.fbm``, where exporters unpack pictures.
+    """
+    pictures: dict[int, Bytes | None] = {}
+    sets: list[str] = next((mesh["uv_sets"] for mesh in told["meshes"] if mesh["uv_sets"]), [])
+
+    def texture(number: int | None) -> Texture | None:
+        if number is None:
+            return None
+        stated = told["textures"][number]
+        name = _picture_name(source, stated["names"])
+        if number not in pictures:
+            pictures[number] = _picture(source, arrays[f"texture{number}"].tobytes(), name)
+        matrix = np.array(stated["transform"])
+        place = sets.index(stated["uv_set"]) if stated["uv_set"] in sets else 0
+        return Texture(
+            name,
+            pictures[number],
+            uv_set=place,
+            transform=matrix[:2][:, [0, 1, 3]],
+            wrap=tuple(stated["wrap"]),
+        )
+
+    return tuple(_material(source, each, texture) for each in told["materials"])
+
+
+def _material(source: Source, told: dict[str, Any], texture: Any) -> Material:
+    def number(name: str, default: float) -> float:
+        value = told[name]["value"]
+        return default if value is None else value[0]
+
+    factor, color = number("base_factor", 1.0), told["base_color"]["value"] or [1.0] * 4
+    base = texture(told["base_color"]["texture"])
+    shown = [1.0, 1.0, 1.0] if base is not None else color[:3]
+    red, green, blue = (min(max(factor * part, 0.0), 1.0) for part in shown[:3])
+    opacity = min(max(number("opacity", 1.0), 0.0), 1.0)
+    cut = texture(told["opacity"]["texture"])
+    if cut is not None and (base is None or cut.name != base.name):
+        source.warn("F007.fbx-opacity", material=told["name"], texture=cut.name)
+        cut = None
+    has_alpha = cut is not None and base is not None and _has_alpha(base.image)
+    strength = number("emission_factor", 1.0)
+    emission = [max(strength * part, 0.0) for part in told["emission_color"]["value"] or [0.0] * 3]
+    return Material(
+        told["name"],
+        base_texture=base,
+        base_color=(red, green, blue, opacity),
+        metallic=min(max(number("metalness", 0.0), 0.0), 1.0),
+        roughness=min(max(number("roughness", 0.6), 0.0), 1.0),
+        metallic_texture=texture(told["metalness"]["texture"]),
+        roughness_texture=texture(told["roughness"]["texture"]),
+        normal_texture=texture(told["normal_map"]["texture"]),
+        occlusion_texture=texture(told["ambient_occlusion"]["texture"]),
+        emissive=(emission[0], emission[1], emission[2]),
+        emissive_texture=texture(told["emission_color"]["texture"]),
+        alpha_mode="blend" if opacity < 1.0 or has_alpha else "opaque",
+        is_physical=told["is_physical"],
+    )
+
+
+def _has_alpha(image: Bytes | None) -> bool:
+    return image is not None and int(image[..., 3].min()) < _LEAST_ALPHA
+
+
+def _picture_name(source: Source, names: list[str]) -> str:
+    """Return the name of the first place where the picture is, else the first name stated."""
+    folder = source.path.parent
+    stated = [name.replace("\\", "/") for name in names if name]
+    bare = PurePosixPath(stated[0]).name if stated else ""
+    places = [*stated, bare, f"textures/{bare}", f"{source.path.stem}.fbm/{bare}"]
+    for name in filter(None, places):
+        path = referenced_path(folder, name)
+        if path is not None and path.is_file():
+            return name
+    return bare
+
+
+def _picture(source: Source, content: bytes, name: str) -> Bytes | None:
+    """Return the pixels of a picture inside the file, or else of one below its folder."""
+    if not content:
+        return load_image(source, name, None) if name else None
+    try:
+        return decode_picture(source.path, content)
+    except FormatError as problem:
+        source.warn("F005.texture", problem=problem.diagnostic)
+        return None

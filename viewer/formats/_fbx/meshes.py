@@ -1,0 +1,231 @@
+"""Meshes of an ``.fbx``: polygons with attributes per corner become triangles of vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.formats._fbx.message import Arrays
+from viewer.formats._nodes.content import NodeMesh, NodeSkin, Primitive
+from viewer.formats._polygons import triangulate
+from viewer.formats._source import Source
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["Placed", "mesh_on_node", "skin_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """One mesh of the message on one of its nodes.
+
+    Attributes
+    ----------
+    prefix : str
+        Of the names of its arrays.
+    told : dict
+        Its JSON.
+    materials : list of int
+        Material of each slot that its faces refer to.
+    placement : (4, 4)
+        Geometry to node; the identity for skinned meshes, whose matrices include it.
+    """
+
+    prefix: str
+    told: dict[str, Any]
+    materials: list[int]
+    placement: Floats
+
+
+def mesh_on_node(source: Source, arrays: Arrays, placed: Placed) -> NodeMesh:
+    """Return a mesh with one primitive per material."""
+    get = _getter(arrays, placed.prefix)
+    faces, corners = get("faces"), get("corners")
+    shown = np.flatnonzero(faces[:, 1] >= 3)
+    starts, counts = faces[shown, 0], faces[shown, 1]
+    listed = np.repeat(starts - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+    if not len(listed):
+        return NodeMesh(placed.told["name"], ())
+    picks, owners = triangulate(get("vertices"), corners[listed].astype(np.int64), counts)
+    wanted = listed[picks]  # corner of the file at each corner of each triangle
+    slots = _slots(arrays, placed)[shown[owners]]
+    linear = placed.placement[:3, :3]
+    if np.linalg.det(linear) < 0.0:
+        wanted = wanted[:, ::-1]
+    weights = _influences(arrays, placed)
+    primitives = []
+    for slot in np.unique(slots).tolist():
+        rows = wanted[slots == slot]
+        chosen, inverse = _distinct(arrays, placed, np.unique(rows))
+        renumbered = np.zeros(len(corners), dtype=np.int32)
+        renumbered[np.unique(rows)] = inverse
+        has_slot = 0 <= slot < len(placed.materials)
+        primitives.append(
+            _primitive(
+                arrays,
+                placed,
+                chosen,
+                renumbered[rows],
+                placed.materials[slot] if has_slot else -1,
+                weights,
+            )
+        )
+    shapes = placed.told["shapes"]
+    return NodeMesh(
+        placed.told["name"],
+        tuple(primitives),
+        tuple(shape["name"] for shape in shapes),
+        np.array([shape["weight"] for shape in shapes], dtype=np.float64),
+    )
+
+
+def _getter(arrays: Arrays, prefix: str) -> Any:
+    return lambda name: arrays[f"{prefix}.{name}"]
+
+
+def _slots(arrays: Arrays, placed: Placed) -> Ints:
+    """Return the material slot of every face: (F,)."""
+    given = arrays[f"{placed.prefix}.face_materials"]
+    count = len(arrays[f"{placed.prefix}.faces"])
+    return given if len(given) == count else np.zeros(count, dtype=np.int32)
+
+
+def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
+    """Return the names of the attributes per corner that the mesh has."""
+    sets = range(len(placed.told["uv_sets"]))
+    names = ["normals", "colors", *(f"uvs{row}" for row in sets)]
+    return [name for name in names if f"{placed.prefix}.{name}" in arrays]
+
+
+def _distinct(
+    arrays: Arrays, placed: Placed, corners: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Ints]:
+    """Return one corner for each vertex, and the vertex of each of the given corners.
+
+    Corners are one vertex if their position and all their attributes are equal.
+    """
+    keys = [arrays[f"{placed.prefix}.corners"][corners]]
+    for name in _attributes(arrays, placed):
+        values = arrays[f"{placed.prefix}.{name}"]
+        rows = arrays[f"{placed.prefix}.{name}.corners"][corners]
+        # Equal values count as one: exporters repeat them for every corner.
+        _, number = np.unique(values + 0.0, axis=0, return_inverse=True)
+        keys.append(number.reshape(-1)[rows])
+    _, first, inverse = np.unique(np.stack(keys), axis=1, return_index=True, return_inverse=True)
+    return corners[first], inverse.reshape(-1).astype(np.int32)
+
+
+def _primitive(
+    arrays: Arrays,
+    placed: Placed,
+    chosen: NDArray[np.intp],
+    triangles: Ints,
+    material: int,
+    influences: tuple[Ints, Floats] | None,
+) -> Primitive:
+    """Return the primitive of some corners, which become its vertices."""
+    get = _getter(arrays, placed.prefix)
+    vertices = get("corners")[chosen]
+    linear, shift = placed.placement[:3, :3], placed.placement[:3, 3]
+    values = {
+        name: get(name)[get(f"{name}.corners")[chosen]] for name in _attributes(arrays, placed)
+    }
+    normals = values.get("normals")
+    count = len(get("vertices"))
+    targets = [
+        (_spread(get, row, "offsets", count)[vertices], _spread(get, row, "normals", count))
+        for row in range(len(placed.told["shapes"]))
+    ]
+    return Primitive(
+        positions=get("vertices")[vertices] @ linear.T + shift,
+        triangles=triangles,
+        normals=None if normals is None else _turned(normals, linear),
+        uvs=tuple(values[name] for name in values if name.startswith("uvs")),
+        colors=values.get("colors"),
+        joints=None if influences is None else influences[0][vertices],
+        weights=None if influences is None else influences[1][vertices],
+        material=material,
+        targets=np.array([offsets @ linear.T for offsets, _ in targets]) if targets else None,
+        normal_targets=_normal_targets([rows[vertices] for _, rows in targets], linear),
+    )
+
+
+def _spread(get: Any, row: int, name: str, count: int) -> Floats:
+    """Return the offsets of a shape for all vertices: (V, 3)."""
+    result = np.zeros((count, 3))
+    vertices, offsets = get(f"shape{row}.vertices"), get(f"shape{row}.{name}")
+    if len(offsets) == len(vertices):
+        np.add.at(result, vertices, offsets)
+    return result
+
+
+def _normal_targets(rows: list[Floats], linear: Floats) -> Floats | None:
+    """Return the offsets of normals; None if the file has none, as they are then recomputed."""
+    if not any(each.any() for each in rows):
+        return None
+    return np.array([_turned(each, linear, unit=False) for each in rows])
+
+
+def _turned(normals: Floats, linear: Floats, unit: bool = True) -> Floats:
+    """Return normals of a transformed surface."""
+    if np.array_equal(linear, np.eye(3)):
+        return normals
+    cofactors = np.linalg.det(linear) * np.linalg.pinv(linear).T
+    turned = normals @ cofactors.T
+    lengths = np.linalg.norm(turned, axis=-1, keepdims=True)
+    return turned / np.where(lengths > 0.0, lengths, 1.0) if unit else turned
+
+
+def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
+    """Return joints and weights of the file's vertices, side by side: (V, K), (V, K)."""
+    if placed.told["skin"] is None:
+        return None
+    get = _getter(arrays, f"{placed.prefix}.skin")
+    kept = _with_bone(get)
+    numbers = np.cumsum(kept) - 1
+    cluster = np.repeat(np.arange(len(kept)), get("counts"))
+    vertices, weights = get("vertices"), get("weights")
+    used = kept[cluster] & (weights != 0.0)
+    cluster, vertices, weights = cluster[used], vertices[used], weights[used]
+    order = np.argsort(vertices, kind="stable")
+    cluster, vertices, weights = cluster[order], vertices[order], weights[order]
+    count = len(arrays[f"{placed.prefix}.vertices"])
+    counts = np.bincount(vertices, minlength=count)
+    slot = np.arange(len(vertices)) - np.repeat(np.cumsum(counts) - counts, counts)
+    width = max(int(counts.max(initial=0)), 1)
+    joints, table = np.zeros((count, width), dtype=np.int32), np.zeros((count, width))
+    joints[vertices, slot] = numbers[cluster]
+    table[vertices, slot] = weights
+    return joints, table
+
+
+def _with_bone(get: Any) -> NDArray[np.bool_]:
+    """Return which clusters have a joint."""
+    return get("bones") >= 0
+
+
+def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -> NodeSkin | None:
+    """Return the skin of a mesh, and say what of it is not used."""
+    if told["skin"] is None:
+        return None
+    get = _getter(arrays, f"{prefix}.skin")
+    kept = _with_bone(get)
+    if not kept.all():
+        source.warn("F007.fbx-no-bone", mesh=told["name"], n=int((~kept).sum()))
+    if told["n_skins"] > 1:
+        source.warn("F007.fbx-skins", mesh=told["name"], n=told["n_skins"])
+    if not kept.any():
+        return None
+    method, blend = told["skin"]["method"], get("blend")
+    if method == "mix":
+        values = blend if len(blend) else np.zeros(1)
+        source.warn(
+            "F007.fbx-mixed",
+            mesh=told["name"],
+            mean=float(values.mean()),
+            low=float(values.min()),
+            high=float(values.max()),
+        )
+    return NodeSkin(told["skin"]["name"], get("bones")[kept], get("matrices")[kept], method)
