@@ -74,7 +74,6 @@ def test_skin_is_recognised(data):
         (b"BM\x36\0\x0c\0", "a BMP image"),
         (b"GIF89a", "a GIF image"),
         (b"%PDF-1.7", "a PDF document"),
-        (b"glTF\2\0\0\0", "a binary glTF file"),
         (b"\x7fELF\2\1\1", "a program (ELF)"),
         ("balljoint a {}".encode("utf-16"), "UTF-16 text"),
         ("balljoint a {}".encode("utf-16-be"), "UTF-16 text"),
@@ -98,6 +97,12 @@ def test_other_content_is_described(data, kind, name, wanted):
 def test_text_in_another_format_is_refused():
     fault = refusal_of(lambda: found("a.txt", b"hello world"))
     assert fault == ("F002.unknown-kind", None, {"wanted": ANY})
+
+
+@pytest.mark.parametrize("name", ["a.glb", "a.vrm", "a", "a.json.gltf"])
+@pytest.mark.parametrize("data", [b"glTF\2\0\0\0", b'\n{"scene": 0, "asset" : {"version": "2.0"}}'])
+def test_gltf_is_recognised(name, data):
+    assert detect(Source(name, data)) == "gltf"
 
 
 @pytest.mark.parametrize(("name", "key"), [("a.skel", "skel"), ("a.skin", "skin")])
