@@ -30,6 +30,7 @@ from viewer.rig.scene import scene_points
 pytestmark = pytest.mark.slow
 SHARED = ROOT.parent / "shared" / "data" / "cse169"
 SIZE = (1280, 800)
+DRAFT, FINAL = ("--quality", "draft"), ("--quality", "final")
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +75,8 @@ def window(display, figure, tmp_path):
     """Return a function that starts the viewer; windows left open are closed."""
     started = []
 
-    def start(*arguments):
-        started.append(Window(display, tmp_path, arguments or figure))
+    def start(*options):
+        started.append(Window(display, tmp_path, [*(options or DRAFT), *figure]))
         return started[-1]
 
     yield start
@@ -151,7 +152,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
 
 
 def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure):
-    app = window()
+    app = window(*FINAL)
     app.key("F12")
     path = app.folder / f"{figure[1].stem}.png"
     _wait_for(path.is_file, "the screenshot")
@@ -278,7 +279,7 @@ def test_vertex_text_is_complete_wherever_the_mouse_rests(window, places, surfac
 
 
 def test_idle_window_uses_no_cpu(window):
-    app = window()
+    app = window(*FINAL)
     # Messages at the start go away after some seconds; until then frames are drawn.
     time.sleep(0.5)
     app.tell("mousemove", 640, 870)

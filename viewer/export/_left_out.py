@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
+from viewer.rig.motion.evaluation import Frames
+from viewer.rig.skeleton import Skeleton
+
+_NEGLIGIBLE = 1e-6  # largest difference of equal scales
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:
@@ -32,6 +38,21 @@ def surface_parts(mesh: Mesh, has_colors: bool = False) -> list[Phrase]:
         "part-mesh-parts": bool(mesh.parts),
     }
     return [Phrase(name) for name, is_lost in extras.items() if is_lost]
+
+
+def joint_scales_note(frames: Frames, skeleton: Skeleton, key: str) -> list[Diagnostic]:
+    """Return a note with the range of joint scales that differ from those at rest, if any.
+
+    ``frames``: the motion.
+    ``skeleton``: its skeleton.
+    ``key``: key of the message.
+    """
+    scales = frames.scales if len(frames.scales) == 1 else frames.scales[frames.present]
+    changed = scales[np.abs(scales - skeleton.rest_scales) > _NEGLIGIBLE]
+    if not len(changed):
+        return []
+    values = {"low": float(changed.min()), "high": float(changed.max())}
+    return [Diagnostic(key, values=values)]
 
 
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:

@@ -31,10 +31,9 @@ from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import DEFAULT_RATE
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.timing import DEFAULT_RATE, Timing
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 
 __all__ = ["read"]

@@ -100,6 +100,12 @@ class Camera:
         """Whether the projection is parallel; that of a calibrated camera never is."""
         return self.orthographic and self.fixed is None
 
+    def rotation(self) -> Floats:
+        """Return the rotation from scene to camera space, for column vectors: (3, 3)."""
+        if self.fixed is not None:
+            return pinhole_view(self.fixed)[:3, :3]
+        return np.array(camera_axes(self))
+
     def view_matrix(self) -> Floats:
         """Return the matrix from scene to camera space, for column vectors: (4, 4)."""
         if self.fixed is not None:

@@ -33,6 +33,7 @@ def viewer_render(tmp_path, *arguments: str, **environment: str):
     skel.write_text(TINY_SKEL)
     command = [sys.executable, "-m", "viewer", "render", str(skel), "-o", str(output)]
     size = [] if "--size" in arguments else ["--size", "64x48"]
+    size += [] if "--quality" in arguments else ["--quality", "draft"]
     result = subprocess.run(
         [*command, *size, *arguments],
         cwd=ROOT,
@@ -202,7 +203,9 @@ def test_too_many_samples_fall_back_to_the_maximum(tmp_path):
 
 @LINUX
 def test_another_rasteriser_draws_without_warnings(tmp_path):
-    result, output = viewer_render(tmp_path, "--samples", "1", GALLIUM_DRIVER="softpipe")
+    result, output = viewer_render(
+        tmp_path, "--quality", "normal", "--samples", "1", GALLIUM_DRIVER="softpipe"
+    )
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
 

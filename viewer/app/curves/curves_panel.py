@@ -12,6 +12,7 @@ from viewer.app.core.widgets import (
     choice,
     explain,
     note_item,
+    offer_files,
     plain_zero,
     same_line_if_room,
 )
@@ -46,9 +47,12 @@ def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     curves = curves_of(state.actor)
     if not curves or state.actor.clip is None:
-        imgui.text_disabled("this figure has no motion")
-        if can_have_keys(state) and button(state, "New clip"):
-            new_clip(state)
+        if can_have_keys(state):
+            imgui.text_wrapped("This figure has no motion.")
+            if button(state, "New clip"):
+                new_clip(state)
+            same_line_if_room("Open files…")
+        offer_files(state, "" if can_have_keys(state) else "This figure has no motion.")
         return
     _follow(state, curves)
     if imgui.begin_child("##channels", (_LIST_WIDTH * imgui.get_font_size(), 0.0)):

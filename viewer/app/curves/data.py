@@ -14,8 +14,9 @@ from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints
 
 __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 
@@ -72,7 +73,7 @@ def curves_of(actor: Actor) -> tuple[Curve, ...]:
     skeleton, points = actor.figure.skeleton, actor.figure.points
     if isinstance(actor.clip, PointClip) and points is not None:
         return _point_curves(points)
-    if skeleton is None or isinstance(actor.clip, PointClip):
+    if skeleton is None or isinstance(actor.clip, PointClip | TransformClip):
         return ()
     if isinstance(actor.clip, SampledClip):
         return _of_skeleton.get(skeleton, "frames", lambda: _joint_curves(skeleton))
@@ -91,7 +92,8 @@ def _dof_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
 
 def _joint_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
     groups = [(_PLACE, -1, False)]
-    groups += [(printable(label, 60), j, True) for j, label in enumerate(joint_labels(skeleton))]
+    labels = joint_labels(skeleton)
+    groups += [(printable(labels[j], 60), j, True) for j in shown_joints(skeleton).tolist()]
     return tuple(
         Curve(group, number, _AXES[axis], axis, is_angle)
         for group, number, is_angle in groups

@@ -96,7 +96,7 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     if isinstance(clip, Clip):
         shown = keyed_values(clip, rows, np.linspace(low, high, _MOST_SAMPLES))
         parts.append((shown * factors).ravel())
-    elif clip is not None:
+    elif isinstance(clip, SampledClip | PointClip):
         parts += [
             factor * sampled_points(clip, row, low, high)[1]
             for row, factor in zip(rows, factors, strict=True)
@@ -122,7 +122,7 @@ def _draw_line(plot: Plot, row: int) -> None:
         times, values = sampled_points(clip, row, low, high)
         implot.plot_line(f"##{row}", times, factor * values, _spec(color))
         return
-    if clip is None:
+    if not isinstance(clip, Clip):
         return
     channel = channel_of(clip, row)
     keys = channel.times if channel is not None else np.zeros(0)

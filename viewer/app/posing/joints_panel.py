@@ -19,6 +19,7 @@ from viewer.app.core.widgets import (
     explain,
     menu_item,
     note_item,
+    offer_files,
     plain_zero,
     same_line_if_room,
     show_tooltip,
@@ -44,7 +45,7 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.number_text import angle_text, number_text
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
+from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints, shown_parents
 
 __all__ = ["draw", "rows"]
 
@@ -54,6 +55,7 @@ OWN_NUMBERS = -2
 """Value used instead of a DOF for the row with the raw pose values of the body model."""
 
 _FIRST_ROTATION = 3
+_LABEL_WIDTH = 1.6  # in font sizes
 _INDENT = 9.0  # points per level
 _DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
@@ -71,12 +73,11 @@ def draw(state: AppState) -> None:
         draw_captured_points(state, actor, actor.figure.points)
         return
     if actor.figure.skeleton is None or actor.pose is None:
-        imgui.text_wrapped(
+        offer_files(
+            state,
             "This figure has no skeleton: open it together with its .skel, or create one with "
-            "Window > Rig."
+            "Window > Rig.",
         )
-        if button(state, "Open files…##joints"):
-            state.wants.add("open dialog")
         return
     _draw_head(state)
     skeleton = actor.figure.skeleton
@@ -204,7 +205,9 @@ def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool
     listed: list[tuple[int, int, int]] = []
     depths, visible = [0] * skeleton.n_joints, [True] * skeleton.n_joints
     labels = _labels(skeleton)
-    for joint, parent in enumerate(skeleton.parents.tolist()):
+    parents = shown_parents(skeleton).tolist()
+    for joint in shown_joints(skeleton).tolist():
+        parent = parents[joint]
         if wanted:
             visible[joint] = wanted.lower() in labels[joint].lower()
         elif parent >= 0:
@@ -254,8 +257,10 @@ def _draw_dof(
     name = DOF_KINDS[kind]
     _indent(depth)
     imgui.align_text_to_frame_padding()
-    imgui.text_colored(ink(_AXIS_COLORS[kind % 3]), f"{name:>2}")
-    imgui.same_line()
+    start = imgui.get_cursor_pos_x()
+    imgui.text_colored(ink(_AXIS_COLORS[kind % 3]), name)
+    # All sliders of a joint begin at one place, whatever the width of their labels.
+    imgui.same_line(start + _LABEL_WIDTH * imgui.get_font_size())
     imgui.set_next_item_width(-1.0)
     low, high = skeleton.dof_limits[dof]
     locked = low == high

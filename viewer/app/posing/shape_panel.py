@@ -13,6 +13,7 @@ from viewer.app.core.widgets import (
     button,
     checkbox,
     note_item,
+    offer_files,
     plain_zero,
     same_line_if_room,
     show_tooltip,
@@ -39,7 +40,7 @@ def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     figure, pose = state.actor.figure, state.actor.pose
     if figure.blend_shapes is None or pose is None:
-        imgui.text_wrapped("This figure has no blend shapes.")
+        offer_files(state, "This figure has no blend shapes: open a body model or a .morph file.")
         return
     _draw_measures(figure, pose)
     varies = "shape" in figure.blend_shapes.groups

@@ -94,7 +94,7 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
     why = "--scale was given on the command line" if appearance.given_scale else ""
     scales = {"0": f"automatic ({100.0 * appearance.screen_scale:.0f} %)"}
     scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
-    with disabled(why):
+    with disabled(state, why):
         chosen = choice(state, "Interface scale", f"{preferences.scale:g}", scales)
         explain("automatic follows the scale of the monitor", why)
     preferences.scale = float(chosen)
@@ -156,7 +156,7 @@ def _draw_key(state: AppState, preferences: Preferences, shortcut: Shortcut, con
     label = "press a key…" if waits else label_of(shortcut, preferences.keys)
     width = 10.0 * imgui.get_font_size()
     why = "this key cannot be changed" if shortcut.label in FIXED else ""
-    with disabled(why):
+    with disabled(state, why):
         if conflict:
             imgui.push_style_color(imgui.Col_.text, ink(WARNING))
         pressed_button = imgui.button(f"{label}###key {name}", (width, 0.0))

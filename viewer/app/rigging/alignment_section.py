@@ -241,7 +241,7 @@ def _draw_landmarks(state: AppState, template: Template) -> None:
             start_align(state, landmark_settings(state, mesh, view.choices.refines))
         except ViewerError as problem:
             state.error = str(problem)
-    with disabled("" if view.landmarks else "there are no landmarks"):
+    with disabled(state, "" if view.landmarks else "there are no landmarks"):
         same_line_if_room("Delete all")
         if button(state, "Delete all"):
             view.landmarks, view.pending = [], None

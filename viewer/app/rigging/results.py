@@ -21,8 +21,11 @@ from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import Pairs
 from viewer.rig.comparison.weights import row_distances
+from viewer.rig.motion.baking import baked
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skin import Skin, owners
 
@@ -250,7 +253,7 @@ def no_motion_of(result: Result | None) -> str:
     """Return why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
-    if isinstance(result.template.clip, Clip | SampledClip):
+    if isinstance(result.template.clip, JointMotion):
         return ""
     return "the template has no motion: it needs one before Run is pressed"
 
@@ -259,6 +262,8 @@ def set_motion(state: AppState, result: Result, plays: bool) -> None:
     """Play the template's motion at the target's position, or pose the result like the target."""
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
     place = target_place(result.target)
+    if isinstance(clip, TransformClip):
+        clip = baked(result.template.figure, clip, base=result.template.pose)
     if not plays or not isinstance(clip, Clip | SampledClip):
         actor.clip, actor.pose = None, rigged.pose.copy()
         actor.placement = place @ rigged.placement

@@ -60,7 +60,7 @@ def draw(state: AppState) -> None:
     why = no_target(state)
     if why:
         imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
-    with disabled(why):
+    with disabled(state, why):
         if _section("Align", "align the template with the target"):
             draw_alignment(state)
         if _section("Match", "conditions for taking the template's weights unchanged"):
@@ -90,7 +90,7 @@ def _draw_sources(state: AppState) -> None:
     view, found, why = state.of(Rigging), targets(state), no_job_room(state)
     names = {str(row): printable(actor.name, 60) for row, actor in enumerate(found)}
     rows = [str(row) for row, actor in enumerate(found) if actor is view.target]
-    with disabled("" if found else "no mesh without a rig"):
+    with disabled(state, "" if found else "no mesh without a rig"):
         chosen = choice(state, "Target", rows[0] if rows else "", names or {"": "none"})
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
@@ -98,7 +98,7 @@ def _draw_sources(state: AppState) -> None:
         _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES)
     if not why:
         explain("add a mesh without a rig to this scene")
-    with disabled(why):
+    with disabled(state, why):
         key = choice(state, "Template", view.template_key, template_texts(state))
     if key != view.template_key:
         choose_template(state, key)
@@ -169,7 +169,7 @@ def _draw_match(state: AppState) -> None:
     view = state.of(Rigging)
     choices = view.choices
     why = _NEAREST_WHY if choices.method == "nearest" else ""
-    with disabled(why):
+    with disabled(state, why):
         percent = 100.0 * choices.max_distance
         moved = slider(state, "Max. distance", percent, 0.1, 30.0, "%.1f %%")
         explain("maximum distance between the surfaces, relative to the target's size", why)
@@ -228,7 +228,7 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
 
 def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
     why = _NEAREST_WHY if choices.method == "nearest" else ""
-    with disabled(why):
+    with disabled(state, why):
         choices.refines = checkbox(state, "Refine alignment", choices.refines)
         explain("refine the result of the search or of the landmarks by closest points", why)
         choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})

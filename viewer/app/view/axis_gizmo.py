@@ -167,7 +167,7 @@ def _ends(state: AppState) -> list[_End]:
     center = _center(state)
     if center is None:
         return []
-    rotation, reach = state.camera.view_matrix()[:3, :3], _ARM * _unit()
+    rotation, reach = state.camera.rotation(), _ARM * _unit()
     found = []
     for axis in range(3):
         right, up, depth = rotation[:, axis].tolist()

@@ -52,7 +52,7 @@ def draw(state: AppState) -> None:
     if SCALARS[key].about == "field":
         _draw_fields(state, key)
     _draw_largest(state, key)
-    with disabled("" if options.shading == "scalar" else "the heat map is off"):
+    with disabled(state, "" if options.shading == "scalar" else "the heat map is off"):
         _draw_range(state, key)
         _draw_marks(state, key)
     imgui.separator()
@@ -71,8 +71,8 @@ def _draw_views(state: AppState) -> None:
         return
     for name in SCALARS:
         why = no_view(state, name)
-        with disabled(why):
-            # Choosing the current quantity again keeps a joint given on the command line.
+        with disabled(state, why):
+            # Choosing the current quantity again keeps a joint named on the command line.
             if imgui.selectable(menu_title(name, skinning), name == key)[0]:
                 show_scalar(state, state.options.scalar if name == key else name)
             note_item(state, f"view {name}")
@@ -121,7 +121,7 @@ def _draw_range(state: AppState, key: str) -> None:
     """Draw the choice of the colour range: automatic, or fixed by two numbers."""
     options = state.options
     why = "this quantity has one colour per integer" if SCALARS[key].kind in _WHOLE else ""
-    with disabled(why):
+    with disabled(state, why):
         if imgui.radio_button("Automatic", options.scalar_range is None):
             options.scalar_range = None
         note_item(state, "Automatic")

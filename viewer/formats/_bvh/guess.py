@@ -10,9 +10,9 @@ from viewer.diagnostics import Phrase
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import DEFAULT_RATE, frames_of, world_frames
+from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
+from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
 from viewer.rig.retargeting.joint_names import canonical_names
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 

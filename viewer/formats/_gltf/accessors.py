@@ -200,7 +200,14 @@ class Accessors:
     def _picked(
         self, layout: _Layout, rows: Ints | None, decoded: NDArray[Any] | None
     ) -> NDArray[Any]:
-        values = self._values(layout) if decoded is None else decoded
+        if decoded is None:
+            values = self._values(layout)
+        elif decoded.shape[1] == layout.width:
+            values = decoded.astype(layout.dtype)
+        else:
+            raise layout.element.fault(
+                "F002.gltf-decoded-width", expected=layout.width, found=decoded.shape[1]
+            )
         if rows is not None:
             values = values[rows]
         # Computations use double precision.

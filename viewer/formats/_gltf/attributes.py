@@ -59,8 +59,12 @@ class Attributes:
         """
         accessors = self.document.accessors
         index = self.element.index(name, len(accessors), "accessors")
-        if index >= 0 and (found := accessors.count(index)) != self.n_vertices:
-            expected = self.n_vertices
+        if index < 0:
+            return index
+        # The counts of accessors may be wrong where the data are compressed.
+        decoded, expected = self.decoded.get(name), self.n_vertices
+        found = accessors.count(index) if decoded is None else len(decoded)
+        if found != expected:
             raise self.element.fault("F002.gltf-vertices", name, expected=expected, found=found)
         return index
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from viewer.formats._gltf.elements import Element
+from viewer.formats._gltf.meshopt import decoded_view, meshopt_of
 from viewer.formats._gltf.uris import is_data_uri, media_type, uri_bytes, uri_path
 from viewer.rig.arrays import Bytes
 
@@ -76,6 +77,7 @@ class Buffers:
         self._images = root.table("images")
         self._source, self._binary, self._spend = root.source, binary, spend
         self._data: dict[int, Bytes] = {}
+        self._decoded: dict[int, View] = {}
         self.n_bytes_read = len(root.source.data)
         """Size of the document and of the files that it has needed so far."""
 
@@ -102,14 +104,21 @@ class Buffers:
         return self._data[index]
 
     def view(self, index: int) -> View:
-        """Return a buffer view.
+        """Return a buffer view, decompressed if it is compressed.
 
         Raises
         ------
         FormatError
             If it is invalid, or its data cannot be read or end before it.
         """
-        return self._part(self._views[index])
+        view = self._views[index]
+        compressed = meshopt_of(view)
+        if compressed is None:
+            return self._part(view)
+        if index not in self._decoded:
+            data = decoded_view(compressed, self._part(compressed).data, self._spend)
+            self._decoded[index] = View(data, view.whole("byteStride", 0), 0)
+        return self._decoded[index]
 
     def image(self, index: int) -> EncodedImage:
         """Return an image, still encoded.

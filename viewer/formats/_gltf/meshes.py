@@ -16,6 +16,7 @@ from viewer.formats._gltf.attributes import (
     read_uvs,
 )
 from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.draco import decoded_primitive
 from viewer.formats._gltf.elements import Element, Table
 from viewer.formats._gltf.influences import read_influences
 from viewer.formats._gltf.targets import n_targets, read_targets, shape_weights, target_names
@@ -105,13 +106,18 @@ def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
     document = reading.document
     position = element.index("POSITION", len(document.accessors), "accessors")
     count = document.accessors.count(position)
+    compressed = decoded_primitive(document, primitive)
+    if compressed is not None:
+        count = len(compressed.attributes.get("POSITION", range(count)))
+        triangles = read_triangles(document, primitive, count, compressed.triangles)
+        decoded = Attributes(document, element, count, None, compressed.attributes)
+        return _read(decoded, primitive, triangles)
     triangles = read_triangles(document, primitive, count)
     rows = None
     if reading.users[position] > 1:
         document.spend(count, primitive.pointer)
         rows, triangles = _used(triangles, count)
-    attributes = Attributes(document, element, count, rows)
-    return _read(attributes, primitive, triangles)
+    return _read(Attributes(document, element, count, rows), primitive, triangles)
 
 
 def _used(triangles: Ints, count: int) -> tuple[Ints | None, Ints]:

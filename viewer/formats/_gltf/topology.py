@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +20,7 @@ def read_triangles(
     document: Document,
     primitive: Element,
     n_vertices: int,
-    decoded: NDArray[Any] | None = None,
+    decoded: NDArray[np.int64] | None = None,
 ) -> Ints:
     """Return the triangles of a primitive: (T, 3) int32.
 
@@ -34,15 +32,17 @@ def read_triangles(
         A primitive with a mode of ``TRIANGLES``.
     n_vertices : int
         Number of its vertices.
-    decoded : (N,), optional
-        Vertex indices that were decoded elsewhere.
+    decoded : (T, 3), optional
+        Triangles that were decoded elsewhere.
 
     Raises
     ------
     FormatError
         If the indices are malformed, or refer to missing vertices.
     """
-    corners = _corners(document, primitive, n_vertices, decoded)
+    if decoded is not None:
+        return _checked(document, primitive, decoded.reshape(-1), n_vertices).reshape(-1, 3)
+    corners = _corners(document, primitive, n_vertices)
     mode = primitive.whole("mode", _LIST)
     if mode == _STRIP:
         return strip(corners)
@@ -53,26 +53,27 @@ def read_triangles(
     return corners[: len(corners) // 3 * 3].reshape(-1, 3)
 
 
-def _corners(
-    document: Document, primitive: Element, n_vertices: int, decoded: NDArray[Any] | None
-) -> Ints:
+def _corners(document: Document, primitive: Element, n_vertices: int) -> Ints:
     """Return vertex indices in drawing order: (N,) int32."""
     accessors = document.accessors
     index = primitive.index("indices", len(accessors), "accessors")
-    if index < 0 and decoded is None:
+    if index < 0:
         document.spend(n_vertices * 4, primitive.pointer)
         return np.arange(n_vertices, dtype=np.int32)
-    pointer = primitive.at("indices")
-    if decoded is None:
-        corners = accessors.integers(index, ("SCALAR",), pointer)[:, 0]
-    else:
-        corners = decoded.astype(np.int64)
+    corners = accessors.integers(index, ("SCALAR",), primitive.at("indices"))[:, 0]
+    return _checked(document, primitive, corners, n_vertices)
+
+
+def _checked(
+    document: Document, primitive: Element, corners: NDArray[np.int64], n_vertices: int
+) -> Ints:
+    """Return vertex indices, all of which exist: (N,) int32."""
     if len(corners) and int(corners.max()) >= n_vertices:
         bad = corners >= n_vertices
         entry = int(bad.argmax())
         document.source.refuse(
             "F002.gltf-corner",
-            pointer,
+            primitive.at("indices"),
             entry=entry,
             vertices=n_vertices,
             found=int(corners[entry]),

@@ -11,7 +11,7 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import rest_pose
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
 
 __all__ = ["BoneLinks", "bone_links"]
 
@@ -29,6 +29,8 @@ class BoneLinks:
 
     Attributes
     ----------
+    joints : (K,) int32
+        Joints that are drawn.
     ids : (N, 3) int32
         Joint; its child, -1 for an end; the joint's axis that lies most across the bone.
     ends : (N, 4)
@@ -41,6 +43,7 @@ class BoneLinks:
         Size that widths are derived from, figure units.
     """
 
+    joints: Ints
     ids: Ints
     ends: Floats
     longest: Floats
@@ -62,14 +65,14 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     """
     worlds = world_matrices(skeleton, rest_pose(skeleton))
     points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
-    parents = np.asarray(skeleton.parents)
-    children = np.flatnonzero(parents >= 0)
+    parents, drawn = shown_parents(skeleton), shown_joints(skeleton)
+    children = drawn[parents[drawn] >= 0]
     above = parents[children]
     spans = points[children] - points[above]
     lengths = np.linalg.norm(spans, axis=1)
-    size = _size(points, lengths)
+    size = _size(points[drawn], lengths)
     lengths = np.where(lengths > _SAME * size, lengths, 0.0)
-    ends = _end_joints(skeleton)
+    ends = _end_joints(skeleton, above)
     ways, reach = _ends(points, parents, ends, axes, size)
     joints = np.concatenate([above, ends])
     along = np.abs(np.einsum("nka,na->nk", axes[joints], np.concatenate([unit(spans), ways])))
@@ -84,7 +87,7 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
         np.maximum.at(longest, beside, lengths)
         np.minimum.at(nearest, beside, np.where(lengths > 0.0, lengths, np.inf))
     shown = np.clip(_AXIS * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
-    return BoneLinks(ids.astype(np.int32), free, longest, shown, size)
+    return BoneLinks(drawn, ids.astype(np.int32), free, longest, shown, size)
 
 
 def _size(points: Floats, lengths: Floats) -> float:
@@ -94,10 +97,10 @@ def _size(points: Floats, lengths: Floats) -> float:
     return (min(whole, _REACH * long) if long > 0.0 else whole) or 1.0
 
 
-def _end_joints(skeleton: Skeleton) -> Ints:
-    """Return the joints without children that can rotate."""
+def _end_joints(skeleton: Skeleton, above: Ints) -> Ints:
+    """Return the joints that can rotate and are not among the parents of others."""
     is_end = np.ones(skeleton.n_joints, dtype=bool)
-    is_end[skeleton.parents[skeleton.parents >= 0]] = False
+    is_end[above] = False
     turns = np.zeros(skeleton.n_joints, dtype=bool)
     turns[skeleton.dof_joints[(skeleton.dof_kinds >= 3) & ~skeleton.locked]] = True
     return np.flatnonzero(is_end & turns).astype(np.int32)

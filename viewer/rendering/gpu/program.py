@@ -46,9 +46,9 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
         Numbers, tuples of numbers, or ``bytes`` laid out as GLSL stores them.
     """
     for name, value in values.items():
-        if name in program:
-            uniform = program[name]
-            assert isinstance(uniform, moderngl.Uniform)  # by the prefix u_
+        # Not ``name in program``, which compares the names of all members one by one.
+        uniform = program.get(name, None)
+        if isinstance(uniform, moderngl.Uniform):
             if isinstance(value, bytes):
                 # Compilers drop the end of an array that is unused.
                 uniform.write(value[: 4 * uniform.dimension * uniform.array_length])

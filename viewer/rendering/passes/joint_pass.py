@@ -22,7 +22,7 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import Skeleton, shown_joints
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.bone_buffers import BoneBuffers
@@ -247,7 +247,10 @@ def _joint_boxes(skeleton: Skeleton) -> Floats:
         return skeleton.boxes
     points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
     half = _CUBE_SIZE * (box_size(bounding_box(points)) or 1.0)
-    return np.tile([[-half] * 3, [half] * 3], (skeleton.n_joints, 1, 1))
+    # Joints that are not shown have boxes without extent.
+    boxes = np.zeros((skeleton.n_joints, 2, 3))
+    boxes[shown_joints(skeleton)] = [[-half] * 3, [half] * 3]
+    return boxes
 
 
 def _cube_vertices() -> Floats:
