@@ -15,7 +15,7 @@ import numpy as np
 from viewer.rendering.gpu.index_sets import IndexSet, MeshRun
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.passes.skin_pass import PosedMesh
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["SortedTriangles"]
 
@@ -39,6 +39,9 @@ class SortedTriangles:
     def __init__(self, context: moderngl.Context) -> None:
         self.indices = buffer(context, np.zeros(0), "u4")
         self.runs: tuple[MeshRun, ...] = ()
+        self._given: tuple[MeshRun, ...] = ()
+        self._buffer: moderngl.Buffer | None = None
+        self._triangles: Ints = np.zeros((0, 3), np.int32)
         self._key: tuple[object, ...] = ()
 
     def sort(self, mesh: PosedMesh, source: IndexSet, along: Floats) -> None:
@@ -53,23 +56,29 @@ class SortedTriangles:
         along : (3,)
             Row of the model-view matrix that gives the depth, which decreases with the distance.
         """
-        runs = [run for run in source.runs if run.surface.is_blended and run.count]
-        key = (mesh.n_updates, along.tobytes(), *((run.first, run.count) for run in runs))
+        given = tuple(run for run in source.runs if run.surface.is_blended and run.count)
+        if given != self._given or source.indices is not self._buffer:
+            rows = [np.arange(run.first // 3, (run.first + run.count) // 3) for run in given]
+            self._triangles = mesh.mesh.triangles[source.order[np.concatenate(rows)]]
+            self._given, self._buffer, self._key = given, source.indices, ()
+        key = mesh.n_updates, along.tobytes()
         if key == self._key:
             return
-        rows = [np.arange(run.first // 3, (run.first + run.count) // 3) for run in runs]
-        triangles = mesh.mesh.triangles[source.order[np.concatenate(rows)]]
         heights = mesh.posed_positions() @ along.astype(np.float32)
-        depths = heights[triangles].sum(axis=1)
-        counts = np.array([run.count // 3 for run in runs])
-        order = np.lexsort((depths, np.repeat(np.arange(len(runs)), counts)))
-        data = np.ascontiguousarray(triangles[order], dtype="u4").tobytes()
+        depths = heights[self._triangles].sum(axis=1)
+        stops = np.cumsum([run.count // 3 for run in given])
+        parts = np.split(depths, stops[:-1])
+        starts = [0, *stops[:-1].tolist()]
+        order = [
+            start + np.argsort(part, kind="stable")
+            for start, part in zip(starts, parts, strict=True)
+        ]
+        data = np.ascontiguousarray(self._triangles[np.concatenate(order)], "u4").tobytes()
         # Vertex arrays that use the buffer remain valid when it is given another size.
         self.indices.orphan(len(data))
         self.indices.write(data)
-        starts = np.cumsum(counts) - counts
-        farthest = np.argsort(np.add.reduceat(depths, starts) / counts, kind="stable")
-        self.runs = tuple(replace(runs[one], first=3 * int(starts[one])) for one in farthest)
+        farthest = np.argsort([part.mean() for part in parts], kind="stable").tolist()
+        self.runs = tuple(replace(given[one], first=3 * starts[one]) for one in farthest)
         self._key = key
 
     def release(self) -> None:
