@@ -32,6 +32,7 @@ MESSAGES = {
     "F002.gltf-type": "expected {wanted}, found {found}",
     "F002.gltf-index": "expected an index below {count} ({what}), found {found}",
     # Buffers and images
+    "F001.gltf-file": "{problem}",
     "F002.gltf-scheme": "expected data or a relative file name, found {found:quoted}",
     "F002.gltf-outside": "{found:quoted} {reason}",
     "F002.gltf-data-uri": "expected a comma before the data, found {found:quoted}",
