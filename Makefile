@@ -22,17 +22,16 @@ PICTURES := $(wordlist 2,$(words $(MAKECMDGOALS)),$(MAKECMDGOALS))
 $(PICTURES): ; @:
 endif
 
-.PHONY: run test quick lint bench golden manual gallery figure system clean
+.PHONY: run test quick lint style types bench golden manual gallery figure system clean
 
 # A window may open even where pictures cannot be drawn without one: go on either way.
 run: $(READY)
 	@sh .ci/system "$(BIN)/python" || true
 	@$(BIN)/viewer $(FILES)
 
-test: $(READY) system
-	@$(BIN)/ruff check viewer tests assets
-	@$(BIN)/ruff format --check viewer tests assets
-	@$(BIN)/mypy
+# Installing what is missing waits for the network, checking types for the processor.
+test: $(READY)
+	@$(MAKE) --no-print-directory --jobs=3 style types system
 	@VIEWER_TEST_BUDGET=300 $(TESTING) -n $(WORKERS) --dist worksteal $(TESTS)
 
 # A test that draws all the same fails: it finds no OpenGL.
@@ -43,6 +42,13 @@ quick: $(READY)
 lint: $(READY)
 	@$(BIN)/ruff check --fix viewer tests assets
 	@$(BIN)/ruff format viewer tests assets
+	@$(BIN)/mypy
+
+style: $(READY)
+	@$(BIN)/ruff check viewer tests assets
+	@$(BIN)/ruff format --check viewer tests assets
+
+types: $(READY)
 	@$(BIN)/mypy
 
 bench: $(READY) system

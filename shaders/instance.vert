@@ -28,8 +28,10 @@ flat out float v_opacity;
 flat out int v_instance;
 
 #ifdef MATERIALS
-in vec2 in_second_uv;
-out vec2 v_second_uv;
+in vec4 in_other_uvs;   // second and third set of texture coordinates in use
+in vec4 in_tint;        // linear, with opacity
+out vec4 v_other_uvs;
+out vec4 v_tint;
 #endif
 
 #pragma chunk
@@ -47,7 +49,8 @@ void main() {
     v_normal = inverse_transposed(in_model_x.xyz, in_model_y.xyz, in_model_z.xyz, normal, 0.0);
     v_uv = in_uv;
 #ifdef MATERIALS
-    v_second_uv = in_second_uv;
+    v_other_uvs = in_other_uvs;
+    v_tint = in_tint;
 #endif
     v_color = u_has_colors ? in_color : in_actor_color;
     v_scalar = 0.0;

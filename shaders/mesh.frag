@@ -1,6 +1,6 @@
 #version 330
 // Two-sided shading of a surface in camera space, with linear colours. The result of a chunk is
-// shown as it is: lit chunks apply the tone curve, those that show data do not.
+// shown as it is: lit chunks apply the tone curve, chunks that show data do not.
 
 #pragma include tone
 #ifdef SHADOWS
@@ -32,10 +32,11 @@ void main() {
     vec3 normal = u_flat || dot(v_normal, v_normal) == 0.0 ? face : normalize(v_normal);
     // Flip normals that face away. The threshold is well beyond 90 degrees: at exactly 90 degrees
     // rounding would flip pixels at random.
-    normal = dot(normal, face) < -0.1 ? -normal : normal;
+    float side = dot(normal, face) < -0.1 ? -1.0 : 1.0;
+    normal *= side;
     float opacity = u_opacity * v_opacity;
 #ifdef MATERIALS
-    normal = mapped_normal(v_position, normal);
+    normal = mapped_normal(v_position, normal, side);
     opacity *= surface_alpha();
 #endif
     f_color = vec4(encode(shade(v_position, normal, to_eye)) * opacity, opacity);

@@ -17,6 +17,8 @@ pytest_plugins = ["stored_pictures"]
 ROOT = Path(__file__).resolve().parents[1]
 # Folders and files whose tests and examples all draw, or depend on one that draws.
 DRAWING = ("tests/app", "tests/rendering", "viewer/rendering", "viewer/__init__.py")
+# These tests wait more than they compute. Begun last, one process would end long after the other.
+FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
 
@@ -41,6 +43,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if any(item.path.is_relative_to(ROOT / place) for place in DRAWING):
             item.add_marker("slow")
+    first = [ROOT / name for name in FIRST]
+    items.sort(key=lambda item: item.path not in first)
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ from viewer.cli import run
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[1]
+QUICK = ("--size", "40x30", "--quality", "draft")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
 COMMAND = [sys.executable, "-m", "viewer"]
 
@@ -228,7 +229,7 @@ def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
     folder = tmp_path / "out"
     folder.mkdir()
     done = subprocess.run(
-        listening("-c", program, "render", *rig, "-o", folder / "x.png", "--size", "40x30"),
+        listening("-c", program, "render", *rig, "-o", folder / "x.png", *QUICK),
         env=ENVIRONMENT, capture_output=True, timeout=60, check=False,
     )  # fmt: skip
     _refused(done, code)
@@ -249,7 +250,7 @@ def test_sigterm_ends_a_waiting_program(rig, tmp_path):
         "sys.exit(viewer.cli.run(sys.argv[1:]))\n"
     )
     done = subprocess.run(
-        listening("-c", program, "render", *rig, "-o", pipe, "--size", "40x30"),
+        listening("-c", program, "render", *rig, "-o", pipe, *QUICK),
         env=ENVIRONMENT, capture_output=True, timeout=100, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr, done.stdout) == (143, b"viewer: terminated\n", b"")
@@ -268,7 +269,7 @@ def test_unusual_file_names(tmp_path, name):
     done = call("info", path)
     assert done.returncode == 0 and not done.stderr
     out = os.path.join(folder, os.fsencode(name) + b".png")  # noqa: PTH118
-    done = call("render", path, b"--output", out, "--size", "40x30")
+    done = call("render", path, b"--output", out, *QUICK)
     assert (
         done.returncode == 0 and done.stdout.count(b"\n") == 1 and Path(os.fsdecode(out)).is_file()
     )
@@ -291,7 +292,7 @@ def test_headless_commands_import_no_interface(rig, tmp_path, command):
         "assert not heavy, heavy\n"
         "sys.exit(code)\n"
     )
-    extra = ["-o", tmp_path / "x.png", "--size", "40x30"] if command == "render" else []
+    extra = ["-o", tmp_path / "x.png", *QUICK] if command == "render" else []
     done = subprocess.run(
         [sys.executable, "-c", program, command, *rig, *extra],
         env=ENVIRONMENT, capture_output=True, timeout=60, check=False,
@@ -300,7 +301,7 @@ def test_headless_commands_import_no_interface(rig, tmp_path, command):
 
 
 def test_program_runs_from_any_folder_without_files(tmp_path):
-    done = call("render", "-o", "fox.png", "--size", "40x30", cwd=tmp_path)
+    done = call("render", "-o", "fox.png", *QUICK, cwd=tmp_path)
     assert done.returncode == 0 and done.stdout.startswith(b"fox.png: 40 x 30")
 
 

@@ -107,8 +107,9 @@ def end(tmp_path):
     return ends
 
 
-PNG = ("render", "--size", "40x30"), {"name": "x.png"}
-MP4 = ("render", "--size", "48x32", "--frames", "0:6"), {"name": "x.mp4", "moves": True}
+DRAWN = ("render", "--quality", "draft", "--size")
+PNG = (*DRAWN, "40x30"), {"name": "x.png"}
+MP4 = (*DRAWN, "48x32", "--frames", "0:6"), {"name": "x.mp4", "moves": True}
 OBJ = ("convert",), {"name": "x.ply"}
 INFO = ("info",), {}
 

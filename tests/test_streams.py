@@ -18,6 +18,7 @@ from viewer.streams import is_stdout, standard_streams
 ROOT = Path(__file__).resolve().parents[1]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
 FULL = Path("/dev/full")
+SMALL = "--size 64x64 --quality draft"
 NAMES = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"]
 
 pytestmark = [
@@ -49,7 +50,7 @@ def refused(done: subprocess.CompletedProcess, *words: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_image_to_a_closed_output_is_refused(rig, name):
-    refused(shell(f'viewer render "$@" -o {name} --size 64x64 >&-', *rig), name)
+    refused(shell(f'viewer render "$@" -o {name} {SMALL} >&-', *rig), name)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +62,7 @@ def test_image_to_a_closed_output_is_refused(rig, name):
         'diff "$1" "$1" -o /dev/fd/1',
         'rig "$2" -o /dev/stdout',
         'rig "$2" -o link.npz',
-        'render "$@" --turntable --contact-sheet 2 -o link.png',
+        'render "$@" --turntable --contact-sheet 2 --quality draft -o link.png',
     ],
 )
 def test_every_command_refuses_a_closed_output(rig, tmp_path, command):
@@ -83,7 +84,7 @@ def test_every_command_refuses_a_closed_output(rig, tmp_path, command):
         'info "$@" --json',
         'lint "$@" --fail-on never',
         'diff "$1" "$1" --json',
-        'render "$@" --size 64x64 -o /dev/stdout',
+        f'render "$@" {SMALL} -o /dev/stdout',
     ],
 )
 def test_full_output_is_refused(rig, command):
@@ -105,7 +106,7 @@ def test_closed_error_stream_does_not_change_results(rig, tmp_path, sink):
     assert (done.returncode, done.stdout) == (2, b"")
     target = tmp_path / "x.bmp"
     # That BMP is opaque is a warning.
-    line = f'viewer render "$@" -o "{target}" --size 64x64 --background transparent'
+    line = f'viewer render "$@" -o "{target}" {SMALL} --background transparent'
     assert b"transparency" in shell(line, *rig).stderr
     done = shell(f"{line} --force 2>{sink}", *rig)
     assert done.returncode == 0 and done.stdout.startswith(os.fsencode(target))
@@ -113,7 +114,7 @@ def test_closed_error_stream_does_not_change_results(rig, tmp_path, sink):
 
 def test_image_with_all_streams_closed_is_complete(rig, tmp_path):
     target = tmp_path / "x.png"
-    done = shell(f'viewer render "$@" --size 64x64 -o "{target}" <&- >&- 2>&-', *rig)
+    done = shell(f'viewer render "$@" {SMALL} -o "{target}" <&- >&- 2>&-', *rig)
     assert done.returncode == 0 and target.read_bytes().endswith(b"IEND\xaeB`\x82")
 
 
@@ -130,7 +131,7 @@ def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
     (tmp_path / "link.bmp").symlink_to("/dev/stdout")
     log = tmp_path / "log"
     log.write_bytes(b"precious\n")
-    line = f'viewer render "$@" {options} --size 64x64 -o {name} >> log'
+    line = f'viewer render "$@" {options} {SMALL} -o {name} >> log'
     done = shell(line, *rig, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert log.read_bytes().startswith(b"precious\n" + begin)
@@ -149,7 +150,7 @@ def test_mesh_to_a_pipe_is_the_only_output(rig, tmp_path):
 
 def test_pipe_without_a_reader_is_not_an_error(rig):
     done = shell(
-        'viewer render "$@" --turntable --contact-sheet 2 -o /dev/stdout | true; '
+        'viewer render "$@" --turntable --contact-sheet 2 --quality draft -o /dev/stdout | true; '
         "exit ${PIPESTATUS[0]}",
         *rig,
     )

@@ -19,6 +19,7 @@ from driven_window import PATIENCE, ROOT, Window, _ask_to_close, _wait_for
 from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
 from PIL import Image
+from x11_clipboard import offer_clipboard, read_clipboard
 
 import viewer
 from viewer.app.view.picks import vertex_at
@@ -30,6 +31,7 @@ from viewer.rig.scene import scene_points
 pytestmark = pytest.mark.slow
 SHARED = ROOT.parent / "shared" / "data" / "cse169"
 SIZE = (1280, 800)
+DRAFT, FINAL = ("--quality", "draft"), ("--quality", "final")
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +76,8 @@ def window(display, figure, tmp_path):
     """Return a function that starts the viewer; windows left open are closed."""
     started = []
 
-    def start(*arguments):
-        started.append(Window(display, tmp_path, arguments or figure))
+    def start(*options):
+        started.append(Window(display, tmp_path, [*(options or DRAFT), *figure]))
         return started[-1]
 
     yield start
@@ -151,7 +153,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
 
 
 def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure):
-    app = window()
+    app = window(*FINAL)
     app.key("F12")
     path = app.folder / f"{figure[1].stem}.png"
     _wait_for(path.is_file, "the screenshot")
@@ -190,6 +192,31 @@ def test_files_and_folders_dragged_onto_the_window_open(window, tmp_path):
     app.wait_until_quiet()
     app.key("ctrl+q")
     app.finish()
+
+
+def test_text_is_typed_copied_and_pasted_as_in_other_programs(window, places):
+    app = window()
+    x0, y0, x1, y1 = places[0]["Filter"]
+    subprocess.run(["setxkbmap", "de"], env=app.environment, check=True)
+    app.drag(((x0 + x1) / 2, (y0 + y1) / 2), ((x0 + x1) / 2, (y0 + y1) / 2))
+
+    def copied():
+        app.key("ctrl+a")
+        app.key("ctrl+c")
+        return read_clipboard(app.environment)
+
+    for key in ("udiaeresis", "ssharp", "dead_acute", "e"):
+        app.key(key)
+    _wait_for(lambda: copied() == "\xfc\xdf\xe9", "letters that are not in ASCII")
+    other = offer_clipboard(app.environment, "two\nlines")
+    try:
+        app.key("ctrl+a")
+        app.key("ctrl+v")
+        _wait_for(lambda: copied() == "two lines", "the text of another program in one line")
+    finally:
+        other.kill()
+        other.communicate()
+    app.key("ctrl+q")
 
 
 def test_window_closes_as_window_managers_ask(window):
@@ -278,7 +305,7 @@ def test_vertex_text_is_complete_wherever_the_mouse_rests(window, places, surfac
 
 
 def test_idle_window_uses_no_cpu(window):
-    app = window()
+    app = window(*FINAL)
     # Messages at the start go away after some seconds; until then frames are drawn.
     time.sleep(0.5)
     app.tell("mousemove", 640, 870)

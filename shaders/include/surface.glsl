@@ -1,5 +1,5 @@
-// The surface of the material that is drawn: its colour, opacity and normal. Files without more
-// than an image per material are drawn without MATERIALS, which costs them nothing.
+// The surface of the material that is drawn: its colour, opacity and normal. Files with at most one
+// image per material are drawn without MATERIALS, at no extra cost.
 
 in vec2 v_uv;
 in vec3 v_color;                // linear
@@ -16,27 +16,30 @@ vec4 base_color() {
 const int BASE_MAP = 0, METALLIC_MAP = 1, ROUGHNESS_MAP = 2;
 const int NORMAL_MAP = 3, OCCLUSION_MAP = 4, EMISSIVE_MAP = 5;
 
-in vec2 v_second_uv;
+in vec4 v_other_uvs;            // second and third set of texture coordinates that are used
+in vec4 v_tint;                 // vertex colour, linear, and opacity
 
 uniform vec4 u_base_factor;     // linear
-uniform bool u_has_base_factor; // else untextured surfaces have v_color
+uniform bool u_has_base_factor; // otherwise untextured surfaces have v_color
+uniform bool u_has_tint;        // v_tint multiplies the base colour, and replaces v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
 uniform mat3 u_places[6];       // texture coordinates to those of each texture's image
-uniform int u_uv_sets[6];       // 0: v_uv, 1: v_second_uv
+uniform int u_uv_sets[6];       // 0: v_uv, 1 and 2: v_other_uvs
 uniform sampler2D u_normal_map;
 uniform float u_normal_scale;   // 0: no map
 
 vec2 place(int map) {
-    vec2 uv = u_uv_sets[map] == 0 ? v_uv : v_second_uv;
+    int set = u_uv_sets[map];
+    vec2 uv = set == 0 ? v_uv : set == 1 ? v_other_uvs.xy : v_other_uvs.zw;
     return (u_places[map] * vec3(uv, 1.0)).xy;
 }
 
 vec4 base_color() {
-    vec4 color = u_has_base_factor ? u_base_factor : vec4(v_color, 1.0);
+    vec4 color = u_has_base_factor ? u_base_factor : vec4(u_has_tint ? vec3(1.0) : v_color, 1.0);
     if (u_textured)
         color = u_base_factor * texture(u_texture, place(BASE_MAP));
-    return color;
+    return u_has_tint ? v_tint * color : color;
 }
 
 // Opacity of the surface; masked fragments are discarded.
@@ -53,15 +56,16 @@ float surface_alpha() {
 
 const float FAINTEST = 0.05;    // largest alpha of blended surfaces that counts as invisible
 
-// Discards masked fragments, and blended ones whose alpha is not larger than this.
+// Discards masked fragments, and blended fragments up to this alpha.
 void cut_out(float alpha) {
     if (surface_alpha() <= alpha)
         discard;
 }
 
-// A normal perturbed by the normal map. The tangents are those of the screen's derivatives
-// (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none.
-vec3 mapped_normal(vec3 position, vec3 normal) {
+// A normal perturbed by the normal map. Tangents are computed from screen-space derivatives
+// (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none, and mirrored
+// texture coordinates need no sign. On the back of a surface, side -1, bumps are dents.
+vec3 mapped_normal(vec3 position, vec3 normal, float side) {
     if (u_normal_scale == 0.0)
         return normal;
     vec2 uv = place(NORMAL_MAP);
@@ -73,7 +77,7 @@ vec3 mapped_normal(vec3 position, vec3 normal) {
     float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
     if (longest == 0.0)
         return normal;
-    mapped.xy *= u_normal_scale * inversesqrt(longest);
+    mapped.xy *= side * u_normal_scale * inversesqrt(longest);
     return normalize(tangent * mapped.x + bitangent * mapped.y + normal * max(mapped.z, 1e-3));
 }
 #endif

@@ -12,6 +12,7 @@ import pytest
 from app.tiny import write_rig
 
 ROOT = Path(__file__).resolve().parents[2]
+DRAFT = ("--quality", "draft")
 
 # Run in a process of its own: the window's own frames end the server at a known moment.
 PROGRAM = """
@@ -28,6 +29,7 @@ def watched(self):
     drawn.append(1)
     if len(drawn) == 3 and folder:
         settings = RecordSettings(kind=".gif", turntable=True, seconds=60.0)
+        settings.size, settings.own_size = "own", (64, 48)
         self.state.of(Recording).settings = settings
         self.state.of(Recording).wanted = Path(folder, "turn.gif")
     if len(drawn) >= 3 and (not folder or os.listdir(folder)):
@@ -90,7 +92,7 @@ def ended(server, tmp_path, word="", program=PROGRAM):
     environment.pop("WAYLAND_DISPLAY", None)
     rig = write_rig(tmp_path)
     return subprocess.run(
-        [sys.executable, "-c", program, str(process.pid), str(word), *map(str, rig)],
+        [sys.executable, "-c", program, str(process.pid), str(word), *map(str, rig), *DRAFT],
         env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
 

@@ -67,6 +67,12 @@ def test_motion_controls_work(drive, rig, tooltips):
     assert hand.state.clock.playing
 
 
+def test_controls_in_a_disabled_block_give_its_reason(hand, tooltips):
+    hand.show_panel("Weights")
+    rest(hand, "Automatic")
+    assert tooltips[-1] == "the heat map is off"
+
+
 def test_gaps_can_be_filled_if_present(drive, rig):
     hand = drive(scene=people(rig, [True, False, True]), size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")

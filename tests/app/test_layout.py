@@ -68,8 +68,8 @@ def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
 
 
 def test_panel_closes_by_its_cross(hand):
-    right = hand.state.view_rect[0]
-    hand.click((right - 13, hand.state.view_rect[1] + 10))
+    tab = imgui.internal.find_window_by_name("Joints").dc.dock_tab_item_rect
+    hand.click((tab.max.x - 8, (tab.min.y + tab.max.y) / 2))
     hand.step(3)
     assert hand.state.of(ShownPanels).closed == {"joints"}
 
@@ -104,7 +104,7 @@ def test_reset_layout_keeps_pose_and_camera(hand):
 
 @pytest.mark.parametrize("size", [(900, 640), (640, 480), (320, 240), (50, 40), (8, 8), (1, 1)])
 def test_small_windows_draw_without_errors(drive, rig, size):
-    hand = drive(*rig, size=size)
+    hand = drive(*rig, size=size, pixels_per_point=1.0)
     hand.key("s")
     hand.key("f")
     hand.wheel(2, (size[0] / 2, size[1] / 2))

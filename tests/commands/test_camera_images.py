@@ -13,6 +13,8 @@ from viewer.rendering.overlay.frusta import frustum_corners
 
 pytestmark = pytest.mark.slow
 
+_QUICK = ("--quality", "draft", "--force")
+
 
 @pytest.fixture
 def recording(tmp_path):
@@ -21,7 +23,7 @@ def recording(tmp_path):
 
 def drawn(recording, out, *options):
     size = f"{SIDE}x{SIDE}"
-    still = ("--view", "01", "--no-grid", "--size", size, "--samples", "1", "--force")
+    still = ("--view", "01", "--no-grid", "--size", size, "--samples", "1", *_QUICK)
     assert run(["render", str(recording), "-o", str(out), *still, *options]) == 0
     return np.array(Image.open(out).convert("RGB")).astype(int)
 
@@ -69,7 +71,9 @@ def test_frustum_shows_the_image_where_the_camera_looks(recording, tmp_path):
     np.testing.assert_allclose(corners[2], [1.01, -3.0, -1.01], atol=1e-12)
     out = tmp_path / "c.png"
     options = ("--cameras", "--no-grid", "--front", "-y", "--azimuth", "180", "--frame", "2")
-    assert run(["render", str(recording), "-o", str(out), "--size", "480x360", *options]) == 0
+    assert (
+        run(["render", str(recording), "-o", str(out), "--size", "480x360", *_QUICK, *options]) == 0
+    )
     pixels = np.array(Image.open(out).convert("RGB")).astype(int)
     assert (pixels == 200).all(axis=2).sum() > 20  # its image's grey
 

@@ -11,6 +11,8 @@ from viewer.cli import run
 
 pytestmark = pytest.mark.slow
 
+_QUICK = ("--size", "320x240", "--quality", "draft", "--force")
+
 
 @pytest.fixture
 def rig(tmp_path):
@@ -23,7 +25,7 @@ def render(tmp_path, capsys):
 
     def drawn(*arguments):
         path = tmp_path / "x.png"
-        assert run(["render", *arguments, "--size", "320x240", "-o", str(path), "--force"]) == 0
+        assert run(["render", *arguments, *_QUICK, "-o", str(path)]) == 0
         return np.array(Image.open(path)).astype(int), capsys.readouterr().err
 
     return drawn

@@ -50,7 +50,19 @@ def recording(tmp_path):
 
 
 def draw(recording, out, *options):
-    return run(["render", str(recording), "-o", str(out), "--size", "32x32", *options])
+    return run(
+        [
+            "render",
+            str(recording),
+            "-o",
+            str(out),
+            "--size",
+            "32x32",
+            "--quality",
+            "draft",
+            *options,
+        ]
+    )
 
 
 # The corner (0, 0) is seen at x = y = -1/2, r^2 = 1/2; k1 = 0.1 moves it by k1 r^2 of its way from

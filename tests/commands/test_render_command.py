@@ -24,6 +24,7 @@ from viewer.rig.scene import scene_points
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
+SMALL = ("--size", "40x30", "--quality", "draft")
 
 
 def _size(path):
@@ -255,7 +256,7 @@ def test_dof_moves_the_figure_in_the_image(draw):
 def test_existing_image_is_replaced_only_with_force(rig, tmp_path, capsys):
     out = tmp_path / "x.png"
     out.write_bytes(b"precious")
-    arguments = ["render", *map(str, rig), "-o", str(out), "--size", "40x30"]
+    arguments = ["render", *map(str, rig), "-o", str(out), *SMALL]
     assert run(arguments) == 5
     assert "--force" in capsys.readouterr().err and out.read_bytes() == b"precious"
     assert run([*arguments, "--force"]) == 0
@@ -283,21 +284,21 @@ def test_input_is_never_replaced(rig, tmp_path, capsys):
 )
 def test_unwritable_output_is_exit_code_5(rig, tmp_path, out, words, capsys):
     before = sorted(tmp_path.iterdir())
-    assert run(["render", *map(str, rig), "-o", str(tmp_path / out), "--size", "40x30"]) == 5
+    assert run(["render", *map(str, rig), "-o", str(tmp_path / out), *SMALL]) == 5
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
 
 
 def test_full_device_is_exit_code_5(rig, capsys):
-    assert run(["render", *map(str, rig), "-o", "/dev/full", "--size", "40x30"]) == 5
+    assert run(["render", *map(str, rig), "-o", "/dev/full", *SMALL]) == 5
     assert capsys.readouterr().err == "viewer: /dev/full: No space left on device\n"
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".bmp", ".webp", ".tiff", ".png", ""])
 def test_suffix_chooses_the_format(rig, tmp_path, suffix):
     out = tmp_path / f"x{suffix}"
-    assert run(["render", *map(str, rig), "-o", str(out), "--size", "40x30"]) == 0
+    assert run(["render", *map(str, rig), "-o", str(out), *SMALL]) == 0
     kinds = {".jpg": "JPEG", ".bmp": "BMP", ".webp": "WEBP", ".tiff": "TIFF"}
     with Image.open(out) as picture:
         assert picture.format == kinds.get(suffix, "PNG") and picture.size == (40, 30)
@@ -341,7 +342,7 @@ def test_video_formats_are_listed_for_frame_ranges_too(rig, tmp_path, capsys):
 
 def test_transparency_that_the_format_lacks_is_a_warning(rig, tmp_path, capsys):
     out = tmp_path / "x.jpg"
-    arguments = ["-o", str(out), "--size", "40x30", "--background", "transparent"]
+    arguments = ["-o", str(out), *SMALL, "--background", "transparent"]
     assert run(["render", *map(str, rig), *arguments]) == 0
     assert "this format has no transparency" in capsys.readouterr().err
 
@@ -356,8 +357,7 @@ def test_image_can_be_written_to_standard_output(rig, tmp_path, into):
         *rig,
         "-o",
         "/dev/stdout",
-        "--size",
-        "40x30",
+        *SMALL,
     ]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     target = tmp_path / "through.png"

@@ -19,6 +19,8 @@ from viewer.rig.scene import Actor, Scene
 
 pytestmark = pytest.mark.slow
 
+_SMALL = ("--size", "160x120", "--quality", "draft")
+
 
 @pytest.fixture(scope="module")
 def body():
@@ -38,7 +40,7 @@ def render(tmp_path, capsys):
     def drawn(*arguments):
         path = tmp_path / "x.png"
         path.unlink(missing_ok=True)
-        code = run(["render", *arguments, "--size", "160x120", "-o", str(path)])
+        code = run(["render", *arguments, *_SMALL, "-o", str(path)])
         said = capsys.readouterr()
         if code:
             assert not path.exists()
@@ -174,7 +176,7 @@ def test_scalar_values_of_a_sequence_are_drawn_with_a_legend(body, tmp_path):
     for option in ("--legend", "--samples=4"):
         path = tmp_path / "sheet.png"
         arguments = ["--scalar", "dominant", "--turntable", "180deg", "--contact-sheet", "2"]
-        more = ["--size", "480x180", "--force", "-o", str(path)]
+        more = ["--size", "480x180", "--quality", "draft", "--force", "-o", str(path)]
         assert run(["render", body, *arguments, option, *more]) == 0
         sheets.append(np.array(Image.open(path)).astype(int))
     changed = np.abs(sheets[0] - sheets[1]).sum(axis=2) > 0

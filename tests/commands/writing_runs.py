@@ -98,7 +98,8 @@ def converting(inputs: Inputs) -> dict[str, list[str]]:
 
 def drawing(inputs: Inputs) -> dict[str, list[str]]:
     """Return commands that render."""
-    motion = [*inputs.twist, "--size", "64x48", "--frames", "0:3"]
+    quick = ["--size", "64x48", "--quality", "draft"]
+    motion = [*inputs.twist, *quick, "--frames", "0:3"]
     return {
         f"{name} {' '.join(more)}": ["render", *motion, "-o", f"OUT/{name}", *more]
         for name, *more in (
@@ -109,7 +110,7 @@ def drawing(inputs: Inputs) -> dict[str, list[str]]:
             ("s.png", "--contact-sheet", "2"),
         )
     } | {
-        "x.jpg": ["render", *inputs.roof, "-o", "OUT/x.jpg", "--size", "64x48"],
+        "x.jpg": ["render", *inputs.roof, "-o", "OUT/x.jpg", *quick],
         "d.png": ["diff", "+".join(inputs.roof), *inputs.roof[1:], "-o", "OUT/d.png"],
     }
 

@@ -28,7 +28,7 @@ def textured(material: Material) -> Actor:
         seamed_mesh(),
         materials=(material,),
         triangle_materials=np.zeros(3, np.int32),
-        second_uvs=UVS[::-1],
+        other_uvs=(UVS[::-1],),
     )
     actor.figure = replace(actor.figure, mesh=mesh)
     return actor
@@ -119,7 +119,7 @@ def test_material_libraries_come_back(tmp_path):
     notes = export(textured(wanted), tmp_path / "out.obj")
     (lost,) = (note for note in notes if note.key == "X003.parts")
     assert (lost.values["format"], [part.key for part in lost.values["parts"]]) == (
-        ".mtl",
+        ".obj and .mtl",
         [
             "part-occlusion",
             "part-single-sided",

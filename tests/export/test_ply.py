@@ -1,5 +1,7 @@
 """Binary ``.ply``: the header and every byte after it, read back by a separate parser."""
 
+from dataclasses import replace
+
 import faults
 import numpy as np
 import pytest
@@ -95,6 +97,17 @@ def test_textures_are_left_out(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["out.ply"]
     values = {"format": ".ply", "parts": [Phrase("part-all-materials")]}
     assert [(note.key, note.values) for note in notes[1:]] == [("X003.parts", values)]
+
+
+def test_colours_of_vertices_are_written_as_srgb(tmp_path):
+    """0.214 and 0.5 of the light are sRGB 127.5 and 187.5; opacity is linear."""
+    colors = np.zeros((5, 4))
+    colors[:2] = [[1.0, 0.21404, 0.5, 1.0], [0.0, 2.0, 0.0031308, 0.2]]
+    notes = export(seamed_actor(mesh=replace(seamed_mesh(), colors=colors)), tmp_path / "out.ply")
+    vertices = read_ply(tmp_path / "out.ply").elements["vertex"]
+    found = columns(vertices, "red", "green", "blue", "alpha")
+    assert_allclose(found[:2], [[255, 127.5, 187.5, 255], [0, 255, 10.3, 51]], atol=0.6)
+    assert len(notes) == 1
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "end_header\n", "é\udcff 文", "", "x" * 5000, "\r"])

@@ -99,6 +99,12 @@ def test_text_in_another_format_is_refused():
     assert fault == ("F002.unknown-kind", None, {"wanted": ANY})
 
 
+@pytest.mark.parametrize("name", ["a.glb", "a.vrm", "a", "a.json.gltf"])
+@pytest.mark.parametrize("data", [b"glTF\2\0\0\0", b'\n{"scene": 0, "asset" : {"version": "2.0"}}'])
+def test_gltf_is_recognised(name, data):
+    assert detect(Source(name, data)) == "gltf"
+
+
 @pytest.mark.parametrize(("name", "key"), [("a.skel", "skel"), ("a.skin", "skin")])
 def test_text_with_a_known_suffix_goes_to_its_reader(name, key):
     assert found(name, b"hello world") == (key, [])

@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from faults import lines
+from faults import told
 from numpy.testing import assert_allclose, assert_array_equal
 from pickle_bytes import array, fake_class, matrix, named, saved, several, text
 from pig_text import (
@@ -21,6 +21,7 @@ from pig_text import (
 )
 
 import viewer
+from viewer.diagnostics.phrase import Phrase
 from viewer.formats import save_image
 from viewer.rig.mesh import split_seams
 from viewer.rig.pose import rest_pose
@@ -171,7 +172,8 @@ def test_scale_of_0_or_less_is_noted(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=np.array([0.0] * 12 + [-2])), figure, pose)
-    assert lines(notes) == ["scale: expected a positive number, found -2; kept at 1"]
+    fault = Phrase("scale-not-positive", found=-2.0)
+    assert told(notes) == [("F007.scale-kept", {"fault": fault, "scale": 1.0})]
 
 
 # Seams

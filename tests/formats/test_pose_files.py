@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from faults import lines, warnings_of
+from faults import told, warnings_of
 from formats.pose_texts import read
 from numpy.testing import assert_allclose, assert_array_equal
 from pig_text import write as write_pig
@@ -196,7 +196,7 @@ def test_vector_of_a_related_model_poses_the_body(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=waves(72)), figure, posed)
-    assert lines(notes) == [f"2 joints of the pose omitted: missing from {figure.name}"]
+    assert told(notes) == [("F007.pose-joints-left-out", {"n": 2, "figure": figure.name})]
     expected = rotation_vector_to_matrix(waves(66).reshape(-1, 3))
     assert_allclose(turns(figure, posed)[:22], expected, rtol=0, atol=1e-15)
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
@@ -206,7 +206,7 @@ def test_body_pose_of_smpl_keeps_the_face_of_smplx(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(parts={"body_pose": waves(69)}), figure, posed)
-    assert lines(notes) == ["2 joints in the pose beyond the body's 21 omitted"]
+    assert told(notes) == [("F007.body-joints-left-out", {"n": 2, "own": 21})]
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
     hands_at_rest = np.where(np.arange(69) < 63, waves(69), 0.0)
     assert apply_record(PoseRecord(parts={"body_pose": hands_at_rest}), figure, posed) == []
@@ -215,9 +215,9 @@ def test_body_pose_of_smpl_keeps_the_face_of_smplx(figures):
 def test_parts_that_a_figure_lacks_are_noted_unless_they_are_at_rest(figures):
     figure = figures["smpl"]
     record, _ = parts(jaw_pose=[0.1, 0, 0], leye_pose=[0, 0, 0], left_hand_pose=[0.5] * 6)
-    assert lines(apply_record(record, figure, rest_pose(figure.skeleton))) == [
-        "jaw_pose omitted: smpl has no such joint",
-        "left_hand_pose omitted: smpl has no hand components",
+    assert told(apply_record(record, figure, rest_pose(figure.skeleton))) == [
+        ("F007.part-left-out", {"part": "jaw_pose", "figure": "smpl"}),
+        ("F007.hand-part-left-out", {"part": "left_hand_pose", "figure": "smpl"}),
     ]
 
 

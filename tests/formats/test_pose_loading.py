@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from faults import fault_of, lines
+from faults import fault_of
 from pig_text import CORE
 from pig_text import write as write_pig
 from synthetic_smpl import model
@@ -178,9 +178,8 @@ def test_pose_is_added_to_an_actor_in_place(files):
     assert actor.pose is pose
     assert pose.dofs[[3, 6]].tolist() == [0.25, 0.5]
     assert notes == []
-    assert lines(add_to_actor(additions(files, "far"), actor)[1]) == [
-        f"{files['far']}: 1 DOF of the pose clamped to its limits"
-    ]
+    (note,) = add_to_actor(additions(files, "far"), actor)[1]
+    assert (*fault_of(note), note.path) == ("F007.pose-clamped", None, {"n": 1}, files["far"])
 
 
 def test_texture_makes_an_actor_with_the_same_pose(files):

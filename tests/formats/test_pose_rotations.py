@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults import fault_of, lines, warnings_of
+from faults import fault_of, told, warnings_of
 from numpy.testing import assert_array_equal
 
 import viewer
@@ -82,7 +82,7 @@ def test_edited_dof_of_a_saved_pose_takes_precedence():
     record = pose.read(Source("a.json", json.dumps(values).encode()))
     found = viewer.rest_pose(skeleton)
     notes = viewer.apply_record(record, figure, found)
-    assert lines(notes) == ["1 DOF of the pose clamped to its limits"]
+    assert told(notes) == [("F007.pose-clamped", {"n": 1})]
     assert found.dofs.tolist() == [-0.5, 1.0]
     assert found.rotations.tolist() == [[0, 0, 0, 1], [0, 0.6, 0, 0.8]]
 

@@ -120,6 +120,24 @@ def test_properties_in_any_order_and_unknown_elements(order: str) -> None:
     assert warnings == [unused("element camera", "vertex red", "face flags", "face quality")]
 
 
+def test_colours_of_vertices_become_linear() -> None:
+    """sRGB 188 is 0.5029 of the light; 0.5 is 0.2140; numbers are limited to 0 to 1."""
+    triangle = ("face", ["list uchar uchar vertex_indices"], [[[0, 1, 2]]])
+    places = ["float x", "float y", "float z"]
+    names = ["uchar red", "uchar green", "uchar blue"]
+    rows = [[0, 0, 0, 255, 0, 188], [1, 0, 0, 0, 0, 0], [0, 1, 0, 255, 255, 255]]
+    figure, warnings = read(binary("<", [("vertex", [*places, *names], rows), triangle]))
+    assert warnings == []
+    wanted = [[1, 0, 0.502886, 1], [0, 0, 0, 1], [1, 1, 1, 1]]
+    np.testing.assert_allclose(figure.mesh.colors, wanted, atol=1e-6)
+    names = ["float red", "float green", "float blue", "ushort alpha"]
+    rows = [[0, 0, 0, 0.5, 0, 2, 65535], [1, 0, 0, 0, 0, 0, 0], [0, 1, 0, 1, 1, 1, 13107]]
+    figure, warnings = read(binary(">", [("vertex", [*places, *names], rows), triangle]))
+    assert warnings == []
+    wanted = [[0.214041, 0, 1, 1], [0, 0, 0, 0], [1, 1, 1, 0.2]]
+    np.testing.assert_allclose(figure.mesh.colors, wanted, atol=1e-6)
+
+
 def test_trailing_ctrl_z_byte_of_binary_data_is_kept() -> None:
     data = binary("<", [("vertex", ["float x", "float y", "uchar z"], [[0, 0, 26]] * 3),
                         ("face", ["list uchar uchar vertex_indices"], [])])  # fmt: skip

@@ -29,6 +29,7 @@ def glazed() -> Material:
     """Return a material with every property except a base texture."""
     picture = np.arange(32, dtype=np.uint8).reshape(4, 2, 4)
     rough = Texture("orm.png", picture, channel=1, wrap=("repeat", "mirror"), is_smooth=False)
+    rough = replace(rough, minification="nearest_mipmap_linear")
     bumps = Texture("gone.png", uv_set=1, transform=[[0.5, 0.0, 0.25], [0.0, 2.0, -1.0]])
     return Material(
         "glazed",
@@ -57,12 +58,15 @@ def figure() -> Figure:
         triangles,
         uvs=np.arange(10.0).reshape(5, 2),
         uv_triangles=np.array([[0, 1, 2], [0, 2, 4]]),
-        second_uvs=np.arange(10.0)[::-1].reshape(5, 2),
+        other_uvs=(np.arange(10.0)[::-1].reshape(5, 2), np.full((5, 2), 0.25)),
         materials=(
             Material("skin", Texture("skin.png", np.arange(48, dtype=np.uint8).reshape(3, 4, 4))),
             glazed(),
         ),
         triangle_materials=np.array([1, 0]),
+        colors=np.arange(16.0).reshape(4, 4) / 16.0,
+        parts=("body", "hat", "body"),
+        triangle_parts=np.array([2, -1]),
     )
     skeleton = ball_skeleton(("root", "tïp"), np.array([-1, 0]), np.array([[0.0, 0, 0], [1, 0, 0]]))
     skeleton = replace(skeleton, boxes=np.arange(12.0).reshape(2, 2, 3))
@@ -121,8 +125,11 @@ def test_all_written_data_is_read_back(tmp_path):
         "triangles",
         "uvs",
         "uv_triangles",
-        "second_uvs",
+        "other_uvs",
         "triangle_materials",
+        "colors",
+        "parts",
+        "triangle_parts",
     ):
         assert_array_equal(getattr(found.mesh, part), getattr(wanted.mesh, part))
     assert [(m.name, m.texture) for m in found.mesh.materials] == [

@@ -291,9 +291,11 @@ def test_properties_of_materials_that_skin_omits_are_named(tmp_path):
     figure = Figure("a", mesh(uvs=np.zeros((3, 2)), materials=(plain,), triangle_materials=[0]))
     assert write(figure, tmp_path / "a.skin") == []
     tinted = replace(plain, base_color=(1.0, 0.0, 0.0, 1.0), alpha_mode="mask")
-    shape = replace(figure.mesh, materials=(tinted,), second_uvs=np.ones((3, 2)))
+    more = {"other_uvs": (np.ones((3, 2)),), "colors": np.ones((3, 4)), "parts": ("hat",)}
+    shape = replace(figure.mesh, materials=(tinted,), **more)
     (note,) = write(Figure("a", shape), tmp_path / "a.skin")
-    parts = [Phrase("part-materials"), Phrase("part-second-uvs")]
+    names = "part-materials", "part-second-uvs", "part-vertex-colors", "part-mesh-parts"
+    parts = [Phrase(name) for name in names]
     assert (note.key, note.values) == ("X003.parts", {"format": ".skin", "parts": parts})
 
 

@@ -75,7 +75,7 @@ def test_edited_data_has_no_line(files: list[Path]) -> None:
     skin = replace(figure.skin, weights=weights)
     scene.actors[0] = replace(scene.actors[0], figure=replace(figure, skin=skin))
     found = {f.code: f for f in checked(files, scene)}
-    assert found["W001"].message.startswith("weights of 2 vertices") and found["W001"].file is None
+    assert found["W001"].diagnostic.values["n"] == 2 and found["W001"].file is None
     # The skeleton is still the one from the file.
     assert found["S003"].file.name == "a.skel" and found["S003"].actor == 0
     # It is unknown whether the reader's messages about the skin apply to this mesh.

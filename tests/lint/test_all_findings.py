@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faults import told
 from formats import bvh_text, skel_text, skin_text, synthetic_smpl
 from lint.sound import column
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.formats import write
 from viewer.lint import Finding, lint_files
 from viewer.rig.figure import Figure
@@ -76,9 +78,9 @@ def test_findings_of_one_code_report_count_and_locations(tmp_path: Path) -> None
     for vertex in (3, 8, 9):
         lines[positions + vertex] = "inf 1 nan"
     found = next(f for f in linted(tmp_path, lines) if f.code == "F003")
-    assert found.message == (
-        'positions of vertex 3: expected a number, found "inf"; first of 6 (vertices 3, 8, 9)'
-    )
+    item = Phrase("of-vertex", section="positions", index=3)
+    assert told([found.diagnostic]) == [("F003.number", {"item": item, "found": b"inf"})]
+    assert found.diagnostic.count == 6
     assert found.vertices.tolist() == [3, 8, 9] and found.line == positions + 4
 
 
@@ -125,10 +127,8 @@ def test_unparsable_file_reports_that_nothing_else_was_checked(tmp_path: Path) -
     lines[section(lines, "positions") + 3] = "normals 4 {"
     (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]
     assert (found.code, found.line) == ("F002", 5)
-    assert found.message == (
-        'expected "}" to close positions (line 1), found "normals"; the rest of '
-        "the file was not checked"
-    )
+    values = {"section": "positions", "line": 1, "found": b"normals"}
+    assert told([found.diagnostic]) == [("F002.unclosed", values)] and found.diagnostic.is_final
 
 
 def test_an_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> None:
@@ -168,7 +168,7 @@ def test_body_errors_are_found_including_lazily_read_ones(tmp_path: Path) -> Non
         ("W001", "error"),
     ]  # fmt: skip
     assert found[0].vertices.tolist() == [3] and found[1].vertices.tolist() == [4]
-    assert [f.message.split(":")[0] for f in found[2:4]] == ["shapedirs", "posedirs"]
+    assert [f.diagnostic.values["item"] for f in found[2:4]] == ["shapedirs", "posedirs"]
 
 
 def test_invalid_frames_are_not_jumps(tmp_path: Path) -> None:
@@ -192,5 +192,6 @@ def test_without_a_unit_lengths_are_in_figure_units(tmp_path: Path) -> None:
     (tmp_path / "a.skel").write_text(skel.replace("offset 0.0 2.0 0.0", "offset 0.0 3.0 0.0"))
     (bound,) = [f for f in linted(tmp_path, lines) if f.code == "B004"]
     # One unit of a column of 2 x 4 x 2, whose diagonal is sqrt(24).
-    assert "knee by 1 units (20.4 % of its size)" in bound.message
+    values = {"n": 1, "joint": "knee", "distance": "1 units (20.4 % of its size)"}
+    assert told([bound.diagnostic]) == [("B004.joints", values)]
     assert bound.line == section(lines, "bindings") + 7

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from faults import told
 from lint.sound import column, scene_of
 
 from viewer.lint import lint_scene
@@ -30,7 +31,8 @@ def test_other_joints_are_compared_despite_a_singular_one() -> None:
     found = {finding.code: finding for finding in lint_scene(scene)}
     assert found["B002"].joints.tolist() == [0]
     assert found["B004"].joints.tolist() == [1]
-    assert "knee by 1000 mm" in found["B004"].message
+    values = {"n": 1, "joint": "knee", "distance": "1000 mm"}
+    assert told([found["B004"].diagnostic]) == [("B004.joints", values)]
 
 
 def test_a_stray_vertex_does_not_hide_joints_that_were_bound_elsewhere() -> None:

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faults import told
 from lint.sound import column, legs, scene_of, standing
 
 from viewer.app.core.clock import Clock
+from viewer.diagnostics.phrase import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
@@ -46,8 +48,10 @@ def test_a_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -
     # It is sampled at 60 fps from 0 to 4 s: from frame 60, at 2 s, to half a frame later.
     assert found.frames.tolist() == [60]
     assert found.times == pytest.approx([start + offset + 2.0 + 1 / 60])
-    assert found.message.startswith("1 of 121 frames: foot moves at")
-    assert found.message.endswith(f"at frame 60, {start + offset + 2.0 + 1 / 60:.3f} s")
+    values = found.diagnostic.values
+    assert (found.diagnostic.key, values["joint"]) == ("C003.joint", "foot")
+    assert (values["n"], values["all"], values["frame"]) == (1, 121, 60)
+    assert values["time"] == pytest.approx(start + offset + 2.0 + 1 / 60)
     assert shown_frame(scene, float(found.times[0])) == 60
 
 
@@ -55,7 +59,7 @@ def test_frames_use_the_requested_rate() -> None:
     found = jump_of(Scene([jumping(0.0, 2.0)]), LintOptions(frame_rate=24.0))
     # Sampled at 72 fps.
     assert found.frames.tolist() == [48] and found.times == pytest.approx([2.0 + 1 / 72])
-    assert found.message.startswith("1 of 97 frames")
+    assert (found.diagnostic.values["n"], found.diagnostic.values["all"]) == (1, 97)
 
 
 def test_frames_of_several_clips_count_from_the_earliest_start() -> None:
@@ -79,10 +83,10 @@ def test_curves_beyond_limits_report_frame_and_degrees() -> None:
     scene = scene_of(figure, Clip("keys", (channel,), 0.0, 1.0))
     (found,) = [f for f in lint_scene(scene) if f.code == "C006"]
     # 4 radians at the end, of at most 3.
-    assert found.message == (
-        "1 curve exceeds its limits: knee.y is 229.2° in frame 30 at 1.000 s, its limits are "
-        "-171.9° and 171.9°"
-    )
+    when = Phrase("in-frame", frame=30, time=1.0)
+    ends = {"low": "-171.9°", "high": "171.9°"}
+    dof = Phrase("beyond-limits", dof="knee.y", value="229.2°", when=when, **ends)
+    assert told([found.diagnostic]) == [("C006.curves", {"n": 1, "dof": dof})]
     assert found.seek == pytest.approx(1.0)
 
 

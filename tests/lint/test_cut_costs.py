@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faults import told
 from lint.sound import column, make_skeleton, scene_of
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.lint import Finding, lint_scene
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
@@ -40,42 +42,45 @@ def cost(scene: Scene, **invalid: Ints) -> Finding:
 
 
 # Joint 4 is 2 m from its rest position, so 0.05 of it is 100 mm; nothing else moves.
-TOLD = (
-    "pruning to 4 moves the mesh by up to 100 mm (vertex 8), 100 mm on average over these "
-    "vertices, in 6 poses"
-)
+COST = {"limit": 4, "most": "100 mm", "vertex": 8, "mean": "100 mm", "poses": 6}
+
+
+def without(n: int) -> Phrase:
+    """Return the part of a message that counts vertices whose error is unknown."""
+    return Phrase("cut-cost-left-out", n=n)
+
+
+def values_of(n: int, cost: Phrase) -> tuple[str, dict[str, object]]:
+    return "W007.influences", {"n": n, "most": 5, "cost": cost}
 
 
 def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
     found = cost(scene({8: CROWDED, 5: LAST}))
-    assert found.message == (
-        f"2 vertices have more than 4 influences (maximum: 5); {TOLD}; 1 vertex is omitted "
-        "because a required position or bind matrix is invalid"
-    )
+    known = Phrase("cut-cost", **COST, left_out=without(1))
+    assert told([found.diagnostic]) == [values_of(2, known)]
     assert found.vertices.tolist() == [8, 5]  # unknown values come last
     found = cost(scene({8: CROWDED, 5: LAST, 6: LAST}))
-    assert found.message.endswith(
-        f"{TOLD}; 2 vertices are omitted because a required position or bind matrix is invalid"
-    )
+    known = Phrase("cut-cost", **COST, left_out=without(2))
+    assert told([found.diagnostic]) == [values_of(3, known)]
 
 
 def test_a_joint_of_weight_0_leaves_nothing_out() -> None:
     found = cost(scene({8: [*CROWDED, (5, 0.0)]}))
-    assert found.message == f"1 vertex has more than 4 influences (maximum: 5); {TOLD}"
+    known = Phrase("cut-cost", **COST, left_out="")
+    assert told([found.diagnostic]) == [values_of(1, known)]
 
 
 def test_an_unknown_error_is_not_reported_as_0() -> None:
-    assert cost(scene({5: LAST})).message == (
-        "1 vertex has more than 4 influences (maximum: 5); the effect of pruning to 4 is unknown: "
-        "1 vertex is omitted because a required position or bind matrix is invalid"
-    )
+    unknown = Phrase("cut-cost-unknown", limit=4, left_out=without(1))
+    assert told([cost(scene({5: LAST})).diagnostic]) == [values_of(1, unknown)]
 
 
 @pytest.mark.parametrize(("part", "places"), [("bindings", [5]), ("positions", [5])])
 def test_vertices_not_from_the_file_are_left_out_too(part: str, places: list[int]) -> None:
     lost = np.array(places, dtype=np.int32)
     found = cost(scene({8: CROWDED, 5: LAST}, singular=False), **{part: lost})
-    assert f"{TOLD}; 1 vertex is omitted because" in found.message
+    known = Phrase("cut-cost", **COST, left_out=without(1))
+    assert told([found.diagnostic]) == [values_of(2, known)]
 
 
 def test_overflowing_errors_are_left_out() -> None:
@@ -84,4 +89,5 @@ def test_overflowing_errors_are_left_out() -> None:
     matrices = figure.skin.inverse_bind.copy()
     matrices[5, :3, :3] *= 1e308  # squares of its displacements are infinite
     whole.actors[0].figure = replace(figure, skin=replace(figure.skin, inverse_bind=matrices))
-    assert f"{TOLD}; 1 vertex is omitted because" in cost(whole).message
+    known = Phrase("cut-cost", **COST, left_out=without(1))
+    assert told([cost(whole).diagnostic]) == [values_of(2, known)]

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faults import told
 from lint.sound import FRAMES, RATE, legs, scene_of, standing
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
 from viewer.lint._ground import Ground, ground_of
 from viewer.rig.motion.timing import Timing
@@ -38,9 +40,8 @@ def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]
 def test_a_short_sink_is_found_however_deep_and_wherever(depth: float, floor: float) -> None:
     (sunk,) = found(np.where((_K >= 20) & (_K < 30), -depth, 0.0), floor)
     assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(120, 130))
-    assert sunk.message == (
-        f"10 of 60 frames: left_ankle is {1000 * depth:g} mm below the ground at frame 120"
-    )
+    values = {"joint": "left_ankle", "depth": f"{1000 * depth:g} mm", "frame": 120}
+    assert told([sunk.diagnostic]) == [("C008.foot", {"n": 10, "all": 60, **values})]
 
 
 @pytest.mark.parametrize("depth", [0.02, 0.05, 0.1, 0.2])
@@ -54,10 +55,11 @@ def test_sinking_for_half_of_the_motion_elsewhere_is_ambiguous(depth: float) -> 
     (note,) = found(np.where(_K >= 30, -depth, 0.0), 0.8)
     # The ankles of the legs are 0.1 above the root's floor.
     assert (note.code, note.severity) == ("C013", "note")
-    assert note.message == (
-        f"feet rest at 2 heights (0.9 for 1 s, {0.9 - depth:g} for 1 s): ground height "
-        "unclear, feet not checked"
-    )
+    levels = [
+        Phrase("resting-height", height=pytest.approx(height), seconds=1.0)
+        for height in (0.9, 0.9 - depth)
+    ]
+    assert told([note.diagnostic]) == [("C013.heights", {"n": 2, "levels": levels})]
 
 
 @pytest.mark.parametrize("floor", FLOORS)
@@ -65,7 +67,8 @@ def test_sinking_for_half_of_the_motion_elsewhere_is_ambiguous(depth: float) -> 
 def test_a_ramp_down_after_standing_is_found(depth: float, floor: float) -> None:
     (sunk,) = found(np.where(_K >= 30, -depth * (_K - 30) / 29, 0.0), floor)
     assert sunk.code == "C008" and sunk.frames[0] == 159
-    assert f"left_ankle is {1000 * depth:g} mm below" in sunk.message
+    values = sunk.diagnostic.values
+    assert (values["joint"], values["depth"]) == ("left_ankle", f"{1000 * depth:g} mm")
 
 
 @pytest.mark.parametrize("floor", FLOORS)
@@ -93,7 +96,9 @@ def test_a_short_rest_on_the_default_ground_far_below_is_ambiguous(
 ) -> None:
     # It stands or sits higher, or has sunk: this is undecidable.
     (note,) = found(np.where(count > _K, 0.0, height), 0.0)
-    assert note.code == "C013" and f"feet rest at 2 heights ({0.1 + height:g}" in note.message
+    assert note.diagnostic.key == "C013.heights" and note.diagnostic.values["n"] == 2
+    highest = note.diagnostic.values["levels"][0]
+    assert highest.values["height"] == pytest.approx(0.1 + height)
 
 
 @pytest.mark.parametrize("count", [8, 14, 19])
@@ -134,7 +139,8 @@ def test_valid_motions_have_no_findings(name: str, floor: float) -> None:
 def test_a_single_noisy_frame_is_ignored_unless_deep() -> None:
     assert found(np.where(_K == 30, -0.02, 0.0), 0.0) == []
     (sunk,) = found(np.where(_K == 30, -0.03, 0.0), 0.0)
-    assert sunk.message == "1 of 60 frames: left_ankle is 30 mm below the ground at frame 130"
+    values = {"n": 1, "all": 60, "joint": "left_ankle", "depth": "30 mm", "frame": 130}
+    assert told([sunk.diagnostic]) == [("C008.foot", values)]
 
 
 def test_the_ground_can_be_given_or_left_out() -> None:
@@ -148,9 +154,7 @@ def test_the_ground_can_be_given_or_left_out() -> None:
 def test_a_body_that_floats_and_turns_has_no_ground() -> None:
     rises = 2.0 + 0.3 * np.sin(2.0 * np.pi * _K / 20)
     (note,) = found(rises, 0.0)
-    assert note.message == (
-        "feet never rest long enough at one height: ground height unclear, feet not checked"
-    )
+    assert told([note.diagnostic]) == [("C013.no-height", {})]
 
 
 def test_ground_levels_are_listed_longest_first() -> None:

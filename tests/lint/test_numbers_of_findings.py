@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faults import told
 from lint.planted import FAULTS, captured, findings_of, five_joints, moving
 from lint.sound import (
     FRAMES,
@@ -16,6 +17,7 @@ from lint.sound import (
     scene_of,
 )
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.lint import lint_scene
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -24,35 +26,36 @@ from viewer.rig.motion.timing import Timing
 
 def test_values_in_messages() -> None:
     messages = {name: findings_of(FAULTS[name][0]) for name in ("sum too large", "jump", "sliding")}
-    texts = {f.code: f.message for found in messages.values() for f in found}
-    assert texts["W001"] == (
-        "weights of 2 vertices do not sum to 1 (worst: 1.1 at vertex 9, an error of 0.1)"
-    )
+    values = {f.diagnostic.key: f.diagnostic.values for found in messages.values() for f in found}
+    assert values["W001.sums"] == {
+        "n": 2,
+        "sum": pytest.approx(1.1),
+        "vertex": 9,
+        "error": pytest.approx(0.1),
+    }
     # 3 m in 1/30 s; the legs are 0.2 m wide and 0.9 m high, and may move at 15 times 0.922 m.
-    assert texts["C003"] == (
-        "2 of 60 frames: pelvis moves at 90 m/s (limit 13.8 m/s) at frame 120, 0.667 s"
-    )
+    speeds = {"speed": "90 m/s", "limit": "13.8 m/s"}
+    place = {"joint": "pelvis", "frame": 120, "time": pytest.approx(20 / 30)}
+    assert values["C003.joint"] == {"n": 2, "all": 60, **speeds, **place}
     # All 59 steps of 0.5 / 30 m.
-    assert "left_ankle slides by 983 mm in total, at up to 0.5 m/s (frame " in texts["C007"]
+    slid = values["C007.foot"]
+    assert (slid["joint"], slid["distance"], slid["speed"]) == ("left_ankle", "983 mm", "0.5 m/s")
 
 
 def test_values_of_mesh_and_gap_findings() -> None:
     """Both ends of an edge, the first vertex of a normal, and which frames are missing."""
     names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
-    texts = {f.code: f.message for name in names for f in findings_of(FAULTS[name][0])}
-    assert texts["M006"] == (
-        "1 non-manifold edge with up to 3 triangles (first: between vertices 0 and 1)"
-    )
-    assert texts["M005"].startswith("3 boundary edges (first: between vertices 0")
-    assert texts["M009"] == (
-        "1 of 20 normals opposes the winding of all adjacent triangles (first: vertex 3)"
-    )
-    assert texts["C005"] == "4 of 60 frames are missing in 2 gaps: frames 110 to 112, frame 130"
+    found = [f.diagnostic for name in names for f in findings_of(FAULTS[name][0])]
+    values = {one.key: one.values for one in found}
+    assert values["M006.edges"] == {"n": 1, "most": 3, "vertex": 0, "other": 1}
+    assert (values["M005.edges"]["n"], values["M005.edges"]["vertex"]) == (3, 0)
+    assert values["M009.normals"] == {"n": 1, "all": 20, "vertex": 3}
+    gaps = [Phrase("frame-range", first=110, last=112), Phrase("one-frame", frame=130)]
+    assert values["C005.gaps"] == {"n": 4, "all": 60, "n_gaps": 2, "gaps": gaps}
     # 4 and 3 radians.
-    assert texts["S004"] == (
-        "1 DOF of the pose is outside its limits: knee.y is 229.2°, its limits are -171.9° and "
-        "171.9°"
-    )
+    ends = {"low": "-171.9°", "high": "171.9°"}
+    dof = Phrase("beyond-limits", dof="knee.y", value="229.2°", when="", **ends)
+    assert values["S004.pose"] == {"n": 1, "dof": dof}
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -78,7 +81,9 @@ def test_long_absences_are_counted_as_absences() -> None:
     rows[20:] = rows[5] = rows[6] = -1
     timing = Timing(RATE, rows, first_frame=100, holds=False)
     (gap,) = lint_scene(moving(lambda root, turns: None, timing))
-    assert gap.message == "2 of 20 frames are missing in 1 gap: frames 105 to 106"
+    gaps = [Phrase("frame-range", first=105, last=106)]
+    values = {"n": 2, "all": 20, "n_gaps": 1, "gaps": gaps}
+    assert told([gap.diagnostic]) == [("C005.gaps", values)]
 
 
 def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
@@ -110,10 +115,9 @@ def test_the_influence_limit_error_is_the_vertex_displacement() -> None:
     scene.actors[0].figure = replace(figure, skeleton=locked)
     (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
     # With all influences: 0.05 of 2 m. The limit drops e: 100 mm in the current pose, 0 at rest.
-    assert found.message == (
-        "1 vertex has more than 4 influences (maximum: 5); pruning to 4 moves the mesh "
-        "by up to 100 mm (vertex 8), 100 mm on average over these vertices, in 6 poses"
-    )
+    costs = {"limit": 4, "most": "100 mm", "vertex": 8, "mean": "100 mm", "poses": 6}
+    values = {"n": 1, "most": 5, "cost": Phrase("cut-cost", **costs, left_out="")}
+    assert told([found.diagnostic]) == [("W007.influences", values)]
 
 
 def test_a_swinging_foot_does_not_slide() -> None:
@@ -153,8 +157,6 @@ def test_low_confidence_is_counted_over_the_frames_that_see_a_keypoint() -> None
         points[1, 2, 3] = 0.1
 
     (low,) = lint_scene(captured(change))
-    assert low.message == (
-        "hip has a confidence below 0.3 in 30 % of the 10 frames in which it is "
-        "visible (first: frame 104)"
-    )
+    values = {"limit": 0.3, "percent": pytest.approx(30.0), "n": 10, "frame": 104}
+    assert told([low.diagnostic]) == [("C011.point", {"name": "hip", **values})]
     assert low.frames.tolist() == [104, 105, 106] and low.joints.tolist() == [0]

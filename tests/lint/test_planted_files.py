@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faults import told
 from formats import bvh_text, capture_files, pig_text, skel_text, skin_text, synthetic_smpl
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.lint import CODES, Finding, LintOptions, lint_files
 
 STILL = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
@@ -192,17 +194,20 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
     found = lint_files([folder], LintOptions(confidence=0.7))[1]
     (gap,) = [f for f in found if f.code == "C005"]
     assert gap.frames.tolist() == [7, 8]
-    assert gap.message == "2 of 20 frames are missing in 1 gap: frames 7 to 8"
+    gaps = [Phrase("frame-range", first=7, last=8)]
+    values = {"n": 2, "all": 20, "n_gaps": 1, "gaps": gaps}
+    assert told([gap.diagnostic]) == [("C005.gaps", values)]
     # Of all 25 points, in all 18 frames, the confidence is 0.7 + 0.5 * waves.
     low = np.flatnonzero(0.5 * capture_files.waves(25, 4)[:, 3] < 0.0)
     named = [f for f in found if f.code == "C011"]
     assert sorted(np.concatenate([f.joints for f in named]).tolist()) == low.tolist()
     assert [len(f.joints) for f in named] == [1] * 6 + [len(low) - 6]
-    assert named[0].message.endswith(
-        " has a confidence below 0.7 in 100 % of the 18 frames in which it is visible "
-        "(first: frame 0)"
-    )
-    assert f"{len(low) - 6} more keypoints have a confidence below" in named[6].message
+    ((key, values),) = told([named[0].diagnostic])
+    del values["name"]
+    assert (key, values) == ("C011.point", {"limit": 0.7, "percent": 100.0, "n": 18, "frame": 0})
+    rest = named[6].diagnostic
+    assert (rest.key, rest.values["limit"]) == ("C011.more-points", 0.7)
+    assert rest.values["n"] == len(rest.values["points"]) == len(low) - 6
 
 
 def test_a_damaged_frame_is_a_gap_and_is_named(tmp_path: Path) -> None:
@@ -225,11 +230,11 @@ def test_a_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
 
 
 def test_every_code_is_planted_somewhere() -> None:
+    from formats.gltf.planted import PLANTED as GLTF
     from lint.planted import FAULTS as FIGURES
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
     planted |= {code for _, code in MODELS.values()} | {"F001"}
-    # Those of glTF files are planted in tests/formats/gltf.
-    planted |= {code for code in CODES if code.startswith("G")}
+    planted |= set(GLTF)
     # Codes that a readable file cannot cause: remarks are not errors.
     assert set(CODES) - planted == {"F007"}

@@ -1,17 +1,24 @@
-"""Orthographic front views of small scenes, unlit or evenly lit, so that pixels are predictable."""
+"""Orthographic front views of small scenes, unlit or evenly lit, so that pixels are predictable.
+
+Squares with a material are drawn in the light of the studio alone.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from rendering.drawn_figures import skeleton
+from rendering.drawn_figures import skeleton, square
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rig.figure import Figure
+from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import skin_from_lists
 
+WHITE = (1.0, 1.0, 1.0, 1.0)
 PIXELS = 80  # pixels per side; x and y from -2 to 2, so a unit is 20 pixels
 
 
@@ -49,3 +56,30 @@ def grid_figure(n=4, **parts) -> Figure:
 def alone(figure) -> Scene:
     """Return a scene of one figure at rest."""
     return Scene([Actor(figure)])
+
+
+def dark(**changes) -> Lights:
+    """Return lights with only the studio on."""
+    off = Light(0.0, 0.0, (1.0, 1.0, 1.0), 0.0)
+    return Lights(key=off, rim=off, ambient=0.0, specular=0.0, **changes)
+
+
+def texture(*rows, **changes) -> Texture:
+    """Return a texture with these rows of (r, g, b) or (r, g, b, a), the first at the top."""
+    pixels = np.array([[(*color, 255)[:4] for color in row] for row in rows], dtype=np.uint8)
+    return Texture("paint.png", pixels, **changes)
+
+
+def painted(material: Material, z=0.0, **changes) -> Figure:
+    return Figure("square", replace(square(z, material=material), **changes))
+
+
+def draw(offscreen, material: Material, **options) -> np.ndarray:
+    lights = options.pop("lights", dark())
+    return front_view(offscreen, alone(painted(material)), lights=lights, **options)
+
+
+def encoded(linear):
+    linear = np.asarray(linear, dtype=float)
+    low = 12.92 * linear
+    return 255.0 * np.where(linear <= 0.0031308, low, 1.055 * linear ** (1 / 2.4) - 0.055)

@@ -8,18 +8,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rendering.drawn_figures import scene_of, sphere, square
-from rendering.front_view import PIXELS, alone, front_view, pixel
+from rendering.front_view import (
+    PIXELS,
+    WHITE,
+    alone,
+    dark,
+    draw,
+    encoded,
+    front_view,
+    painted,
+    pixel,
+    texture,
+)
 
 from viewer.rendering.camera import Camera
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.resources import resource
 from viewer.rig.figure import Figure
-from viewer.rig.material import Material, Texture
+from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor, Scene, scene_box
 
-WHITE = (1.0, 1.0, 1.0, 1.0)
 FLAT = (128, 128, 255)
 
 
@@ -40,33 +50,6 @@ def furnace(offscreen):
     yield offscreen
     with offscreen.context:
         studio._light.write(light.tobytes())
-
-
-def dark(**changes) -> Lights:
-    """Return lights with only the studio on."""
-    off = Light(0.0, 0.0, (1.0, 1.0, 1.0), 0.0)
-    return Lights(key=off, rim=off, ambient=0.0, specular=0.0, **changes)
-
-
-def texture(*rows, **changes) -> Texture:
-    """Return a texture with these rows of (r, g, b) or (r, g, b, a), the first at the top."""
-    pixels = np.array([[(*color, 255)[:4] for color in row] for row in rows], dtype=np.uint8)
-    return Texture("paint.png", pixels, **changes)
-
-
-def painted(material: Material, z=0.0, **changes) -> Figure:
-    return Figure("square", replace(square(z, material=material), **changes))
-
-
-def draw(offscreen, material: Material, **options) -> np.ndarray:
-    lights = options.pop("lights", dark())
-    return front_view(offscreen, alone(painted(material)), lights=lights, **options)
-
-
-def encoded(linear):
-    linear = np.asarray(linear, dtype=float)
-    low = 12.92 * linear
-    return 255.0 * np.where(linear <= 0.0031308, low, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 # The formula
@@ -228,7 +211,7 @@ def test_textures_are_placed_wrapped_and_taken_from_the_second_set(offscreen):
     def seen(**placing):
         made = texture(*corners, is_smooth=False, **placing)
         material = Material("", made, unlit=True, is_physical=True)
-        figure = painted(material, second_uvs=square().uvs[:, ::-1])
+        figure = painted(material, other_uvs=(square().uvs[:, ::-1],))
         shown = front_view(offscreen, alone(figure), lights=dark())
         return [tuple(pixel(shown, x, y)[:3]) for y in (0.5, -0.5) for x in (-0.5, 0.5)]
 
@@ -313,6 +296,21 @@ def test_normal_maps_bend_normals_along_u_and_v(offscreen):
         offscreen, alone(Figure("s", replace(mesh, uvs=mesh.uvs[:, ::-1]))), shading="normals"
     )
     assert np.allclose(pixel(shown, 0.3, 0.2)[:3], encoded(np.array([0.5, 0.8, 0.9]) ** 2), atol=2)
+
+
+def test_normal_maps_follow_mirrored_coordinates_and_turn_over_on_the_back(offscreen):
+    """Bumps that point along u: to the left where u grows to the left, and dents from behind."""
+    mesh = square(material=bumpy())
+    mirrored = Figure("s", replace(mesh, uvs=mesh.uvs * [-1.0, 1.0]))
+    shown = front_view(offscreen, alone(mirrored), shading="normals")
+    wanted = encoded((0.5 * np.array([-0.6, 0.0, 0.8]) + 0.5) ** 2)
+    assert np.allclose(pixel(shown, 0.3, 0.2)[:3], wanted, atol=2)
+    # Rotated by half a turn about y, u grows to the left, and the normal (0.6, 0, 0.8) of the
+    # front becomes -(-0.6, 0, -0.8).
+    behind = Actor(Figure("s", mesh), placement=np.diag([-1.0, 1.0, -1.0, 1.0]))
+    shown = front_view(offscreen, Scene([behind]), shading="normals")
+    wanted = encoded((0.5 * np.array([0.6, 0.0, 0.8]) + 0.5) ** 2)
+    assert np.allclose(pixel(shown, 0.3, 0.2)[:3], wanted, atol=2)
 
 
 @pytest.mark.parametrize("name", ["clay", "chrome"])

@@ -9,7 +9,7 @@ import viewer
 from viewer.rendering.colormap import colormap, diverging_map, oklab
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
 from viewer.rendering.part_colors import part_colors
-from viewer.rendering.srgb import decode_srgb, encode_srgb
+from viewer.rig.srgb import decode_srgb, encode_srgb
 
 # Vienot, Brettel and Mollon 1999, for linear sRGB; the palettes themselves use Machado 2009.
 PROTAN = [[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]]

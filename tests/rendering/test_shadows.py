@@ -6,7 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rendering.drawn_figures import picture, random_figure, random_pose, scene_of, sphere, square
+from rendering.drawn_figures import (
+    picture,
+    random_figure,
+    random_pose,
+    scene_of,
+    skeleton,
+    sphere,
+    square,
+)
 from rendering.golden_motion import SHOTS
 from rendering.plain_pictures import N, front, lights, plain
 
@@ -15,8 +23,11 @@ from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
 from viewer.rendering.quality_limits import limit_passes, time_note
+from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
+from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import deform
 
 WHITE = picture([[(255, 255, 255)]])
@@ -210,3 +221,27 @@ def test_the_time_of_a_pass_is_measured_once_and_stated_if_all_take_long(offscre
     assert time_note(0.6, 8) == []
     (note,) = time_note(1.25, 8)
     assert "about 10 s" in note and "8 passes of 1.2 s" in note
+
+
+def on_ground(n_joints) -> Scene:
+    """Return an upright square from y = 0 to 1, bound to a single joint or to none."""
+    mesh = square(half=0.5, material=WHITE)
+    mesh = replace(mesh, positions=mesh.positions + np.array([0.0, 0.5, 0.0]))
+    if not n_joints:
+        return Scene([Actor(Figure("square", mesh))])
+    skin = skin_from_lists([[(0, 1.0)]] * 4, [np.eye(4)])
+    figure = Figure("square", mesh, skeleton([-1], np.zeros((1, 3))), skin)
+    return Scene([Actor(figure, rest_pose(figure.skeleton))])
+
+
+@pytest.mark.parametrize("quality", ["normal", "final"])
+def test_figures_of_a_single_joint_have_the_same_shadows(offscreen, quality):
+    """Joints in one place have no extent; the mesh has."""
+    light = lights(0.3, 1.0, azimuth=60.0, inclination=45.0, follow_camera=False)
+    options, camera = with_shadows(quality=quality, lights=light), front(inclination=40.0)
+    areas = [
+        (draw(offscreen, on_ground(count), options, camera)[..., 3] % 255 > 20).sum()
+        for count in (0, 1)
+    ]
+    # The shadow map is fitted to spheres around the joints, so its texels are other ones.
+    assert areas[0] > 50 and areas[1] == pytest.approx(areas[0], rel=0.25)

@@ -10,7 +10,7 @@ import pytest
 from rendering.drawn_figures import picture, scene_of, square
 from rendering.plain_pictures import draw, lights, plain
 
-from viewer.rendering.srgb import encode_srgb
+from viewer.rig.srgb import encode_srgb
 
 WHITE = square(material=picture([[(255, 255, 255)]]))
 

@@ -34,6 +34,7 @@ _LOOK = "view.camera_actions.look"
 _TOOL = "posing.tool_actions.choose_tool"
 _UNDO = "core.undo_actions"
 _STEP = "playback.actions.step"
+_ANIMATION = "playback.animations.step_animation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,6 +233,8 @@ KEYS = (
         (_K.home,), "Home", "first frame of the range", "playback.actions.go_to_end", (False,)
     ),
     Shortcut((_K.end,), "End", "last frame of the range", "playback.actions.go_to_end", (True,)),
+    Shortcut((_K.left_bracket,), "[", "previous animation", _ANIMATION, (-1,)),
+    Shortcut((_K.right_bracket,), "]", "next animation", _ANIMATION, (1,)),
     Shortcut((_K.i,), "I", "start the range here", "playback.actions.range_in"),
     Shortcut((_K.o,), "O", "end the range here", "playback.actions.range_out"),
     Shortcut((_K.escape,), "Esc", "close the topmost dialog", "cancel.cancel"),

@@ -61,6 +61,8 @@ __all__ = ["Frame"]
 
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
 """Suffixes of poses and textures, which are applied to the open figure."""
+_LAID_OUT = 2
+"""The frame from which on the panels leave the view its own place; ImGui counts from 1."""
 
 
 class Frame:
@@ -204,7 +206,7 @@ class Frame:
         state = self.state
         x, y, width, height = state.view_rect
         size = (round(width * scale), round(height * scale))
-        if min(size) < 1:
+        if min(size) < 1 or (state.panels_visible and imgui.get_frame_count() < _LAID_OUT):
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)

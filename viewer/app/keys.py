@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.features import KEYS
+from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.state import Files
 from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
@@ -16,6 +17,8 @@ __all__ = ["Keyboard", "handle_keys"]
 
 _REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # repeat while held
 _ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog is open
+_Bound = tuple[imgui.Key, bool, Shortcut]
+"""A key without modifiers, whether it repeats while held, and its action."""
 
 
 @dataclass(slots=True)
@@ -28,10 +31,22 @@ class Keyboard:
         Whether the list of keys is shown.
     modifiers : int
         Modifiers in the previous frame, as ImGui's bits.
+    chosen : dict
+        The user's keys for which the table below was made, as in ``Preferences.keys``.
+    bound : dict
+        Keys in the order of the table of keys, by the modifiers that are held with them.
     """
 
     is_listed: bool = False
     modifiers: int = 0
+    chosen: dict[str, str] = field(default_factory=dict)
+    bound: dict[int, list[_Bound]] = field(default_factory=dict)
+
+    def of(self, chosen: Mapping[str, str], held: int) -> list[_Bound]:
+        """Return the keys that run an action while these modifiers are held."""
+        if not self.bound or self.chosen != chosen:
+            self.chosen, self.bound = dict(chosen), _bound(chosen)
+        return self.bound.get(held, [])
 
 
 def handle_keys(state: AppState) -> None:
@@ -54,12 +69,23 @@ def handle_keys(state: AppState) -> None:
         return
     is_covered = bool(state.error) or state.of(Files).dialog is not None
     chosen = state.of(Preferences).keys
-    for shortcut in KEYS:
+    for key, repeats, shortcut in keyboard.of(chosen, int(held)):
         if is_covered and shortcut.label not in _ALWAYS:
             continue
-        if any(_is_pressed(chord, held) for chord in chords_of(shortcut, chosen)):
+        if imgui.is_key_pressed(key, repeats):
             shortcut.run(state)
             break
+
+
+def _bound(chosen: Mapping[str, str]) -> dict[int, list[_Bound]]:
+    """Return the keys by their modifiers; to take chords apart in every frame is slow."""
+    mask = int(imgui.Key.mod_mask_)
+    bound: dict[int, list[_Bound]] = {}
+    for shortcut in KEYS:
+        for chord in map(int, chords_of(shortcut, chosen)):
+            key = imgui.Key(chord & ~mask)
+            bound.setdefault(chord & mask, []).append((key, key in _REPEATED, shortcut))
+    return bound
 
 
 def _close_menus() -> bool:
@@ -70,10 +96,3 @@ def _close_menus() -> bool:
         return False
     imgui.internal.close_popup_to_level(0, True)
     return True
-
-
-def _is_pressed(chord: int, held: int) -> bool:
-    """Return whether a key was pressed with exactly the modifiers of the chord."""
-    modifiers = chord & imgui.Key.mod_mask_
-    key = imgui.Key(chord & ~modifiers)
-    return held == modifiers and imgui.is_key_pressed(key, key in _REPEATED)

@@ -20,7 +20,7 @@ from viewer.app.core.undo_actions import redo, undo
 from viewer.app.core.widgets import begin_menu, menu_item, note_item
 from viewer.app.curves.clip_actions import new_clip
 from viewer.app.features import PANELS
-from viewer.app.files.export_formats import draw_formats
+from viewer.app.files.export_formats import N_ROWS, draw_pose_formats, pose_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.model_folder import set_model_folder
 from viewer.app.files.motion_dialog import ask_for_motion
@@ -42,7 +42,7 @@ from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.record_dialog import open_record_dialog
 from viewer.app.shown_panels import is_open, reset_layout, set_open
 from viewer.app.view.view_menu import draw_view_menu
-from viewer.export import EXPORTERS, files_written
+from viewer.export import files_written
 from viewer.formats import FORMATS, file_stem, opened_text
 from viewer.models import known_models, load_model_folder
 from viewer.phrases import printable
@@ -159,8 +159,7 @@ def ask_for_pose(state: AppState) -> None:
 
 def ask_for_export(state: AppState) -> None:
     """Ask where to export the chosen actor in its current pose."""
-    kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
-    suffixes = tuple(suffix for kind in kinds for suffix in kind.suffixes)
+    suffixes = tuple(pose_formats())
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
         lambda state, paths: save_export(state, paths[0]),
@@ -168,7 +167,8 @@ def ask_for_export(state: AppState) -> None:
         "Export",
         suffixes,
         f"{file_stem(state.actor.name)}.obj",
-        more=draw_formats,
+        more=draw_pose_formats,
+        more_rows=N_ROWS,
         written=lambda path: files_written(path) if path.suffix.lower() in suffixes else [path],
     )
 

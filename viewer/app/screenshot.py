@@ -20,7 +20,7 @@ def save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
     Parameters
     ----------
     state : AppState
-        Receives a message.
+        State that receives a message.
     picture : callable
         Returns the image, (H, W, 4) uint8; may raise ViewerError.
     """
@@ -28,7 +28,7 @@ def save_screenshot(state: AppState, picture: Callable[[], Bytes]) -> None:
         path = free_path(Path.cwd(), state.scene.title, ".png")
         save_image(path, picture())
         state.say(f"Saved {printable(path, 200)}")
-        if "##legend" in state.item_rects:  # drawn over the image, not in it
+        if "##legend" in state.item_rects:  # drawn over the image, not into it
             state.say('Saved without the legend: turn on "Legend in pictures" in the Weights panel')
     except ViewerError as problem:
         state.error = str(problem)

@@ -12,7 +12,7 @@ __all__ = ["ShownPanels", "is_open", "reset_layout", "set_open"]
 
 @dataclass(slots=True)
 class ShownPanels:
-    """Panels that differ from the default.
+    """Panels whose state differs from the default.
 
     Attributes
     ----------

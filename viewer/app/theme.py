@@ -27,12 +27,15 @@ _COLORS = {
     "quiet text": ((0.56, 0.57, 0.59, 1.0), (0.37, 0.385, 0.41, 1.0)),
     "track": ((0.80, 0.47, 0.17, 1.0), (0.84, 0.47, 0.12, 1.0)),
     "track active": ((1.0, 0.66, 0.30, 1.0), (0.72, 0.37, 0.04, 1.0)),
+    "dim": ((0.0, 0.0, 0.0, 0.5), (0.0, 0.0, 0.0, 0.3)),
+    "grip": ((0.30, 0.33, 0.37, 1.0), (0.70, 0.72, 0.75, 1.0)),
+    "chosen text": ((0.62, 0.36, 0.12, 0.9), (0.97, 0.78, 0.55, 1.0)),
     "mark": (_ACCENT, (0.80, 0.42, 0.06, 1.0)),
 }
 _USES = {
     "panel": ("window_bg", "tab_selected", "tab_dimmed_selected"),
     "popup": ("popup_bg",),
-    "title": ("title_bg", "title_bg_active", "menu_bar_bg"),
+    "title": ("title_bg", "title_bg_active", "menu_bar_bg", "table_header_bg"),
     "tab": ("tab", "tab_dimmed"),
     "frame": ("frame_bg",),
     "button": ("button", "header"),
@@ -43,7 +46,10 @@ _USES = {
     "text": ("text",),
     "quiet text": ("text_disabled",),
     "track": ("slider_grab",),
-    "track active": ("slider_grab_active",),
+    "track active": ("slider_grab_active", "resize_grip_hovered", "resize_grip_active"),
+    "dim": ("modal_window_dim_bg",),
+    "grip": ("resize_grip",),
+    "chosen text": ("text_selected_bg",),
     "mark": ("check_mark", "tab_selected_overline"),
 }
 
@@ -70,6 +76,9 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     style.window_border_size = 0.0
     style.item_spacing = imgui.ImVec2(7.0, 4.0)
     style.scrollbar_size = 12.0
+    # Panels are closed by the cross in their tab, and listed in the menu.
+    style.docking_node_has_close_button = False
+    style.window_menu_button_position = imgui.Dir.none
     style.grab_min_size = 8.0
     style.scale_all_sizes(scale)
     style.font_scale_dpi = scale

@@ -1,7 +1,7 @@
 """Filter for keys that only type a character, which bypass ImGui's queue during text input.
 
 ImGui spreads the press and release of a key over two frames, so that no press is lost, and delays
-all later input. On a slow machine typed text would appear at one or two characters per frame.
+all later input. On a slow machine, typed text would appear at one or two characters per frame.
 Characters arrive as separate events, so a text field needs no key events for letters and digits.
 Keys with an effect, such as Enter, Backspace and Ctrl+A, and the mouse stay in the queue, so that a
 press and release within one frame still works.

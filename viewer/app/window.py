@@ -85,7 +85,7 @@ def show(
     paths : sequence of str or Path
         Files of the scene, for the title and the list of recent files.
     scale : float, optional
-        Scale of the interface; that of the screen if omitted.
+        Scale of the interface; the scale of the screen if omitted.
     fit_distance : bool
         Whether the camera is kept fitted to the scene until the user moves it.
     builders : sequence of Builder
@@ -232,10 +232,10 @@ class _Window:
                 glfw.set_window_should_close(self.handle, True)
 
     def _wait(self, is_settling: bool) -> bool:
-        """Process events, waiting for one unless frames are left to draw.
+        """Process events; wait for one unless frames are left to draw.
 
         Returns whether there was an event. ImGui spreads quick events over several frames, so
-        events left in its queue count as well.
+        events left in its queue also count.
         """
         self._is_dirty = False
         state = self.state
@@ -254,7 +254,7 @@ class _Window:
         return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
-        """Return whether a change is due without an event: files, a motion's extent, hover text."""
+        """Return whether a change is expected without an event: of files, extent or hover text."""
         state = self.state
         files = state.of(Files)
         is_read = files.loader is not None or files.stream is not None
@@ -263,7 +263,7 @@ class _Window:
         return is_read or is_waiting or _awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
-        """Draw one frame; return False if the window has no pixels at present."""
+        """Draw one frame; return False if the window currently has no pixels."""
         size = glfw.get_framebuffer_size(self.handle)
         if min(size) < 1:
             return False
@@ -312,9 +312,9 @@ class _Rest:
         Parameters
         ----------
         happened : bool
-            Whether there was an event, or something moves.
+            Whether there was an event, or something is moving.
         awaits : bool
-            Whether a change is due without an event.
+            Whether a change is expected without an event.
         """
         is_over = self._awaited and not awaits
         self._awaited = awaits
@@ -322,7 +322,7 @@ class _Rest:
 
 
 def _awaits_tooltip(context: Any) -> bool:
-    """Return whether the mouse is over an item whose delayed tooltip is still to appear."""
+    """Return whether the mouse is over an item whose delayed tooltip has not appeared yet."""
     delay = imgui.get_style().hover_delay_normal
     return context.hover_item_delay_id != 0 and context.hover_item_delay_timer < delay
 
@@ -333,7 +333,7 @@ def _title(state: AppState) -> str:
 
 
 def _create_window(title: str, is_visible: bool = True, scale: float = 0.0) -> Any:
-    """Create a window, larger for a larger scale of the interface; 0 for the monitor's."""
+    """Create a window, larger for a larger scale of the interface; 0 for the monitor's scale."""
     glfw.default_window_hints()
     glfw.window_hint(glfw.VISIBLE, is_visible)
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
-from viewer.rig.scene import Motion
+from viewer.rig.scene import Actor, Motion
+from viewer.rig.transforms.rate import key_rate
 
 _SHOWN_GAPS = 6
 
@@ -23,6 +26,8 @@ def describe_clip(clip: Motion) -> dict[str, Any]:
     facts: dict[str, Any] = {"name": clip.name, "range": [clip.start, clip.end]}
     if isinstance(clip, Clip):
         return facts | _describe_keys(clip)
+    if isinstance(clip, TransformClip):
+        return facts | _describe_transforms(clip)
     facts["kind"] = "points" if isinstance(clip, PointClip) else "sampled"
     return facts | _describe_timing(clip.timing) | _describe_rows(clip)
 
@@ -36,6 +41,23 @@ def _describe_keys(clip: Clip) -> dict[str, Any]:
         "key_times": [min(times), max(times)] if times else [],
         "extrapolation": dict(sorted(modes.items())),
     }
+
+
+def _describe_transforms(clip: TransformClip) -> dict[str, Any]:
+    ends = [time for channel in clip.channels for time in channel.times[[0, -1]].tolist()]
+    return {
+        "kind": "transforms",
+        "frame_rate": key_rate(clip),
+        "channels": len(clip.channels),
+        "paths": _counts(channel.path for channel in clip.channels),
+        "interpolation": _counts(channel.interpolation for channel in clip.channels),
+        "keys": sum(len(channel.times) for channel in clip.channels),
+        "key_times": [min(ends), max(ends)] if ends else [],
+    }
+
+
+def _counts(names: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(names).items()))
 
 
 def _describe_timing(timing: Timing) -> dict[str, Any]:
@@ -64,10 +86,38 @@ def gaps_of(timing: Timing) -> list[list[int]]:
     return [[int(first), int(last)] for first, last in pairs]
 
 
+def describe_animations(actor: Actor) -> list[dict[str, Any]]:
+    """Return the names and ranges of a figure's animations as JSON data, without their keys."""
+    return [
+        {
+            "number": index + 1,
+            "name": animation.name,
+            "range": [animation.start, animation.end],
+            "plays": index == actor.animation,
+        }
+        for index, animation in enumerate(actor.figure.animations)
+    ]
+
+
+def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
+    """Return the list of animations as lines of text; an asterisk marks the one that plays."""
+    width = len(str(len(animations)))
+    lines = []
+    for row, each in enumerate(animations):
+        head = "animations" if row == 0 else ""
+        start, end = map(number_text, each["range"])
+        mark = "*" if each["plays"] else " "
+        name = printable(each["name"]) or "(no name)"
+        lines.append(f"  {head:10} {each['number']:{width}}{mark} {name}: {start} to {end} s")
+    return lines
+
+
 def clip_lines(clip: dict[str, Any]) -> list[str]:
     """Return the description as lines of text."""
     start, end = clip["range"]
     head = f"  clip       {printable(clip['name'])}: {number_text(start)} to {number_text(end)} s, "
+    if clip.get("kind") == "transforms":
+        return _transform_lines(head, clip)
     if "kind" in clip:
         return [head + _rows_text(clip), *_gap_lines(clip)]
     modes = ", ".join(f"{mode} {count}" for mode, count in clip["extrapolation"].items())
@@ -77,6 +127,17 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
         lines.append(
             f"    keys from {number_text(first)} to {number_text(last)} s; extrapolation: {modes}"
         )
+    return lines
+
+
+def _transform_lines(head: str, clip: dict[str, Any]) -> list[str]:
+    paths = ", ".join(f"{path} {count}" for path, count in clip["paths"].items())
+    modes = ", ".join(f"{mode} {count}" for mode, count in clip["interpolation"].items())
+    lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
+    if clip["key_times"]:
+        first, last = map(number_text, clip["key_times"])
+        rate = f"{clip['frame_rate']:g} fps"
+        lines.append(f"    keys from {first} to {last} s at {rate}; {paths}; {modes}")
     return lines
 
 

@@ -29,9 +29,8 @@ from viewer.rig.arrays import Bools
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.captures.sampled_points import SampledPoints, sample_upright_points
-from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES
@@ -85,7 +84,7 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
         return True
     if not any(kind.writes_pose for kind in kinds):
         return True
-    moves = any(isinstance(actor.clip, Clip | SampledClip) for actor in scene.actors)
+    moves = any(isinstance(actor.clip, JointMotion) for actor in scene.actors)
     if EXPORTERS[_OF_POINTS] in kinds and scene.actors:
         moves = moves or all(isinstance(actor.clip, PointClip) for actor in scene.actors)
     wants_one = arguments.time is not None or arguments.frame is not None

@@ -10,9 +10,8 @@ from viewer.commands._sequence.frame_numbers import numbering_of
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.export import EXPORTERS, MotionOptions
-from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.single_frame import upright_single_frame
 from viewer.rig.scene import Actor, Scene
 
@@ -68,4 +67,4 @@ def _at_one_time(arguments: argparse.Namespace) -> bool:
 
 
 def _moving(scene: Scene) -> list[Actor]:
-    return [actor for actor in scene.actors if isinstance(actor.clip, Clip | SampledClip)]
+    return [actor for actor in scene.actors if isinstance(actor.clip, JointMotion)]

@@ -58,6 +58,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "the model folder, such as smplx:neutral, a texture image; see viewer help formats"
         f"{f' (default: {default})' if default else ''}",
     )
+    add_animation_argument(group)
     group.add_argument("--body", action="store_true", help="also open the bundled human body")
     group.add_argument(
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
@@ -109,6 +110,16 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_animation_argument(group: argparse._ArgumentGroup) -> None:
+    """Add ``--animation``."""
+    group.add_argument(
+        "--animation",
+        metavar="NAME",
+        help="which of a file's animations is played: a name, a number from 1, or none; viewer "
+        "info lists them (default: the first)",
+    )
+
+
 def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
     """Return the requested settings for reading motions."""
     model = None if arguments.model is None else resolve(arguments.model)
@@ -122,6 +133,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         legacy_expression=arguments.legacy_expression,
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
+        animation=arguments.animation or "",
     )
 
 

@@ -15,8 +15,10 @@ from viewer.loading import MotionSettings, load
 from viewer.models import resolve
 from viewer.phrases import printable
 from viewer.rig.figure import Figure
+from viewer.rig.motion.baking import baked
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene, figure_pose
 
 
@@ -80,6 +82,8 @@ def _clip_of(name: str, template: list[Path], fps: float | None) -> Clip | Sampl
     scene = load(*template, resolve(name), motion=MotionSettings(frame_rate=fps))
     print_warnings(scene.diagnostics)
     for actor in scene.actors:
+        if actor.figure.is_attached and isinstance(actor.clip, TransformClip):
+            return baked(actor.figure, actor.clip, fps)
         if actor.figure.is_attached and isinstance(actor.clip, Clip | SampledClip):
             return actor.clip
     raise RigError(f"--clip: expected a motion of the template, found none in {printable(name)}")

@@ -18,7 +18,7 @@ from viewer.commands._diff.report import Compared, json_text, lines_of, table_of
 from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
-from viewer.commands._scene import print_warnings
+from viewer.commands._scene import add_animation_argument, print_warnings
 from viewer.commands._sequence.frame_numbers import parse_range
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import UnsupportedFormatError, ViewerError
@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
     files.add_argument("--unit", choices=METRES, help="length unit of BVH")
+    add_animation_argument(files)
     _add_poses(parser)
     _add_results(parser)
     add_skinning_arguments(parser)
@@ -174,7 +175,9 @@ def _frames(text: str | None) -> FrameRange | None:
 
 
 def _opener(arguments: argparse.Namespace) -> Callable[[str], Scene]:
-    settings = MotionSettings(up=arguments.up or "", unit=arguments.unit or "")
+    settings = MotionSettings(
+        up=arguments.up or "", unit=arguments.unit or "", animation=arguments.animation or ""
+    )
 
     def open_one(text: str) -> Scene:
         return load(*arguments.common, *input_files(text), motion=settings)

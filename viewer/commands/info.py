@@ -9,7 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from viewer.commands._clip_info import clip_lines, describe_clip
+from viewer.commands._clip_info import (
+    animation_lines,
+    clip_lines,
+    describe_animations,
+    describe_clip,
+)
 from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
@@ -22,8 +27,14 @@ from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene, actor_points
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels
-from viewer.rig.skin import Skin, has_influence, influence_counts, weight_sums
+from viewer.rig.skeleton import (
+    DOF_KINDS,
+    Skeleton,
+    joint_labels,
+    shown_joints,
+    shown_parents,
+)
+from viewer.rig.skin import Skin, has_influence, idle_joints, influence_counts, weight_sums
 from viewer.rig.skinning import Skinning
 
 __all__ = ["add_arguments", "describe", "run"]
@@ -85,28 +96,34 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
     if figure.mesh is not None:
         parts["mesh"] = _describe_mesh(figure.mesh)
     if figure.skin is not None:
-        parts["skin"] = _describe_skin(figure.skin)
+        parts["skin"] = _describe_skin(figure.skin, figure.skeleton)
     if figure.blend_shapes is not None and MORPH_GROUP in figure.blend_shapes.groups:
         parts["morphs"] = _describe_morphs(figure.blend_shapes)
     if actor.clip is not None:
         parts["clip"] = describe_clip(actor.clip)
+    if figure.animations:
+        parts["animations"] = describe_animations(actor)
     return parts
 
 
 def _describe_skeleton(skeleton: Skeleton, dofs: list[float]) -> dict[str, Any]:
-    labels = joint_labels(skeleton)
+    labels, shown = joint_labels(skeleton), shown_joints(skeleton).tolist()
+    names, parents = skeleton.names, shown_parents(skeleton)
     limits = skeleton.dof_limits
     return {
-        "joints": skeleton.n_joints,
+        "joints": len(shown),
         "roots": int((skeleton.parents < 0).sum()),
         "dofs": skeleton.n_dofs,
         "locked_dofs": int(skeleton.locked.sum()),
         "limited_dofs": int(np.isfinite(limits).any(axis=1).sum()),
         "joint_table": [
-            {"index": index, "name": name, "label": label, "parent": int(parent)}
-            for index, (name, label, parent) in enumerate(
-                zip(map(printable, skeleton.names), labels, skeleton.parents, strict=True)
-            )
+            {
+                "index": joint,
+                "name": printable(names[joint]),
+                "label": labels[joint],
+                "parent": int(parents[joint]),
+            }
+            for joint in shown
         ],
         "dof_table": [
             {
@@ -164,11 +181,10 @@ def _describe_surface(material: Material) -> dict[str, Any]:
     return surface
 
 
-def _describe_skin(skin: Skin) -> dict[str, Any]:
+def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
     counts = influence_counts(skin)
     sums = weight_sums(skin)
     moved = has_influence(skin)
-    used = np.unique(skin.joints[skin.weights != 0.0])
     return {
         "bindings": skin.n_joints,
         "influences": len(skin.joints),
@@ -180,7 +196,7 @@ def _describe_skin(skin: Skin) -> dict[str, Any]:
         "zero_weights": int((skin.weights == 0.0).sum()),
         "negative_weights": int((skin.weights < 0.0).sum()),
         "vertices_without_influence": int((~moved).sum()),
-        "joints_without_vertices": sorted(set(range(skin.n_joints)) - set(used.tolist())),
+        "joints_without_vertices": idle_joints(skin, skeleton).tolist(),
     }
 
 
@@ -210,6 +226,8 @@ def _lines(actor: dict[str, Any]) -> list[str]:
     ]
     if "clip" in actor:
         lines += clip_lines(actor["clip"])
+    if "animations" in actor:
+        lines += animation_lines(actor["animations"])
     return lines
 
 

@@ -34,7 +34,7 @@ from viewer.lint import (
 )
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
-from viewer.rig.motion.evaluation import DEFAULT_RATE
+from viewer.rig.motion.timing import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]
 

@@ -41,6 +41,8 @@ class Exporter:
         Label in menus.
     suffixes : tuple of str
         With leading dots; ``"/"`` represents a folder.
+    keeps, omits : str
+        Data that its files hold, and data that they cannot hold.
     writes_pose : bool
         Whether its module has ``export(actor, path, skinning)``.
     writes_motion : bool
@@ -51,25 +53,74 @@ class Exporter:
 
     title: str
     suffixes: tuple[str, ...]
+    keeps: str
+    omits: str
     writes_pose: bool = True
     writes_motion: bool = False
     keeps_world: bool = False
 
 
 EXPORTERS = {
-    "obj": Exporter("Wavefront OBJ: the posed mesh", (".obj",), writes_motion=True),
-    "ply": Exporter("PLY: the posed mesh", (".ply",)),
-    "npz": Exporter("NumPy arrays: posed vertices and joints", (".npz",), writes_motion=True),
-    "pose": Exporter("pose: joints by name and the pose vector", (".json", ".txt")),
-    "rig": Exporter("course rig: .skel and .skin", (".skel", ".skin")),
-    "anim": Exporter(
-        "clip: keys of a course rig", (".anim",), writes_pose=False, writes_motion=True
+    "obj": Exporter(
+        "Wavefront OBJ: the posed mesh",
+        (".obj",),
+        "the posed mesh, textures",
+        "joints, weights",
+        writes_motion=True,
     ),
-    "gltf": Exporter("glTF: mesh, skin and motion", (".glb", ".gltf"), writes_motion=True),
-    "bvh": Exporter("BVH: skeleton and motion", (".bvh",), writes_pose=False, writes_motion=True),
+    "ply": Exporter(
+        "PLY: the posed mesh",
+        (".ply",),
+        "the posed mesh, texture coordinates",
+        "joints, weights, textures",
+    ),
+    "npz": Exporter(
+        "NumPy arrays: posed vertices and joints",
+        (".npz",),
+        "posed vertices and joints as arrays",
+        "weights, materials",
+        writes_motion=True,
+    ),
+    "pose": Exporter(
+        "pose: joints by name and the pose vector",
+        (".json", ".txt"),
+        "rotations of joints, shape",
+        "mesh, weights",
+    ),
+    "rig": Exporter(
+        "course rig: .skel and .skin",
+        (".skel", ".skin"),
+        "mesh, joints, limits, weights, texture",
+        "blend shapes, pose correctives",
+    ),
+    "anim": Exporter(
+        "clip: keys of a course rig",
+        (".anim",),
+        "keys of the clip, or one per frame",
+        "mesh, shape, scale",
+        writes_pose=False,
+        writes_motion=True,
+    ),
+    "gltf": Exporter(
+        "glTF: mesh, skin and motion",
+        (".glb", ".gltf"),
+        "mesh, weights, materials, shapes, motion",
+        "limits of joints, pose correctives",
+        writes_motion=True,
+    ),
+    "bvh": Exporter(
+        "BVH: skeleton and motion",
+        (".bvh",),
+        "joints and their motion",
+        "mesh, weights, changes of shape",
+        writes_pose=False,
+        writes_motion=True,
+    ),
     "amass": Exporter(
         "AMASS: parameters of the SMPL family",
         (".npz",),
+        "pose, place and shape of an SMPL body",
+        "scale",
         writes_pose=False,
         writes_motion=True,
         keeps_world=True,
@@ -77,6 +128,8 @@ EXPORTERS = {
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
         ("/",),
+        "pose, place and shape of SMPL bodies",
+        "scale",
         writes_pose=False,
         writes_motion=True,
         keeps_world=True,

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.export._left_out import joint_scales_note
 from viewer.export._options import MotionOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -16,6 +17,7 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.body_motion import root_positions
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.skeleton import Skeleton
 from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, UNIT_NAMES
 
@@ -159,7 +161,7 @@ def family_frames(
     parts = (found.vectors, found.translations)
     if not all(np.isfinite(part[present]).all() for part in parts):
         raise RigError(f"{animation.name}: expected finite numbers in every frame")
-    notes = _losses(frames, moved[:, 1:]) + _own_shapes(figure)
+    notes = _losses(frames, skeleton, moved[:, 1:]) + _own_shapes(figure)
     return found, notes + _bare_skeleton(figure, roots[0])
 
 
@@ -193,7 +195,7 @@ def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
     return notes
 
 
-def _losses(frames: Frames, moved: Floats) -> list[Diagnostic]:
+def _losses(frames: Frames, skeleton: Skeleton, moved: Floats) -> list[Diagnostic]:
     notes = []
     present = frames.present
     farthest = np.linalg.norm(moved[present], axis=-1).max(initial=0.0)
@@ -203,4 +205,5 @@ def _losses(frames: Frames, moved: Floats) -> list[Diagnostic]:
     if np.abs(scales - 1.0).max(initial=0.0) > _NEGLIGIBLE:
         values = {"low": float(scales.min()), "high": float(scales.max())}
         notes.append(Diagnostic("X003.body-scale", values=values))
+    notes += joint_scales_note(frames, skeleton, "X003.body-joint-scales")
     return notes

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
+from viewer.rig.motion.evaluation import Frames
+from viewer.rig.skeleton import Skeleton
+
+_NEGLIGIBLE = 1e-6  # largest difference of equal scales
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:
@@ -18,6 +25,34 @@ def extra_parts(figure: Figure) -> list[Phrase]:
         "part-regressor": figure.joint_regressor,
     }
     return [Phrase(name) for name, part in extras.items() if part is not None]
+
+
+def surface_parts(mesh: Mesh, has_colors: bool = False) -> list[Phrase]:
+    """Return the data of a mesh that formats with one set of texture coordinates cannot hold.
+
+    ``has_colors`` tells whether the format holds vertex colours.
+    """
+    extras = {
+        "part-second-uvs": bool(mesh.other_uvs),
+        "part-vertex-colors": mesh.colors is not None and not has_colors,
+        "part-mesh-parts": bool(mesh.parts),
+    }
+    return [Phrase(name) for name, is_lost in extras.items() if is_lost]
+
+
+def joint_scales_note(frames: Frames, skeleton: Skeleton, key: str) -> list[Diagnostic]:
+    """Return a note with the range of joint scales that differ from those at rest, if any.
+
+    ``frames``: the motion.
+    ``skeleton``: its skeleton.
+    ``key``: key of the message.
+    """
+    scales = frames.scales if len(frames.scales) == 1 else frames.scales[frames.present]
+    changed = scales[np.abs(scales - skeleton.rest_scales) > _NEGLIGIBLE]
+    if not len(changed):
+        return []
+    values = {"low": float(changed.min()), "high": float(changed.max())}
+    return [Diagnostic(key, values=values)]
 
 
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:

@@ -11,6 +11,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._bvh.angles import euler_angles, unrolled
 from viewer.export._gaps import filled, gaps_note, runs
+from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import between_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._motion_paths import split_paths
@@ -217,6 +218,7 @@ def _left_out(figure: Figure, frames: Frames) -> list[Diagnostic]:
     scales = frames.figure_scales[there]
     if np.abs(scales - 1.0).max() > _SAME:
         notes.append(Diagnostic("X003.clip-scale", values={"scale": float(scales.max())}))
+    notes += joint_scales_note(frames, figure.require_skeleton(), "X003.clip-joint-scales")
     moved = np.linalg.norm(frames.translations[there][:, 1:], axis=-1).max(initial=0.0)
     if moved > _SAME:
         length = length_text(figure, float(moved))

@@ -15,6 +15,7 @@ from viewer.export._bvh.ends import end_offsets
 from viewer.export._bvh.reading import BvhFile, read_back
 from viewer.export._bvh.text import bvh_text
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
+from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
@@ -158,6 +159,7 @@ def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, F
         frames,
         rotations=np.concatenate([identity, frames.rotations], axis=1),
         translations=np.concatenate([np.zeros((count, 1, 3)), frames.translations], axis=1),
+        scales=np.concatenate([np.ones((len(frames.scales), 1, 3)), frames.scales], axis=1),
         shape_weights=np.zeros((1, 0)),
     )
 
@@ -267,6 +269,7 @@ def _remarks(
     if shape_changes(frames):
         first = reference + animation.first_frame
         notes.append(Diagnostic("X005.shape-changes", values={"frame": first}))
+    notes += joint_scales_note(frames, animation.figure.require_skeleton(), "X003.bvh-joint-scales")
     scales = frames.figure_scales[frames.present]
     if np.ptp(scales) > 0.0:
         low, high, first_scale = map(float, (scales.min(), scales.max(), scales[0]))

@@ -13,7 +13,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.export import MotionOptions, require_mesh
 from viewer.export._gaps import kept_gaps
-from viewer.export._left_out import not_held_note
+from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._motion_paths import numbered_paths
 from viewer.export._obj_materials import PLAIN, library_losses, material_library
 from viewer.formats import all_or_none, save_bytes, save_text
@@ -53,8 +53,10 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         save_text(path, "".join(parts))
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
     textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
-    lost = not_held_note(".mtl", library_losses(mesh))
-    return [Diagnostic("X001.mesh", path, values=counts), *textures, *lost]
+    lost = library_losses(mesh)
+    lost += [part for part in surface_parts(mesh) if part not in lost]
+    notes = not_held_note(".obj and .mtl", lost)
+    return [Diagnostic("X001.mesh", path, values=counts), *textures, *notes]
 
 
 def export_animation(

@@ -6,8 +6,9 @@
     line     = "comment" text | "element" name count | "property" type name
              | "property" "list" type type name
 
-Properties used: x y z, nx ny nz, s t (or u v, texture_u texture_v) of ``vertex``; the corners
-(``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers per corner, of ``face``. A
+Properties used: x y z, nx ny nz, s t (or u v, texture_u texture_v), red green blue alpha of
+``vertex``; the corners (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers per
+corner, of ``face``. Colours are sRGB, integers or numbers from 0 to 1; alpha may be missing. A
 comment ``TextureFile`` names a texture image. Polygons are triangulated; other data is ignored with
 a warning that names it.
 """
@@ -33,12 +34,14 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
+from viewer.rig.srgb import decode_srgb
 
 __all__ = ["read"]
 
 Indices = NDArray[np.int64]
 
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_COLORS = ("red", "green", "blue", "alpha")
 _TEXTURE = "texturefile"
 
 
@@ -59,7 +62,8 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, or the number of the vertex or face, if the file is invalid.
+        If the file is invalid; the error has the file and line, or the number of the vertex or
+        face.
     """
     header = read_header(source)
     tables = read_tables(source, header)
@@ -79,6 +83,7 @@ def read(source: Source) -> Figure:
         triangles=triangles,
         uvs=uvs,
         uv_triangles=uv_triangles,
+        colors=_colors(source, vertices),
         materials=materials,
         triangle_materials=np.zeros(len(owners), np.int32) if materials else None,
     )
@@ -181,7 +186,7 @@ def _faces(
 def _corners(
     source: Source, faces: Table, counts: Indices, values: NDArray[Any], n_vertices: int
 ) -> Indices:
-    """Return the vertices of all faces, invalid ones replaced by another of the same face."""
+    """Return the vertices of all faces; invalid ones are replaced by others of the same face."""
     corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
     is_wrong = (corners != values) | (corners < 0) | (corners >= n_vertices)
     if not is_wrong.any():
@@ -233,7 +238,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
 def _uvs(
     source: Source, vertices: Table, wedges: Floats | None, picks: Indices
 ) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates: the distinct ones of corners, or those of vertices."""
+    """Return texture coordinates: the distinct coordinates of corners, or those of vertices."""
     if wedges is not None and len(wedges):
         # Each pair is viewed as one complex number, so that sorting finds equal pairs.
         pairs = np.ascontiguousarray(wedges + 0.0).view(np.complex128).ravel()
@@ -247,8 +252,24 @@ def _uvs(
     return None, None
 
 
+def _colors(source: Source, vertices: Table) -> Floats | None:
+    """Return linear colours with opacity: bytes and other integers are fractions of the largest."""
+    names = _COLORS[:4] if _COLORS[3] in vertices.columns else _COLORS[:3]
+    values = _columns(source, vertices, names)
+    if values is None:
+        return None
+    kinds = {prop.name: np.dtype(prop.kind) for prop in vertices.element.properties}
+    largest = [
+        1.0 if kinds[name].kind == "f" else float(np.iinfo(kinds[name]).max) for name in names
+    ]
+    colors = np.ones((len(values), 4))
+    colors[:, : len(names)] = np.clip(np.nan_to_num(values) / largest, 0.0, 1.0)
+    colors[:, :3] = decode_srgb(colors[:, :3])
+    return colors
+
+
 def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material, ...]:
-    """Return a material with the image that a comment names, for all faces."""
+    """Return a material, for all faces, with the image that a comment specifies."""
     named = [
         (text.split(None, 1)[1].strip(), offset)
         for text, offset in header.comments
@@ -268,6 +289,8 @@ def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None
         "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
         "face": {*CORNERS, *(("texcoord",) if uses_wedges else ())},
     }
+    if set(_COLORS[:3]) <= set(tables["vertex"].columns):
+        used["vertex"] |= {*_COLORS}
     left = []
     for name, table in tables.items():
         if name not in used:

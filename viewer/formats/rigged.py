@@ -3,8 +3,7 @@
 ::
 
     viewer_rig ()   name ()   up ()   unit ()
-    positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
-    second_uvs (U, 2)   triangle_materials (T,)   and the materials, see ``_rigged_materials.py``
+    positions (V, 3)   triangles (T, 3)   and the rest of the mesh, see ``_rigged/mesh.py``
     joint_names (J,)   parents (J,)   rest_translations (J, 3)   rest_rotations (J, 4)
     rest_scales (J, 3)   dof_joints (D,)   dof_kinds (D,)   rest_dofs (D,)   dof_limits (D, 2)
     boxes (J, 2, 3)   skin_starts (V + 1,)   skin_joints (N,)   skin_weights (N,)
@@ -32,10 +31,10 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part
 from viewer.errors import FormatError, RigError
-from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.checking import archive_of, finite
 from viewer.formats._archive.values import Archive
-from viewer.formats._neutral import neutral_positions
-from viewer.formats._rigged_materials import material_arrays, read_materials
+from viewer.formats._rigged.materials import texts
+from viewer.formats._rigged.mesh import mesh_arrays, read_mesh
 from viewer.formats._source import Source
 from viewer.media.saving import save_arrays
 from viewer.rig.annotations import VertexField
@@ -44,7 +43,6 @@ from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
 from viewer.rig.hierarchy import cycle_members
-from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
@@ -66,7 +64,7 @@ def read(source: Source) -> Figure:
     Returns
     -------
     Figure
-        Figure with mesh, skeleton and skin; correctives are read when first used.
+        Figure with mesh, skeleton and skin; correctives are read on first use.
 
     Raises
     ------
@@ -85,7 +83,7 @@ def read(source: Source) -> Figure:
         count = skeleton.n_joints
         return Figure(
             name=archive.text("name") or source.path.stem,
-            mesh=_mesh(archive),
+            mesh=read_mesh(archive),
             skeleton=skeleton,
             skin=_skin(archive, count),
             up="z" if up == "z" else "y",
@@ -109,31 +107,8 @@ def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Par
     return finite(archive, key, _numbers(archive, key, shape), part)
 
 
-def _texts(archive: Archive, key: str) -> tuple[str, ...]:
-    return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))
-
-
-def _mesh(archive: Archive) -> Mesh:
-    positions = _finite(archive, "positions", (None, 3), "positions")
-    listed = _numbers(archive, "triangles", (None, 3))
-    triangles = corners_of(archive, "triangles", listed, len(positions))
-    positions = neutral_positions(positions, triangles)
-    has_uvs, split = archive.has("uvs"), archive.has("uv_triangles")
-    materials = read_materials(archive)
-    return Mesh(
-        positions=positions,
-        normals=vertex_normals(positions, triangles),
-        triangles=triangles,
-        uvs=_finite(archive, "uvs", (None, 2)) if has_uvs else None,
-        uv_triangles=_numbers(archive, "uv_triangles", (None, 3)) if split else None,
-        second_uvs=_finite(archive, "second_uvs", (None, 2)) if archive.has("second_uvs") else None,
-        materials=materials,
-        triangle_materials=_numbers(archive, "triangle_materials", (None,)) if materials else None,
-    )
-
-
 def _skeleton(archive: Archive) -> Skeleton:
-    count = len(names := _texts(archive, "joint_names"))
+    count = len(names := texts(archive, "joint_names"))
     n_dofs = len(_numbers(archive, "dof_joints", (None,)))
     return Skeleton(
         names=names,
@@ -150,7 +125,7 @@ def _skeleton(archive: Archive) -> Skeleton:
 
 
 def _parents(archive: Archive, count: int) -> NDArray[Any]:
-    """Return the parents; refuse those that do not precede their joints, which become roots."""
+    """Return the parents; refuse parents that do not precede their joints, which become roots."""
     parents = _numbers(archive, "parents", (count,))
     late = np.flatnonzero((parents >= np.arange(count)) | (parents < -1))
     if len(late) == 0:
@@ -176,7 +151,7 @@ def _parents(archive: Archive, count: int) -> NDArray[Any]:
 
 
 def _limits(archive: Archive, n_dofs: int) -> Floats:
-    """Return the limits; refuse contradictory ones, which are removed."""
+    """Return the limits; refuse contradictory limits, which are removed."""
     limits = _numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64)
     wrong = ~(limits[:, 0] <= limits[:, 1])
     if not wrong.any():
@@ -198,7 +173,7 @@ def _skin(archive: Archive, n_joints: int) -> Skin:
     starts = _numbers(archive, "skin_starts", (None,))
     joints = _numbers(archive, "skin_joints", (None,))
     listed = _numbers(archive, "skin_weights", (None,))
-    # Whether the starts ascend is checked by the skin.
+    # The skin checks whether the starts are in ascending order.
     owners = np.searchsorted(np.sort(starts), np.arange(len(listed)), side="right") - 1
     weights = finite(archive, "skin_weights", listed, "weights", np.maximum(owners, 0))
     inverse_bind = _finite(archive, "inverse_bind", (None, 4, 4), "bindings")
@@ -272,7 +247,7 @@ def _fields(archive: Archive) -> tuple[VertexField, ...]:
                 title=archive.text(f"{key}_title"),
                 values=_finite(archive, f"{key}_values", (None,)),
                 unit=archive.text(f"{key}_unit"),
-                names=_texts(archive, f"{key}_names") if archive.has(f"{key}_names") else (),
+                names=texts(archive, f"{key}_names") if archive.has(f"{key}_names") else (),
             )
         )
     return tuple(fields)
@@ -286,7 +261,7 @@ def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | No
     figure : Figure
         Figure with mesh, skeleton and skin.
     path : str or Path
-        Replaced in one step.
+        Target file, replaced atomically.
     more : mapping of str to array, optional
         Additional arrays, for other programs.
 
@@ -316,11 +291,6 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         "name": np.array(figure.name),
         "up": np.array(figure.up),
         "unit": np.array(figure.unit),
-        "positions": mesh.positions,
-        "triangles": mesh.triangles,
-        "uvs": mesh.uvs,
-        "uv_triangles": mesh.uv_triangles,
-        "second_uvs": mesh.second_uvs,
         "joint_names": np.array(skeleton.names),
         "skin_starts": skin.starts,
         "skin_joints": skin.joints,
@@ -331,7 +301,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
         arrays[key] = getattr(skeleton, key)
     if figure.correctives is not None:
         arrays["correctives"] = figure.correctives.values().astype(np.float32)
-    arrays |= material_arrays(mesh) | _layout_arrays(figure.pose_layout)
+    arrays |= mesh_arrays(mesh) | _layout_arrays(figure.pose_layout)
     for index, hand in enumerate(figure.hands):
         arrays[f"hand_{index}_side"] = np.array(hand.side)
         for key in ("joints", "components", "mean"):

@@ -15,7 +15,7 @@ from viewer.lint._counting import Counting
 from viewer.lint._track import Track
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.evaluation import DEFAULT_RATE
+from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +21,7 @@ from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.phrases import printable
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
+from viewer.rig.motion.animation import Animation
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
@@ -140,6 +141,9 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
     except FormatError as problem:
         refusals.append(of_error(problem))
         figure = replace(figure, blend_shapes=None)
+    valid = tuple(_readable(figure.animations, refusals))
+    if len(valid) < len(figure.animations):
+        figure = replace(figure, animations=valid)
     try:
         if figure.correctives is not None:
             figure.correctives.values()
@@ -147,6 +151,17 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
         refusals.append(of_error(problem))
         figure = replace(figure, correctives=None)
     return figure
+
+
+def _readable(animations: Iterable[Animation], refusals: list[Finding]) -> Iterator[Animation]:
+    """Yield the animations whose keys are valid, and report the others."""
+    for animation in animations:
+        try:
+            animation.clip()
+        except FormatError as problem:
+            refusals.append(of_error(problem))
+        else:
+            yield animation
 
 
 def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progress | None) -> None:
@@ -171,6 +186,8 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         if culprit is None:
             # The model is not among the files: motions that need it cannot be checked.
             contents = Contents(figures=contents.figures, clips=contents.clips)
+            if settings is not None:  # a requested animation may not exist
+                settings = replace(settings, animation="")
         else:
             alone += _take_out(contents, culprit)
     opened.findings += [of_diagnostic(found) for found in opened.scene.diagnostics]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +14,9 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
+from viewer.rig.motion.evaluation import JointMotion, frames_between, frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.shape import rest_joints, shaped
 
 __all__ = ["frame_numbers", "key_times", "track_of"]
@@ -59,7 +59,7 @@ def _track(subject: Subject) -> Track | None:
     axis = actor.placement[2 if subject.up == "z" else 1]
     for start in range(0, count, _TOGETHER):
         part = slice(start, start + _TOGETHER)
-        world = world_frames(figure, _slice(frames, part))
+        world = world_frames(figure, frames_between(frames, part))
         joints[part] = world[..., :3, 3]
         if soles is not None:
             lowest[part] = soles.heights(world, axis, scale)
@@ -77,7 +77,7 @@ def _track(subject: Subject) -> Track | None:
     )
 
 
-def key_times(subject: Subject, clip: Clip) -> Floats:
+def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:
     """Return the sampling times of a keyed clip: its frames, and steps between them. (F,).
 
     Times are seconds on the clip's own clock.
@@ -98,23 +98,9 @@ def frame_numbers(subject: Subject, times: Floats) -> Ints:
     return counting.numbers(times + actor.offset)
 
 
-def _known(subject: Subject, clip: Clip | SampledClip, count: int) -> Bools:
+def _known(subject: Subject, clip: JointMotion, count: int) -> Bools:
     """Return which frames have valid data from the file: (F,)."""
     if not isinstance(clip, SampledClip):
         return np.ones(count, dtype=np.bool_)
     rows = clip.timing.rows
     return subject.valid("frames", clip.n_rows)[rows] | (rows < 0)
-
-
-def _slice(frames: Frames, part: slice) -> Frames:
-    weights = frames.shape_weights
-    return replace(
-        frames,
-        times=frames.times[part],
-        present=frames.present[part],
-        rotations=frames.rotations[part],
-        translations=frames.translations[part],
-        shape_weights=weights if len(weights) == 1 else weights[part],
-        figure_translations=frames.figure_translations[part],
-        figure_scales=frames.figure_scales[part],
-    )

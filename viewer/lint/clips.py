@@ -36,7 +36,7 @@ def check(subject: Subject) -> list[Finding]:
     findings = []
     if isinstance(clip, SampledClip):
         findings += missing_frames(subject, clip.timing)
-    else:
+    elif isinstance(clip, Clip):
         findings += _keys(subject, clip)
         findings += _outside(subject, clip, skeleton)
     if clip.end - clip.start <= SHORTEST:

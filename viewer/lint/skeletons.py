@@ -10,7 +10,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.lint._finding import Finding, Subject
 from viewer.rig.pose import Pose
 from viewer.rig.posing.dof_text import beyond_text
-from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels
+from viewer.rig.skeleton import Skeleton, dof_labels, joint_labels, shown_joints
 
 __all__ = ["check"]
 
@@ -47,7 +47,9 @@ def _names(subject: Subject, skeleton: Skeleton) -> list[Finding]:
                 at=("joints", repeated[0]),
             )
         )
-    nameless = [joint for joint, name in enumerate(skeleton.names) if not name.strip()]
+    nameless = [
+        joint for joint in shown_joints(skeleton).tolist() if not skeleton.names[joint].strip()
+    ]
     if nameless:
         findings.append(
             subject.found(

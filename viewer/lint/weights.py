@@ -13,7 +13,15 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.skeleton import joint_labels
-from viewer.rig.skin import Skin, has_influence, influence_counts, merged, owners, weight_sums
+from viewer.rig.skin import (
+    Skin,
+    has_influence,
+    idle_joints,
+    influence_counts,
+    merged,
+    owners,
+    weight_sums,
+)
 from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["check"]
@@ -126,8 +134,7 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
 
 
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
-    strengths = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
-    idle = np.flatnonzero(strengths == 0.0)
+    idle = idle_joints(skin, figure.skeleton)
     if len(idle) == 0 or len(subject.invalid.get("weights", ())):
         return []  # missing weights may have belonged to these joints
     labels = [_label(subject, int(joint)) for joint in idle]

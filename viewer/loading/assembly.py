@@ -71,17 +71,11 @@ def begin(
     for pair in pairs:
         figure = _join([figures[index] for index in pair])
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
-        actor = Actor(figure, called=cast.free_title(called))
-        cast.add(actor, figure.up, placed=False, origin=figures[pair[-1]][0])
+        origin = figures[pair[-1]][0]
+        actor = Actor(figure, called=cast.free_title(called), origin=origin)
+        cast.add(actor, figure.up, placed=False, origin=origin)
     _give_morphs(contents, cast)
-    if contents.has_motion:
-        from viewer.loading.driving import drive
-        from viewer.rig.motion.evaluation import pose_actor, time_span
-
-        drive(contents, cast, settings or MotionSettings())
-        start = time_span(cast.actors)[0]
-        for actor in cast.actors:
-            pose_actor(actor, start)
+    _move(contents, cast, settings or MotionSettings())
     for path, record in contents.poses:
         cast.diagnostics += _assign_pose(path, record, cast.actors)
     for path, pixels in contents.pictures:
@@ -97,6 +91,24 @@ def begin(
     if settings is not None and settings.model is not None:
         scene.files += (settings.model,)
     return scene, cast.builders
+
+
+def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
+    """Assign motions and animations to actors, and pose them at the start."""
+    if contents.has_motion:
+        from viewer.loading.driving import drive
+
+        drive(contents, cast, settings)
+    if settings.animation or any(actor.figure.animations for actor in cast.actors):
+        from viewer.loading.animating import animate
+
+        animate(cast, settings.animation)
+    if any(actor.clip is not None for actor in cast.actors):
+        from viewer.rig.motion.evaluation import pose_actor, time_span
+
+        start = time_span(cast.actors)[0]
+        for actor in cast.actors:
+            pose_actor(actor, start)
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
@@ -143,7 +155,8 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
                 if figure.skeleton is None and figure.mesh is not None:
                     figure = on_one_joint(figure)
                     cast.note("F007.only-morphs", figure=figure.name)
-                actors[index] = Actor(with_morphs(figure, [target]), called=actor.called)
+                figure = with_morphs(figure, [target])
+                actors[index] = Actor(figure, called=actor.called, origin=actor.origin)
                 break
             except RigError as refused:
                 problem = problem or refused

@@ -181,7 +181,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
-        from viewer.rig.motion.evaluation import DEFAULT_RATE
+        from viewer.rig.motion.timing import DEFAULT_RATE
 
         return open_capture(
             source,

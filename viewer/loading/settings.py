@@ -36,6 +36,9 @@ class MotionSettings:
     images : Path or None
         Folder with an image folder for each camera of a capture; None for ``images`` beside the
         capture.
+    animation : str
+        The animation that figures play, by name or by number from 1; ``"none"`` for their rest
+        pose, empty for the first.
     """
 
     model: Path | None = None
@@ -47,3 +50,4 @@ class MotionSettings:
     legacy_expression: bool = False
     drives: bool = True
     images: Path | None = None
+    animation: str = ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from viewer.rendering.bounds import Bounds
+from viewer.rendering.bounds import Bounds, stretch
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -20,6 +20,7 @@ from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.shown import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
+from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
 
 __all__ = ["Casters"]
@@ -81,6 +82,18 @@ class Casters:
         """Set the phase of the pattern by which blended surfaces block part of the light."""
         if run.surface.is_blended:
             set_uniforms(program, {"u_threshold": self.threshold})
+
+    def largest_mesh(self) -> float:
+        """Return the size of the largest mesh at rest, scene units; 0 without meshes."""
+        sizes: dict[int, float] = {}
+        found = 0.0
+        for actor in self.actors:
+            mesh = actor.figure.mesh
+            if actor.is_drawn and mesh is not None:
+                size = sizes.setdefault(id(mesh), box_size(bounding_box(mesh.positions)))
+                scale = stretch(placement_of(actor, self.options)[None])[0]
+                found = max(found, float(scale) * size)
+        return found
 
     def spheres(self, bounds: Bounds) -> list[Floats]:
         """Return bounding spheres of each drawn actor: (N, 4) centres and radii, scene space."""

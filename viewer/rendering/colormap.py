@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rendering.srgb import encode_srgb
 from viewer.rig.arrays import Bytes, Floats
+from viewer.rig.srgb import encode_srgb
 
 __all__ = ["colormap", "diverging_map", "oklab"]
 

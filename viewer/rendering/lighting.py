@@ -25,12 +25,12 @@ from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = ["Lighting"]
 
-_SHADOW_STRENGTH = 0.9  # the rest represents light reflected by other surfaces
+_SHADOW_STRENGTH = 0.9  # the remainder represents light reflected by other surfaces
 _BLUR = 0.011  # filter radius on the ground, relative to a figure's size, where passes are averaged
 
 
 class Lighting:
-    """Draws the maps that the lighting depends on, before each pass of an image.
+    """Draws the maps on which the lighting depends, before each pass of an image.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Lighting:
         self.bounds = Bounds()
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
-        self._size = 0.0  # of the largest figure, scene units
+        self._size = 0.0  # size of the largest figure, scene units
         self._shadow: ShadowPass | None = None
         self._occlusion: OcclusionPass | None = None
         self._made: list[ContactPass | GroundShadowPass] = []
@@ -70,7 +70,7 @@ class Lighting:
         up : str
             The scene's up axis.
         box : (2, 3)
-            Bounds whose lowest point lies on the ground, scene space.
+            Bounds whose lowest point is at ground level, scene space.
         """
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options
@@ -80,6 +80,8 @@ class Lighting:
         if not of_actors:
             return
         self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
+        # The joints of a figure may all be in one place.
+        self._size = self._size or casters.largest_mesh()
         if options.has_shadows and self._size > 0.0:
             self._spheres, (axes, height) = np.concatenate(of_actors), _ground(up, box)
             self._contact = self._contact_pass.draw(
@@ -117,7 +119,7 @@ class Lighting:
                 casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
             )
             # The shadows of the passes are offset on the ground: they must overlap.
-            blur = _BLUR * self._size if n_passes(options) > 1 else 0.0
+            blur = _BLUR * casters.largest_mesh() if n_passes(options) > 1 else 0.0
             shadow = replace(shadow, angle=2.0 * math.pi * sample.phase, blur=blur)
         if options.quality == "final" and self._size > 0.0:
             occlusion = self._occlusion_pass(size).draw(

@@ -9,13 +9,19 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes, Floats, frozen
 
-__all__ = ["ALPHA_MODES", "TEXTURES", "WRAPS", "Material", "Texture"]
+__all__ = ["ALPHA_MODES", "MINIFICATIONS", "TEXTURES", "WRAPS", "Material", "Texture"]
 
 ALPHA_MODES = ("opaque", "mask", "blend")
 """Alpha ignored; cut out below the cutoff; blended with the background."""
 
 WRAPS = ("clamp", "repeat", "mirror")
 """Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
+
+MINIFICATIONS = (
+    *("nearest", "linear", "nearest_mipmap_nearest"),
+    *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
+)
+"""Filters of images that are drawn smaller than they are, as OpenGL and glTF name them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,13 +38,17 @@ class Texture:
     channel : int
         Channel of ``image`` from which single-channel textures are read.
     uv_set : int
-        0 for ``Mesh.uvs``, 1 for ``Mesh.second_uvs``.
+        0 for ``Mesh.uvs``, n for ``Mesh.other_uvs[n - 1]``.
     transform : (2, 3)
         Maps texture coordinates to image coordinates, whose v is 0 at the bottom row.
     wrap : (str, str)
         Entries of ``WRAPS`` along u and v.
     is_smooth : bool
         Whether pixels are interpolated.
+    minification : str
+        Entry of ``MINIFICATIONS``; empty for mipmaps, interpolated if ``is_smooth``.
+    encoded : bytes or None
+        The PNG or JPEG file that ``image`` was decoded from, if it was part of another file.
     """
 
     name: str
@@ -48,6 +58,8 @@ class Texture:
     transform: Floats | None = None
     wrap: tuple[str, str] = ("clamp", "clamp")
     is_smooth: bool = True
+    minification: str = ""
+    encoded: bytes | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -58,7 +70,9 @@ class Texture:
         placed = np.eye(2, 3) if self.transform is None else self.transform
         put("transform", frozen("transform", placed, (2, 3)))
         _check_choice("channel", self.channel, range(4))
-        _check_choice("uv_set", self.uv_set, range(2))
+        _check_choice("minification", self.minification, ("", *MINIFICATIONS))
+        if self.uv_set < 0:
+            raise RigError(f"uv_set: expected at least 0, found {self.uv_set}")
         for side in self.wrap:
             _check_choice("wrap", side, WRAPS)
 

@@ -46,8 +46,8 @@ class Mesh:
         In file order.
     triangle_materials : (T,) int32
         Index into ``materials``, -1 for none.
-    second_uvs : (U, 2) or None
-        A second texture coordinate for each row of ``uvs``, for textures that refer to this set.
+    other_uvs : tuple of (U, 2)
+        Further texture coordinates for each row of ``uvs``, for textures that refer to these sets.
     colors : (V, 4) or None
         Linear vertex colours and opacity, 0 to 1, which multiply the materials' base colours.
     parts : tuple of P str
@@ -63,7 +63,7 @@ class Mesh:
     materials: tuple[Material, ...] = ()
     triangle_materials: Ints | None = None
     uv_triangles: Ints | None = None
-    second_uvs: Floats | None = None
+    other_uvs: tuple[Floats, ...] = ()
     colors: Floats | None = None
     parts: tuple[str, ...] = ()
     triangle_parts: Ints | None = None
@@ -78,9 +78,8 @@ class Mesh:
         if self.uvs is not None:
             rows = self.n_vertices if self.uv_triangles is None else None
             put("uvs", frozen("uvs", self.uvs, (rows, 2)))
-        if self.second_uvs is not None:
-            rows = 0 if self.uvs is None else len(self.uvs)
-            put("second_uvs", frozen("second_uvs", self.second_uvs, (rows, 2)))
+        rows = 0 if self.uvs is None else len(self.uvs)
+        put("other_uvs", tuple(frozen("other_uvs", uvs, (rows, 2)) for uvs in self.other_uvs))
         if self.uv_triangles is not None:
             shape = (self.n_triangles, 3)
             put("uv_triangles", frozen("uv_triangles", self.uv_triangles, shape, np.int32))
@@ -88,6 +87,9 @@ class Mesh:
             put("colors", frozen("colors", self.colors, (self.n_vertices, 4)))
         for name in ("triangle_materials", "triangle_parts"):
             given = getattr(self, name)
+            if name == "triangle_parts" and not self.parts and np.all(np.asarray(given) == -1):
+                # It may be that of a mesh with other triangles, copied by ``dataclasses.replace``.
+                given = None
             values = np.full(self.n_triangles, -1, dtype=np.int32) if given is None else given
             put(name, frozen(name, values, (self.n_triangles,), np.int32))
         self._check_indices()
@@ -266,7 +268,6 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
         Vertex that each of them is a copy of.
     """
     sources, uv_indices, triangles = split_seams(mesh)
-    second = mesh.second_uvs
     return Mesh(
         positions=mesh.positions[sources],
         normals=mesh.normals[sources],
@@ -274,7 +275,10 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
         uvs=None if mesh.uvs is None else mesh.uvs[uv_indices],
         materials=mesh.materials,
         triangle_materials=mesh.triangle_materials,
-        second_uvs=None if second is None else second[uv_indices],
+        other_uvs=tuple(uvs[uv_indices] for uvs in mesh.other_uvs),
+        colors=None if mesh.colors is None else mesh.colors[sources],
+        parts=mesh.parts,
+        triangle_parts=mesh.triangle_parts,
     ), sources
 
 

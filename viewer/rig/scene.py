@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from viewer.rig.captures.points import PointClip
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.sampled_clip import SampledClip
+    from viewer.rig.motion.transform_clip import TransformClip
 
-Motion: TypeAlias = "Clip | SampledClip | PointClip"
+Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
 
 # The camera frames the box of the other 99.9 % of the points ...
@@ -76,6 +77,10 @@ class Actor:
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
         Whether its clip covers the current time.
+    animation : int
+        Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none.
+    origin : Path or None
+        File of its figure; figures of one file play their animations together.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
     hidden_parts : frozenset of int
@@ -94,6 +99,8 @@ class Actor:
     points: Floats | None = None
     is_present: bool = True
     called: str = ""
+    animation: int = -1
+    origin: Path | None = None
     hidden_parts: frozenset[int] = frozenset()
 
     @property

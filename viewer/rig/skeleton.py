@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.humanoid import Humanoid
 
 __all__ = [
     "DOF_KINDS",
@@ -22,6 +23,9 @@ __all__ = [
     "find_joint",
     "joint_label",
     "joint_labels",
+    "shown_joint_of",
+    "shown_joints",
+    "shown_parents",
 ]
 
 DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
@@ -51,7 +55,8 @@ class Skeleton:
         Lowest and highest corner of the box drawn for each joint, in joint space.
     auxiliary : (J,) bool or None
         Joints that the file does not have: a reader added them to express a transform or a second
-        binding exactly. They have no DOFs, and are not shown as joints. None if there are none.
+        binding exactly. They have no DOFs, and ``shown_joints`` leaves them out: lists, pictures
+        and messages show the nearest ancestor in their place. None if there are none.
     """
 
     names: tuple[str, ...]
@@ -65,6 +70,7 @@ class Skeleton:
     dof_limits: Floats
     boxes: Floats | None = None
     auxiliary: Bools | None = None
+    humanoid: Humanoid | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -201,20 +207,53 @@ def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
     -------
     tuple of J str
         ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` if unnamed.
+        Auxiliary joints have the label of the joint that is shown in their place.
     """
     counts = Counter(skeleton.names)
-    return tuple(
+    labels = tuple(
         name if name and counts[name] == 1 else f"{name}#{joint}"
         for joint, name in enumerate(skeleton.names)
     )
+    if skeleton.auxiliary is None:
+        return labels
+    return tuple(labels[joint] for joint in shown_joint_of(skeleton).tolist())
 
 
 def joint_label(skeleton: Skeleton, joint: int) -> str:
     """Return the label of one joint, as in ``joint_labels``."""
+    if skeleton.auxiliary is not None:
+        joint = int(shown_joint_of(skeleton)[joint])
     name = skeleton.names[joint]
     if name and skeleton.names.count(name) == 1:
         return name
     return f"{name}#{joint}"
+
+
+def shown_joints(skeleton: Skeleton) -> Ints:
+    """Return the joints that are shown: those of the file, without auxiliary ones: (N,) int32."""
+    joints: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
+    return joints if skeleton.auxiliary is None else joints[~skeleton.auxiliary]
+
+
+def shown_joint_of(skeleton: Skeleton) -> Ints:
+    """Return the joint that is shown in place of each joint: (J,) int32.
+
+    The joint itself, or the nearest ancestor of an auxiliary one.
+    """
+    shown: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
+    if skeleton.auxiliary is not None:
+        for joint in np.flatnonzero(skeleton.auxiliary).tolist():
+            # Parents come first, so theirs is already final.
+            shown[joint] = shown[skeleton.parents[joint]]
+    return shown
+
+
+def shown_parents(skeleton: Skeleton) -> Ints:
+    """Return the shown joint above each joint, -1 for none: (J,) int32."""
+    if skeleton.auxiliary is None:
+        return skeleton.parents
+    parents = shown_joint_of(skeleton)[skeleton.parents]
+    return np.where(skeleton.parents < 0, np.int32(-1), parents)
 
 
 def dof_label(skeleton: Skeleton, dof: int) -> str:

@@ -9,11 +9,13 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.skeleton import Skeleton, shown_joint_of, shown_joints
 
 __all__ = [
     "Skin",
     "bind_positions",
     "has_influence",
+    "idle_joints",
     "influence_counts",
     "limit_influences",
     "merged",
@@ -148,6 +150,17 @@ def has_influence(skin: Skin) -> Bools:
     if not zero.any():
         return counts > 0
     return np.bincount(owners(skin), weights=~zero, minlength=skin.n_vertices) > 0
+
+
+def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
+    """Return the joints without influence, in ascending order: (N,) int32.
+
+    Influences of auxiliary joints of the skeleton count as those of the joints shown for them.
+    """
+    used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
+    if skeleton is not None and skeleton.n_joints == skin.n_joints:
+        used, shown = shown_joint_of(skeleton)[used], shown_joints(skeleton)
+    return np.setdiff1d(shown, used)
 
 
 def skin_from_entries(

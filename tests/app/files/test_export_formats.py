@@ -1,25 +1,22 @@
-"""Format of an export: each with what it keeps; the name follows the choice."""
+"""Formats of an export: each with what it keeps and omits; the name follows the choice."""
 
 from __future__ import annotations
 
-from viewer.app.files import export_formats
+from viewer.app.files.export_formats import FOLDER
+from viewer.app.files.motion_export import motion_formats, unsuited_formats
 from viewer.app.files.state import Files
 
 
-def test_chosen_format_changes_the_suffix_of_the_name(hand, monkeypatch):
+def test_chosen_format_changes_the_suffix_of_the_name(hand):
     hand.menu("menu File", "Export…")
-    dialog = hand.state.of(Files).dialog
     hand.key("a", "ctrl")
     hand.type("my.figure.obj")
-    hand.click("Folder")
-    offered = {}
+    hand.click("format .ply")
+    assert hand.state.of(Files).dialog.name == "my.figure.ply"
+    assert "format .bvh" not in hand.state.item_rects
 
-    def choose(state, label, value, texts):
-        offered.update(texts)
-        return ".ply"
 
-    # The list of a dialog opens upwards, where tests cannot aim.
-    monkeypatch.setattr(export_formats, "choice", choose)
-    hand.step(2)
-    assert dialog.name == "my.figure.ply"
-    assert "posed mesh" in offered[".ply"] and ".bvh" not in offered
+def test_format_that_cannot_hold_the_motion_says_why(curves):
+    state = curves.state
+    assert "SMPL" in unsuited_formats(state.actor)[FOLDER]
+    assert set(motion_formats(state.actor)) > {FOLDER, ".bvh", ".glb", ".anim"}

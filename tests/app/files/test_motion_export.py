@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from app.captured import dots, people, walk
 
-from viewer.app.files.motion_export import FOLDER, motion_files, motion_suffixes, save_motion
+from viewer.app.files.export_formats import FOLDER
+from viewer.app.files.motion_export import motion_files, motion_suffixes, save_motion
 from viewer.app.files.state import Files
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
@@ -240,23 +241,37 @@ def test_dialog_warns_of_any_file_that_would_be_replaced(crowd, tmp_path):
     assert "Save###Save" in crowd.state.item_rects
 
 
-def test_dialog_changes_the_suffix_with_the_format(crowd, tmp_path):
-    _ask(crowd, tmp_path)
-    dialog = crowd.state.of(Files).dialog
-    kinds = [*motion_suffixes(), FOLDER]
-    crowd.pick("Format", kinds.index(".glb"))
-    assert (dialog.name, dialog.target()) == ("tiny.glb", tmp_path / "tiny.glb")
-    crowd.pick("Format", kinds.index(FOLDER))
-    assert (dialog.name, dialog.target()) == ("tiny", tmp_path / "tiny")
-    dialog.name = "hand.made.npz"  # a suffix that is typed counts
-    crowd.step(2)
-    crowd.pick("Format", 0)
+def _choose_format(hand, suffix):
+    # The list of formats shows a few rows at a time.
+    for notches in (40, *[-1] * 12):
+        hand.wheel(notches, (500, 530))
+        hand.step(2)
+        _, y0, _, y1 = hand.state.item_rects.get(f"format {suffix}", (0, 0, 0, 0))
+        if hand.state.item_rects["formats"][1] + 10 < y0 and y1 < hand.state.item_rects["Name"][1]:
+            hand.click(f"format {suffix}")
+            return
+    raise AssertionError(suffix)
+
+
+def test_dialog_changes_the_suffix_with_the_format(bodies, tmp_path):
+    _ask(bodies, tmp_path)
+    dialog = bodies.state.of(Files).dialog
+    stem = dialog.name.removesuffix(".bvh")
+    _choose_format(bodies, ".glb")
+    assert (dialog.name, dialog.target()) == (f"{stem}.glb", tmp_path / f"{stem}.glb")
+    _choose_format(bodies, FOLDER)
+    assert (dialog.name, dialog.target()) == (stem, tmp_path / stem)
+    bodies.click("Name")
+    bodies.key("a", "ctrl")
+    bodies.type("hand.made.npz")  # a suffix that is typed counts
+    _choose_format(bodies, ".bvh")
     assert dialog.name == "hand.made.bvh"
 
 
 def test_dialog_for_one_actor_does_not_ask_for_the_actor(moving, tmp_path):
     _ask(moving, tmp_path)
-    assert "Actors##exported" not in moving.state.item_rects and "Format" in moving.state.item_rects
+    assert "Actors##exported" not in moving.state.item_rects
+    assert "format .bvh" in moving.state.item_rects
     moving.click("Save###Save")
     moving.finish_job()
     assert (tmp_path / "tiny.bvh").exists()

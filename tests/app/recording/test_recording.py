@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from numpy.testing import assert_allclose
 from PIL import Image
 
@@ -20,7 +21,7 @@ from viewer.rig.motion.instances import pose_actors
 @pytest.fixture
 def moving(drive, rig):
     """A test driver on the tiny figure whose root moves right, 0.5 a second, for a second."""
-    hand = drive(*rig, size=(1000, 700), samples=1)
+    hand = drive(*rig, size=(1000, 700), samples=1, pixels_per_point=1.0)
     channel = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
     hand.state.actor.clip = Clip("slide", (channel,), 0.0, 1.0)
     hand.step(3)
@@ -54,6 +55,19 @@ def test_menu_opens_the_dialog_and_escape_closes_it(moving):
     moving.key("escape")
     moving.step(2)
     assert moving.state.of(Recording).settings is None
+
+
+def test_preview_is_kept_while_the_panels_still_show_it(moving):
+    moving.menu("menu File", "Record pictures or video…")
+    moving.screen()
+    moving.state.of(Recording).settings.size = "1080x1920"
+    moving.screen()
+    for is_down in (True, False):
+        moving.io.add_key_event(imgui.Key.escape, is_down)
+        moving.step()
+        moving.app.pixels()
+    assert moving.state.of(Recording).settings is None
+    assert moving.app.context.error == "GL_NO_ERROR"
 
 
 def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):

@@ -227,7 +227,7 @@ def test_target_that_is_already_rigged_is_refused(drive, tmp_path):
     start_adding(hand.state, tmp_path / "whole.npz")
     hand.finish_job()
     assert hand.state.error == (
-        f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found one with a rig"
+        f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found a rigged mesh"
     )
 
 

@@ -228,3 +228,25 @@ def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     tall.state.scene.actors[1] = Actor(bare)
     tall.step(2)
     assert vertices() == "12"
+
+
+def test_vertex_colours_have_a_check_box_where_there_are_some(drive, tmp_path):
+    rows = "0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n"
+    names = [f"float {name}" for name in "xyz"] + [
+        f"uchar {name}" for name in ("red", "green", "blue")
+    ]
+    path = tmp_path / "red.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\n"
+        + "".join(f"property {name}\n" for name in names)
+        + f"element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}"
+    )
+    hand = drive(path, size=(1000, 1000))
+    before = hand.scene_picture()
+    hand.click("Vertex colours")
+    assert not hand.state.options.vertex_colors and hand.undo_steps == 1
+    assert (hand.scene_picture() != before).any()
+
+
+def test_vertex_colours_have_no_check_box_without_any(tall):
+    assert "Vertex colours" not in tall.state.item_rects

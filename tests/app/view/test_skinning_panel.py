@@ -125,5 +125,5 @@ def test_panel_of_a_lone_skeleton_says_so(drive, rig, texts):
     hand.show_panel("Skinning")
     texts.clear()
     hand.step()
-    assert "This figure has no skin attached to a skeleton." in texts
+    assert any(text.startswith("This figure has no skin attached") for text in texts)
     assert "engine" not in hand.state.item_rects

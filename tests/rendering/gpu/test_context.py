@@ -33,6 +33,7 @@ def viewer_render(tmp_path, *arguments: str, **environment: str):
     skel.write_text(TINY_SKEL)
     command = [sys.executable, "-m", "viewer", "render", str(skel), "-o", str(output)]
     size = [] if "--size" in arguments else ["--size", "64x48"]
+    size += [] if "--quality" in arguments else ["--quality", "draft"]
     result = subprocess.run(
         [*command, *size, *arguments],
         cwd=ROOT,
@@ -61,7 +62,7 @@ def test_missing_egl_device_names_the_remedies(tmp_path):
     check_refusal(
         *result,
         code=4,
-        message="EGL found 0 devices: in a container start it with "
+        message="EGL found 0 devices: start containers with "
         "NVIDIA_DRIVER_CAPABILITIES=all, or install Mesa for software rendering " + INSTALL,
     )
 
@@ -202,7 +203,9 @@ def test_too_many_samples_fall_back_to_the_maximum(tmp_path):
 
 @LINUX
 def test_another_rasteriser_draws_without_warnings(tmp_path):
-    result, output = viewer_render(tmp_path, "--samples", "1", GALLIUM_DRIVER="softpipe")
+    result, output = viewer_render(
+        tmp_path, "--quality", "normal", "--samples", "1", GALLIUM_DRIVER="softpipe"
+    )
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
 
@@ -217,7 +220,7 @@ def test_drawing_needs_no_display(tmp_path):
 @pytest.mark.parametrize(
     ("text", "start"),
     [
-        ("requested device index 0, but found 0 devices", "EGL found 0 devices: in a container"),
+        ("requested device index 0, but found 0 devices", "EGL found 0 devices: start containers"),
         (
             "requested device index 9, but found 1 devices",
             "there is no graphics device 9: EGL found 1 device, counted from 0",
@@ -230,7 +233,7 @@ def test_drawing_needs_no_display(tmp_path):
         ("eglInitialize failed (0x3002)", "EGL was denied access to the graphics device"),
         ("eglCreateContext failed (0x3003)", "the driver is out of memory"),
         ("eglGetDisplay failed (0x3008)", "EGL does not accept this display"),
-        ("eglCreateContext failed (0x3009)", "OpenGL 3.3 is needed and the driver"),
+        ("eglCreateContext failed (0x3009)", "OpenGL 3.3 is needed, but the driver"),
         ("eglMakeCurrent failed (0x300B)", "EGL refused"),
         ("libEGL.so.1 not loaded", "libEGL was not found"),
         ("libGL.so.1 not loaded", "libGL was not found"),
@@ -298,6 +301,6 @@ def test_inaccessible_graphics_card_is_a_note(monkeypatch):
 
 def test_display_without_opengl_3_reports_the_requirement():
     assert explain("GLX: Failed to create context: GLXBadFBConfig") == (
-        "OpenGL 3.3 is needed and this display's driver does not offer it "
+        "OpenGL 3.3 is needed, but this display's driver does not offer it "
         "[GLX: Failed to create context: GLXBadFBConfig]"
     )

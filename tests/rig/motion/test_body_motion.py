@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from export.plain_smpl import rotation, smpl_forward
 from family_models import family_figure
-from faults import lines
+from faults import told
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from rig.hand_made import skeleton
@@ -162,13 +162,16 @@ def test_missing_joints_of_the_figure_are_reported(family):
         hands={"left": np.ones((1, 6)), "right": np.zeros((1, 6))},
     )  # fmt: skip
     _, notes = posed(family("smpl"), given)
-    assert lines(notes) == [
-        "left hand omitted: smpl has no hand components",
-        "2 joints missing from smpl omitted: jaw, left_middle3",
-        "shape coefficients 11 to 12 omitted "
-        f"(largest value {np.abs(waves(12)[10:]).max():.3g}): smpl has 10",
-        f"expression coefficients 1 to 10 omitted "
-        f"(largest value {np.abs(waves(10)).max():.3g}): smpl has 0",
+    shape = {"first": 11, "last": 12, "most": 10, "largest": np.abs(waves(12)[10:]).max()}
+    face = {"first": 1, "last": 10, "most": 0, "largest": np.abs(waves(10)).max()}
+    assert told(notes) == [
+        ("F007.hand-left-out", {"side": "left", "figure": "smpl"}),
+        (
+            "F007.joints-left-out",
+            {"n": 2, "figure": "smpl", "names": ["jaw", "left_middle3"]},
+        ),
+        ("F007.coefficients-left-out", {"group": "shape", "figure": "smpl", **shape}),
+        ("F007.coefficients-left-out", {"group": "expression", "figure": "smpl", **face}),
     ]
 
 
@@ -194,10 +197,10 @@ def test_only_six_of_many_omitted_joints_are_named(family):
     vectors[:, 22:] = 0.1
     _, notes = posed(family("smpl"), motion(names, vectors))
     lost = [name for name in names[22:] if name not in family("smpl").skeleton.names]
-    listed = ", ".join(lost[:6])
     assert len(lost) == 33
-    assert lines(notes) == [f"33 joints missing from smpl omitted: {listed} and 27 more"]
+    values = {"n": 33, "figure": "smpl", "names": lost}
+    assert told(notes) == [("F007.joints-left-out", values)]
     vectors[:, 28:] = 0.0
-    assert lines(posed(family("smpl"), motion(names, vectors))[1]) == [
-        f"6 joints missing from smpl omitted: {listed}"
+    assert told(posed(family("smpl"), motion(names, vectors))[1]) == [
+        ("F007.joints-left-out", {"n": 6, "figure": "smpl", "names": lost[:6]})
     ]

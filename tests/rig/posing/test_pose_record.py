@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from family_models import family_figure
-from faults import lines
+from faults import told
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 from rig.hand_made import mesh, skeleton
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations, pose_key, rest_pose
@@ -69,7 +70,7 @@ def test_dofs_beyond_their_limits_are_clamped_and_counted():
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(dofs={"knee.z": 3.0, "hip.x": -2.0}), figure, pose)
     assert pose.dofs.tolist() == [0.5, -1.0, 1.0]
-    assert lines(notes) == ["2 DOFs of the pose clamped to their limits"]
+    assert told(notes) == [("F007.pose-clamped", {"n": 2})]
 
 
 def test_unknown_dof_is_refused_and_leaves_the_pose():
@@ -132,8 +133,8 @@ def test_vector_of_another_family_member_is_matched_by_joint_names(
         expected[target : target + joints] = wanted[source : source + joints]
     found, notes = applied(figure, vector=wanted.ravel())
     assert_allclose(found, expected, atol=1e-13)
-    said = [f"{left_out} joints of the pose omitted: missing from {figure.name}"]
-    assert lines(notes) == (said if left_out else [])
+    said = [("F007.pose-joints-left-out", {"n": left_out, "figure": figure.name})]
+    assert told(notes) == (said if left_out else [])
 
 
 def test_joints_missing_from_the_vector_go_to_rest(family):
@@ -158,18 +159,17 @@ def test_invalid_scale_is_left_out(family, scale):
     pose.figure_scale = 1.5
     notes = apply_record(PoseRecord(scale=scale), figure, pose)
     assert pose.figure_scale == 1.5
-    assert (
-        len(notes) == 1
-        and lines(notes)[0].startswith("scale: expected")
-        and "kept at 1.5" in lines(notes)[0]
-    )
+    ((key, values),) = told(notes)
+    assert (key, values["scale"]) == ("F007.scale-kept", 1.5)
+    assert values["fault"].values["found"] == scale
 
 
 def test_extreme_placement_and_shape_are_left_out_or_refused(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
-    assert lines(notes) == ["translation: expected at most 1e+09, found 1e+300; unchanged"]
+    fault = Phrase("translation-too-far", most=1e9, found=1e300)
+    assert told(notes) == [("F007.translation-kept", {"fault": fault})]
     assert not pose.figure_translation.any()
     message = refusal(figure, shape=np.array([1e300]))
     assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
@@ -234,7 +234,7 @@ def test_missing_part_is_reported_unless_at_rest(family):
     figure = family("smpl")
     assert applied(figure, parts={"jaw_pose": np.zeros(3)})[1] == []
     found, notes = applied(figure, parts={"jaw_pose": np.ones(3)})
-    assert lines(notes) == [f"jaw_pose omitted: {figure.name} has no such joint"]
+    assert told(notes) == [("F007.part-left-out", {"part": "jaw_pose", "figure": figure.name})]
     assert not found.any()
 
 
@@ -301,7 +301,8 @@ def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
     assert_allclose(found[37:].ravel(), wanted, atol=1e-13)
     assert notes == []
     found, notes = applied(figure, parts={"right_hand_pose": np.ones(6)})
-    assert lines(notes) == [f"right_hand_pose omitted: {figure.name} has no hand components"]
+    values = {"part": "right_hand_pose", "figure": figure.name}
+    assert told(notes) == [("F007.hand-part-left-out", values)]
     assert not found.any()
 
 
@@ -330,9 +331,11 @@ def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
-    assert lines(apply_record(record, figure, pose, drop_excess=True)) == [
-        f"shape coefficients 11 to 16 omitted (largest value 3): {figure.name} has 10",
-        f"expression coefficient 1 omitted (largest value 2): {figure.name} has 0",
+    shape = {"group": "shape", "first": 11, "last": 16, "most": 10, "largest": 3.0}
+    face = {"group": "expression", "first": 1, "last": 1, "most": 0, "largest": 2.0}
+    assert told(apply_record(record, figure, pose, drop_excess=True)) == [
+        ("F007.coefficients-left-out", {**shape, "figure": figure.name}),
+        ("F007.coefficient-left-out", {**face, "figure": figure.name}),
     ]
     assert pose.shape_weights.tolist() == [0.5] * 10
 
@@ -393,6 +396,5 @@ def test_record_holds_labels_and_raw_pose_values(family):
 def test_record_of_a_figure_without_shapes_has_none():
     figure = hinges()
     record = record_of(figure, rest_pose(figure.skeleton))
-    assert record.shape is None
-    assert record.expression is None
+    assert record.shape is None and record.expression is None
     assert record.vector.tolist() == [0.5, 0.0, 0.0]

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from faults import lines
+from faults import told
 from numpy.testing import assert_allclose
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.errors import RigError
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
@@ -79,7 +80,7 @@ def test_other_order_of_dofs_gets_the_same_rotation() -> None:
     y, z, x = pose.dofs[3:]
     second = about(2, -0.7) @ about(1, 0.2) @ about(0, 1.0)
     assert_allclose(about(0, x) @ about(2, z) @ about(1, y), second, atol=1e-12)
-    assert lines(notes) == ["transferred 2 of 2 joints of one"]
+    assert told(notes) == [("F007.joints-taken-over", {"n": 2, "all": 2, "figure": "one"})]
 
 
 def test_labels_alone_would_give_another_pose() -> None:
@@ -95,7 +96,10 @@ def test_missing_joints_are_named_in_one_line_and_others_stay() -> None:
     other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
     start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
     pose, notes = transfer_pose(one, posed(one, *[0.2] * 12), other, start)
-    assert lines(notes) == ["transferred 2 of 4 joints of cat", "man has no joint named tail, tip"]
+    assert told(notes) == [
+        ("F007.joints-taken-over", {"n": 2, "all": 4, "figure": "cat"}),
+        ("F007.joints-lacking", {"figure": "man", "names": ["tail", "tip"]}),
+    ]
     assert_allclose(pose.dofs, [0.2] * 6 + [0.1, 0.2, 0.3], atol=1e-12)
     assert_allclose(start.dofs[:6], 0)
 
@@ -136,7 +140,7 @@ def test_limits_and_missing_axes_are_respected_and_reported() -> None:
     assert_allclose(pose.dofs[:3], [0.1, 0, 0], atol=1e-9)
     # Rz(0.2) Rx(0.4) on an axis x: tan t = (1 + cos 0.2) sin 0.4 / ((1 + cos 0.2) cos 0.4).
     assert_allclose(pose.dofs[3], 0.4, atol=1e-9)
-    assert lines(notes)[1:] == ["rotated as far as DOFs and limits allow: a, b"]
+    assert told(notes)[1:] == [("F007.joints-limited", {"names": ["a", "b"]})]
 
 
 def test_placement_scale_and_shape_stay() -> None:
@@ -179,9 +183,8 @@ def test_long_lists_are_truncated() -> None:
     one = figure(["a", *(f"j{k}" for k in range(20))], ["xyz"] * 21)
     other = figure("a", ["zyx"], "man")
     _, notes = transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
-    assert lines(notes)[1].startswith("man has no joint named j0, j1, ") and lines(notes)[
-        1
-    ].endswith("8 more")
+    names = [f"j{k}" for k in range(20)]
+    assert told(notes)[1] == ("F007.joints-lacking", {"figure": "man", "names": names})
 
 
 def test_rotations_are_about_the_figures_axes() -> None:
@@ -214,9 +217,9 @@ def test_record_for_other_dofs_rotates_joints_and_keeps_placement_and_scale() ->
     pose.figure_translation[:] = 1, 0, 0
     pose.figure_scale = 2.0
     found = rest_pose(other.skeleton)
-    assert lines(apply_record(record_of(one, pose), other, found)) == [
-        "transferred 2 of 2 joints of cat",
-        "unchanged: figure translation, figure scale",
+    assert told(apply_record(record_of(one, pose), other, found)) == [
+        ("F007.joints-taken-over", {"n": 2, "all": 2, "figure": "cat"}),
+        ("F007.left-as-they-were", {"names": [Phrase("left-place"), Phrase("left-size")]}),
     ]
     wanted = joint_rotations(one.skeleton, pose)
     assert_allclose(joint_rotations(other.skeleton, found), wanted, atol=1e-12)
@@ -277,7 +280,7 @@ def test_edited_dof_beyond_its_limit_leaves_no_rotation_beneath() -> None:
     record = record_of(one, posed(one, 0.1, 0.2, 0.3))
     found = rest_pose(one.skeleton)
     notes = apply_record(replace(record, dofs={**record.dofs, "a.x": 2.0}), one, found)
-    assert lines(notes) == ["1 DOF of the pose clamped to its limits"]
+    assert told(notes) == [("F007.pose-clamped", {"n": 1})]
     assert found.dofs.tolist() == [0.5, 0.2, 0.3]
     assert found.rotations.tolist() == [[0, 0, 0, 1]]
 
@@ -303,7 +306,7 @@ def test_lists_that_do_not_fit_the_skeleton_are_matched_by_name() -> None:
                     rotations=np.array([[0, 0, 0, 1.0]]))  # fmt: skip
     found = posed(one, 0, 0, 0, 0.3)
     notes = apply_record(replace(record, joint_rotations=turns), one, found)
-    assert lines(notes) == ["transferred 1 of 1 joints of cat"]
+    assert told(notes) == [("F007.joints-taken-over", {"n": 1, "all": 1, "figure": "cat"})]
     assert_allclose(found.dofs, [0.1, 0, 0, 0.3], atol=1e-12)
 
 
@@ -329,9 +332,11 @@ def test_same_skeleton_with_fewer_shapes_takes_placement_scale_and_common_shapes
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), replace(shaped(bones, 2, 1), name="kin")
     found = rest_pose(bones.skeleton)
-    assert lines(apply_record(record_of(one, body_pose(one)), other, found, cut)) == [
-        "shape coefficients 3 to 4 omitted (largest value 0.5): kin has 2",
-        "expression coefficient 2 omitted (largest value 4): kin has 1",
+    shape = {"first": 3, "last": 4, "most": 2, "largest": 0.5}
+    face = {"first": 2, "last": 2, "most": 1, "largest": 4.0}
+    assert told(apply_record(record_of(one, body_pose(one)), other, found, cut)) == [
+        ("F007.coefficients-left-out", {"group": "shape", "figure": "kin", **shape}),
+        ("F007.coefficient-left-out", {"group": "expression", "figure": "kin", **face}),
     ]
     assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4]
     assert found.shape_weights.tolist() == [2, -1, 3]
@@ -352,9 +357,11 @@ def test_same_skeleton_without_shapes_reports_dropped_shapes() -> None:
     bones = figure("ab", ["xyz", "x"], "bones")
     one = shaped(bones, 4, 2)
     found = rest_pose(bones.skeleton)
-    assert lines(apply_record(record_of(one, body_pose(one)), bones, found)) == [
-        "shape coefficients 1 to 4 omitted (largest value 2): bones has 0",
-        "expression coefficients 1 to 2 omitted (largest value 4): bones has 0",
+    shape = {"first": 1, "last": 4, "most": 0, "largest": 2.0}
+    face = {"first": 1, "last": 2, "most": 0, "largest": 4.0}
+    assert told(apply_record(record_of(one, body_pose(one)), bones, found)) == [
+        ("F007.coefficients-left-out", {"group": "shape", "figure": "bones", **shape}),
+        ("F007.coefficients-left-out", {"group": "expression", "figure": "bones", **face}),
     ]
     assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4] and found.shape_weights.size == 0
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2

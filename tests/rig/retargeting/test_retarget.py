@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from faults import lines
+import pytest
+from faults import told
 from rig.retargeting.two_people import (
     BODY,
     EXACT,
@@ -17,6 +18,7 @@ from rig.retargeting.two_people import (
     quaternions,
 )
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -49,9 +51,10 @@ def test_retargeting_onto_itself_is_the_identity() -> None:
     same = np.abs(np.einsum("nja,nja->nj", clip.rotations, motion.clip.rotations))
     np.testing.assert_allclose(same, 1.0, atol=EXACT)
     np.testing.assert_allclose(clip.translations, motion.clip.translations, atol=1e-12 * 100)
-    assert lines(notes) == [
-        "mocap drives 20 of 20 joints of mocap",
-        "root path scaled by 1, the ratio of leg lengths",
+    matched = {"motion": "mocap", "figure": "mocap", "n": 20, "all": 20, "pairs": []}
+    assert told(notes) == [
+        ("F007.joints-matched", matched),
+        ("F007.path-scaled", {"scale": pytest.approx(1.0), "by": Phrase("ratio-of-legs")}),
     ]
 
 
@@ -69,13 +72,18 @@ def test_limb_directions_match_the_source_from_t_pose_to_a_pose() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
-    assert lines(notes)[0].startswith(
-        "mocap drives 19 of 20 joints of body: pelvis by Hips, left_hip by "
-    )
-    assert lines(notes)[0].endswith("left_wrist by LeftHand, right_wrist by RightHand")
-    assert lines(notes)[1:3] == [
-        "joints kept at rest: spine2",
-        "unmatched joints of mocap: LeftToeBase",
+    (key, values), *rest = told(notes)
+    assert key == "F007.joints-matched-as-follows"
+    assert (values["motion"], values["figure"]) == ("mocap", "body")
+    assert (values["n"], values["all"], len(values["pairs"])) == (19, 20, 19)
+    partners = {pair.values["joint"]: pair.values["partner"] for pair in values["pairs"]}
+    for joint, partner in (("pelvis", "Hips"), ("left_hip", "LeftUpLeg")):
+        assert partners[joint] == partner
+    for joint, partner in (("left_wrist", "LeftHand"), ("right_wrist", "RightHand")):
+        assert partners[joint] == partner
+    assert rest[:2] == [
+        ("F007.joints-at-rest", {"names": ["spine2"]}),
+        ("F007.joints-without-partner", {"motion": "mocap", "names": ["LeftToeBase"]}),
     ]
 
 
@@ -168,7 +176,8 @@ def test_the_path_is_scaled_by_leg_length() -> None:
     clip, notes = retarget(source, figure)
     theirs = places(source.figure, source.clip)["Hips"]
     np.testing.assert_allclose(places(figure, clip)["pelvis"], path_scale() * theirs, atol=1e-12)
-    assert lines(notes)[-1] == f"root path scaled by {path_scale():.4g}, the ratio of leg lengths"
+    values = {"scale": pytest.approx(path_scale()), "by": Phrase("ratio-of-legs")}
+    assert told(notes)[-1] == ("F007.path-scaled", values)
     assert clip.figure_translations is None
 
 

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from faults import lines
+from faults import told
 from rig.retargeting.two_people import BODY, EXACT, HIK, bones, figure_of, moving, places
 
+from viewer.diagnostics.phrase import Phrase
 from viewer.errors import RigError
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing
@@ -29,7 +30,8 @@ def test_joints_between_two_that_match_are_folded_in() -> None:
         bones(theirs, ("LeftForeArm", "LeftHand")),
         atol=EXACT,
     )
-    assert "unmatched joints of mocap: LeftToeBase, LeftArmRoll" in lines(notes)
+    names = ["LeftToeBase", "LeftArmRoll"]
+    assert ("F007.joints-without-partner", {"motion": "mocap", "names": names}) in told(notes)
 
 
 def test_unmapped_joints_stay_at_rest_relative_to_their_parent() -> None:
@@ -37,7 +39,7 @@ def test_unmapped_joints_stay_at_rest_relative_to_their_parent() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(table, "body")
     clip, notes = retarget(source, figure)
     np.testing.assert_array_equal(clip.rotations[:, -2:], np.tile([0.0, 0, 0, 1], (5, 2, 1)))
-    assert "joints kept at rest: spine2, jaw, tail" in lines(notes)
+    assert ("F007.joints-at-rest", {"names": ["spine2", "jaw", "tail"]}) in told(notes)
 
 
 def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles() -> None:
@@ -93,7 +95,8 @@ def test_same_hierarchy_with_other_proportions_transfers_rotations() -> None:
             "na,na->n", clip.rotations[:, joint], source.clip.rotations[:, names.index(name)]
         )
         np.testing.assert_allclose(np.abs(same), 1.0, atol=EXACT)
-    assert lines(notes)[0] == "one drives 20 of 20 joints of two"
+    values = {"motion": "one", "figure": "two", "n": 20, "all": 20, "pairs": []}
+    assert told(notes)[0] == ("F007.joints-matched", values)
 
 
 def test_joint_translations_are_transferred_between_equal_hierarchies() -> None:
@@ -108,9 +111,8 @@ def test_joint_translations_are_transferred_between_equal_hierarchies() -> None:
     clip, _ = retarget(motion, bigger)
     np.testing.assert_allclose(clip.translations[:, 4], 2 * shifts[:, 4], atol=EXACT)
     _, notes = retarget(motion, figure_of(HIK, "mocap"))
-    assert lines(notes)[-1] == (
-        "translations of 1 joint relative to its parent omitted (largest: 0.0548 at left_knee)"
-    )
+    values = {"n": 1, "most": pytest.approx(np.sqrt(0.003)), "joint": "left_knee"}
+    assert told(notes)[-1] == ("F007.joint-positions-left-out", values)
 
 
 def test_mapping_covers_names_without_rules() -> None:
@@ -127,11 +129,13 @@ def test_mapping_covers_names_without_rules() -> None:
     np.testing.assert_allclose(
         bones(mine, ("left_elbow", "left_wrist")), bones(theirs, ("x14", "x15")), atol=EXACT
     )
-    assert lines(notes)[0] == (
-        "strange drives 4 of 20 joints of body: pelvis by x0, left_shoulder by x13, "
-        "left_elbow by x14, left_wrist by x15"
-    )
-    assert "joints kept at rest: left_hip, right_hip" in lines(notes)[1]
+    names = ("pelvis", "x0"), ("left_shoulder", "x13"), ("left_elbow", "x14"), ("left_wrist", "x15")
+    pairs = [Phrase("joint-by-joint", joint=joint, partner=partner) for joint, partner in names]
+    values = {"motion": "strange", "figure": "body", "n": 4, "all": 20, "pairs": pairs}
+    (matched, resting, *_) = told(notes)
+    assert matched == ("F007.joints-matched-as-follows", values)
+    assert resting[0] == "F007.joints-at-rest"
+    assert resting[1]["names"][:2] == ["left_hip", "right_hip"]
 
 
 def test_equal_names_match_whatever_they_mean() -> None:
@@ -145,9 +149,10 @@ def test_equal_names_match_whatever_they_mean() -> None:
     clip, notes = retarget(source, figure)
     theirs, mine = places(source.figure, source.clip), places(figure, clip)
     np.testing.assert_allclose(mine["tail_02"], theirs["tail_02"], atol=EXACT)
-    assert lines(notes)[:2] == [
-        "snake drives 3 of 4 joints of wasp",
-        "joints kept at rest: sting",
+    values = {"motion": "snake", "figure": "wasp", "n": 3, "all": 4, "pairs": []}
+    assert told(notes)[:2] == [
+        ("F007.joints-matched", values),
+        ("F007.joints-at-rest", {"names": ["sting"]}),
     ]
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import DEFAULT_RATE, time_span
+from viewer.rig.motion.evaluation import scene_rate, time_span
 from viewer.rig.motion.instances import pose_actors
+from viewer.rig.motion.timing import DEFAULT_RATE
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["FASTEST", "MODES", "Clock"]
@@ -71,7 +73,8 @@ class Clock:
     first_frame : int
         Number of that frame in its file.
     keyed_rate : float
-        Frames per second for scenes without sampled motion: keyed clips have no rate of their own.
+        Frames per second for scenes without sampled motion: the rate that was set, or else the
+        rate of the keys.
     has_frames : bool
         Whether some motion is sampled: each frame is then shown for its whole duration.
     interpolate_gaps : bool
@@ -94,6 +97,7 @@ class Clock:
     frame_rate: float = DEFAULT_RATE
     origin: float = 0.0
     keyed_rate: float = DEFAULT_RATE
+    _is_rate_set: bool = False
     first_frame: int = 0
     has_frames: bool = False
     interpolate_gaps: bool = False
@@ -117,7 +121,7 @@ class Clock:
         """Attach a scene: use the range of its clips, and go to its time, or to the start."""
         self.scene, self.posed_for = scene, None
         self.playing, self.mode, self.speed = False, "loop", 1.0
-        self.keyed_rate, self.has_frames = DEFAULT_RATE, False
+        self._is_rate_set, self.has_frames = False, False
         self._grid = ()
         self.follow(scene.actors[0] if scene.actors else None)
         self.start, self.end = self.whole
@@ -135,7 +139,10 @@ class Clock:
         """
         was_whole = (self.start, self.end) == self.whole
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
-        sampled = [actor for actor in moving if not isinstance(actor.clip, Clip)]
+        keyed = [actor for actor in moving if isinstance(actor.clip, Clip | TransformClip)]
+        sampled = [actor for actor in moving if actor not in keyed]
+        if not self._is_rate_set:
+            self.keyed_rate = scene_rate(keyed)
         self.has_motion, self.has_frames = bool(moving), bool(sampled)
         self.whole = time_span(moving)
         counted = chosen if chosen in sampled else max(sampled, key=_length, default=None)
@@ -149,7 +156,7 @@ class Clock:
         """Count the frames of an actor's capture; for None, frames at the rate of keyed clips."""
         clip = None if actor is None else actor.clip
         old_rate, old_origin, old_grid = self.frame_rate, self.origin, self._grid
-        if actor is None or clip is None or isinstance(clip, Clip):
+        if actor is None or clip is None or isinstance(clip, Clip | TransformClip):
             self.frame_rate, self.first_frame = self.keyed_rate, 0
             self.origin, self._grid = self.whole[0], ()
             return
@@ -165,7 +172,7 @@ class Clock:
 
     def count_by(self, rate: float) -> None:
         """Set the frame rate used to count keyed clips."""
-        self.keyed_rate = rate
+        self.keyed_rate, self._is_rate_set = rate, True
         if not self.has_frames:
             self.frame_rate = rate
 

@@ -232,7 +232,7 @@ class _Track:
         imgui.pop_style_color(2)
 
     def draw(self, value: float, low: float, high: float) -> None:
-        """Draw the track of the last slider, filled from 0 if possible, or else from the left."""
+        """Draw the track of the last slider: filled from 0 if possible, or from the left end."""
         if imgui.internal.temp_input_is_active(imgui.get_item_id()) or low == high:
             return
         start, end = imgui.get_item_rect_min(), imgui.get_item_rect_max()

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.evaluation import JointMotion
 
 __all__ = [
     "no_job_room",
@@ -25,7 +24,11 @@ __all__ = [
 
 def no_motion(state: AppState) -> str:
     """Return why the time cannot be changed."""
-    return "" if state.clock.has_motion else "no motion: open a clip, a capture or a BVH"
+    if state.clock.has_motion:
+        return ""
+    if any(actor.figure.animations for actor in state.scene.actors):
+        return "no animation plays: choose one in the Timeline"
+    return "no motion: open a clip, a capture or a BVH"
 
 
 def no_panel(state: AppState, needs: str) -> str:
@@ -38,6 +41,8 @@ def no_panel(state: AppState, needs: str) -> str:
     needs : str
         Entry of the table of panels.
     """
+    if needs == "motion" and any(actor.figure.animations for actor in state.scene.actors):
+        return ""
     if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
         return no_motion(state)
     if needs == "parts":
@@ -65,7 +70,7 @@ def no_new_clip(state: AppState) -> str:
 
 def nothing_to_export(state: AppState) -> str:
     """Return why no motion can be written."""
-    if any(isinstance(actor.clip, Clip | SampledClip) for actor in state.scene.actors):
+    if any(isinstance(actor.clip, JointMotion) for actor in state.scene.actors):
         return ""
     if state.clock.has_motion:
         return "only captured points move; there are no joints to export"

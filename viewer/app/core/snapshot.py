@@ -35,6 +35,7 @@ class Look:
     color: tuple[float, float, float] | None
     placement: bytes
     hidden_parts: frozenset[int]
+    animation: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +82,9 @@ def restored_pose(key: PoseKey | None) -> Pose | None:
 def look_of(actor: Actor) -> Look:
     """Return an actor's motion and display settings."""
     placement = actor.placement.tobytes()
-    hidden = actor.hidden_parts
-    return Look(actor.clip, actor.offset, actor.visible, actor.color, placement, hidden)
+    hidden, number = actor.hidden_parts, actor.animation
+    look = actor.clip, actor.offset, actor.visible, actor.color, placement, hidden, number
+    return Look(*look)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
@@ -94,6 +96,7 @@ def _looks(actor: Actor, look: Look) -> bool:
         and actor.offset == look.offset
         and actor.color == look.color
         and actor.hidden_parts == look.hidden_parts
+        and actor.animation == look.animation
         and actor.placement.tobytes() == look.placement
     )
 
@@ -133,7 +136,7 @@ def restore_motion(snapshot: Snapshot, scene: Scene) -> None:
     scene.actors[:] = snapshot.actors
     for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
         actor.pose = restored_pose(pose)
-        actor.clip, actor.offset = look.clip, look.offset
+        actor.clip, actor.offset, actor.animation = look.clip, look.offset, look.animation
 
 
 def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:

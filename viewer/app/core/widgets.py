@@ -6,6 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 
 from imgui_bundle import imgui
 
@@ -27,6 +28,7 @@ __all__ = [
     "explain",
     "menu_item",
     "note_item",
+    "offer_files",
     "overlay_rect",
     "plain_zero",
     "same_line_if_room",
@@ -41,19 +43,35 @@ Rect = tuple[float, float, float, float]
 
 
 def note_item(state: AppState, label: str) -> None:
-    """Record the rectangle of the last widget under a label, for tests."""
+    """Record the rectangle of the last widget under a label, for tests.
+
+    In a disabled block, its tooltip is the reason.
+    """
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     state.item_rects[label] = (low.x, low.y, high.x, high.y)
+    reasons = state.of(_Disabled).reasons
+    if reasons:
+        explain("", reasons[-1])
+
+
+@dataclass(slots=True)
+class _Disabled:
+    """Reasons of the enclosing blocks that are disabled."""
+
+    reasons: list[str] = field(default_factory=list)
 
 
 @contextlib.contextmanager
-def disabled(why: str) -> Iterator[None]:
-    """Disable the widgets of a block if there is a reason, which ``explain`` shows."""
+def disabled(state: AppState, why: str) -> Iterator[None]:
+    """Disable the widgets of a block if there is a reason, which their tooltips show."""
+    reasons = state.of(_Disabled).reasons
+    reasons += [why] if why else []
     imgui.begin_disabled(bool(why))
     try:
         yield
     finally:
         imgui.end_disabled()
+        del reasons[len(reasons) - bool(why) :]
 
 
 def explain(text: str, why: str = "") -> None:
@@ -66,6 +84,10 @@ def explain(text: str, why: str = "") -> None:
     why : str
         Reason why it is disabled; empty if it is enabled.
     """
+    is_disabled = imgui.get_current_context().last_item_data.item_flags & imgui.ItemFlags_.disabled
+    if is_disabled and not why:
+        # The reason of the enclosing block is shown already.
+        return
     flags = imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled
     tooltip = "\n".join(filter(None, (text, why)))
     if tooltip and imgui.is_item_hovered(flags):
@@ -171,7 +193,7 @@ def count_slider(
 
 def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
     """Draw a check box and return its state; disabled if there is a reason."""
-    with disabled(why):
+    with disabled(state, why):
         result = imgui.checkbox(label, value)[1]
         note_item(state, label)
         explain("", why)
@@ -180,11 +202,18 @@ def checkbox(state: AppState, label: str, value: bool, why: str = "") -> bool:
 
 def button(state: AppState, label: str, why: str = "") -> bool:
     """Draw a button and return whether it was pressed; disabled if there is a reason."""
-    with disabled(why):
+    with disabled(state, why):
         pressed = imgui.button(label)
         note_item(state, label)
         explain("", why)
     return pressed and not why
+
+
+def offer_files(state: AppState, text: str) -> None:
+    """Draw why a panel is empty, and a button that opens files to fill it."""
+    imgui.text_wrapped(text)
+    if button(state, "Open files…"):
+        state.wants.add("open dialog")
 
 
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:

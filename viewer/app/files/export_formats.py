@@ -1,29 +1,97 @@
-"""Choice of the format of an exported pose, and the data that each format keeps."""
+"""List of the formats of an export, and the data that each keeps and omits."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+from imgui_bundle import imgui
+
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import choice
+from viewer.app.core.widgets import disabled, explain, note_item
 from viewer.app.files.file_choice import FileDialog
-from viewer.export import EXPORTERS
+from viewer.export import EXPORTERS, Exporter
 
-__all__ = ["draw_formats"]
+__all__ = ["FOLDER", "N_ROWS", "draw_formats", "draw_pose_formats", "pose_formats"]
+
+FOLDER = "/"
+"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
+
+N_ROWS = 6.5
+"""Height of the list in lines: half a line shows that the list continues."""
+
+_COLUMNS = (("Format", 0.3), ("Keeps", 0.4), ("Omits", 0.3))
 
 
-def draw_formats(state: AppState, dialog: FileDialog) -> None:
-    """Draw the list of formats; a choice changes the suffix of the name."""
-    kinds = {
-        suffix: f"{suffix}  {kind.title}"
-        for kind in EXPORTERS.values()
-        if kind.writes_pose
-        for suffix in kind.suffixes
-    }
+def pose_formats() -> dict[str, Exporter]:
+    """Return the exporters of poses by suffix."""
+    kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
+    return {suffix: kind for kind in kinds for suffix in kind.suffixes}
+
+
+def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
+    """Draw the list of formats of poses."""
+    draw_formats(state, dialog, pose_formats(), {})
+
+
+def draw_formats(
+    state: AppState,
+    dialog: FileDialog,
+    formats: Mapping[str, Exporter],
+    missing: Mapping[str, str],
+) -> None:
+    """Draw a list of formats; a choice changes the suffix of the name.
+
+    Parameters
+    ----------
+    state : AppState
+        Records where the rows are drawn.
+    dialog : FileDialog
+        Dialog whose name is changed.
+    formats : mapping
+        Exporters by suffix; ``FOLDER`` for a folder.
+    missing : mapping
+        Why formats cannot be written, by suffix.
+    """
+    typed = Path(dialog.name.strip()).suffix.lower()
+    now = typed if typed in formats else dialog.suffix or FOLDER
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_outer
+    height = N_ROWS * imgui.get_text_line_height_with_spacing()
+    if not imgui.begin_table("##formats", len(_COLUMNS), flags, (0.0, height)):
+        return
+    imgui.table_setup_scroll_freeze(0, 1)
+    for title, part in _COLUMNS:
+        imgui.table_setup_column(title, imgui.TableColumnFlags_.width_stretch, part)
+    imgui.table_headers_row()
+    for suffix, kind in formats.items():
+        why = missing.get(suffix, "")
+        if _draw_row(state, suffix, kind, suffix == now, why) and not why:
+            _choose(dialog, suffix, typed if typed in formats else "")
+    imgui.end_table()
+    note_item(state, "formats")
+
+
+def _draw_row(state: AppState, suffix: str, kind: Exporter, is_chosen: bool, why: str) -> bool:
+    """Draw the row of a format; return whether it was chosen."""
+    imgui.table_next_row()
+    imgui.table_next_column()
+    flags = imgui.SelectableFlags_.span_all_columns | imgui.SelectableFlags_.no_auto_close_popups
+    shown = "folder" if suffix == FOLDER else suffix
+    name = kind.title.partition(":")[0]
+    with disabled(state, why):
+        pressed = imgui.selectable(f"{shown}  {name}###format {suffix}", is_chosen, flags)[0]
+        note_item(state, f"format {suffix}")
+        explain(f"{kind.title}\nkeeps: {kind.keeps}\nomits: {kind.omits}", why)
+        if is_chosen and imgui.is_window_appearing():
+            imgui.set_scroll_here_y(0.5)
+        for text in (kind.keeps, kind.omits):
+            imgui.table_next_column()
+            imgui.text_unformatted(text)
+    return pressed
+
+
+def _choose(dialog: FileDialog, suffix: str, old: str) -> None:
+    """Replace the suffix of the name by that of a format."""
     name = dialog.name.strip()
-    typed = Path(name).suffix.lower()
-    now = typed if typed in kinds else dialog.suffix
-    chosen = choice(state, "Format##export", now, kinds)
-    if chosen != now:
-        stem = name[: -len(typed)] if typed in kinds else name
-        dialog.suffix, dialog.name = chosen, stem + chosen
+    dialog.suffix = "" if suffix == FOLDER else suffix
+    dialog.name = name[: len(name) - len(old)] + dialog.suffix

@@ -36,6 +36,8 @@ class FileDialog:
         Suggested name of the file to write; its suffix is added to names without a suffix.
     more : callable, optional
         Draws additional options, given the state and the dialog.
+    more_rows : float
+        Height of these options in lines of text.
     written : callable, optional
         Returns all files that are written for a name; if omitted, only the named file is written.
     """
@@ -49,9 +51,10 @@ class FileDialog:
         suffixes: tuple[str, ...] = (),
         name: str = "",
         more: Callable[[AppState, FileDialog], None] | None = None,
+        more_rows: float = 0.0,
         written: Callable[[Path], list[Path]] | None = None,
     ) -> None:
-        self.more, self.written = more, written
+        self.more, self.more_rows, self.written = more, more_rows, written
         self.done, self.purpose, self.title, self.name = done, purpose, title, name
         self.suffixes = set(suffixes or opened_suffixes())
         self.suffix, self.suggested = Path(name).suffix, name

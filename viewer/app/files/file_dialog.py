@@ -20,7 +20,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_file_dialog"]
 
-_SIZE = (44.0, 32.0)  # in font sizes
+_SIZE = (46.0, 33.0)  # in font sizes
 _HINTS = {
     "open": "Ctrl+click selects several: a .skel and its .skin",
     "folder": "",
@@ -139,5 +139,8 @@ def _confirmed(dialog: FileDialog) -> list[Path]:
 
 def _foot_height(dialog: FileDialog) -> float:
     """Return the height of the widgets below the list."""
-    more = 0.0 if dialog.more is None else imgui.get_frame_height_with_spacing()
-    return 1.5 * imgui.get_frame_height() + more
+    return (
+        1.5 * imgui.get_frame_height()
+        + dialog.more_rows * imgui.get_text_line_height_with_spacing()
+        + imgui.get_style().item_spacing.y
+    )

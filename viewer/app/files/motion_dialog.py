@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-
-from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import choice, explain
+from viewer.app.files.export_formats import N_ROWS, draw_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.motion_export import (
-    FOLDER,
     motion_files,
+    motion_formats,
     motion_suffixes,
     moving_actors,
     save_motion,
+    unsuited_formats,
 )
 from viewer.app.files.state import Files
-from viewer.export import EXPORTERS
 from viewer.formats import file_stem
 from viewer.phrases import printable
+from viewer.rig.scene import Actor
 
 __all__ = ["ask_for_motion"]
 
@@ -35,8 +34,9 @@ class _Selection:
 def ask_for_motion(state: AppState) -> None:
     """Open the dialog; all actors are preselected if there are several."""
     moving = moving_actors(state)
-    selection = _Selection(len(moving) > 1 or state.actor not in moving)
-    first = moving[0] if selection.everyone else state.actor
+    asks = len(moving) > 1 or state.actor not in moving
+    selection = _Selection(asks)
+    first = _first(state, selection)
     # The number of each person is appended to the name if there are several files.
     stem = file_stem(first.title if len(moving) > 1 else first.name)
     suffixes = motion_suffixes()
@@ -48,8 +48,14 @@ def ask_for_motion(state: AppState) -> None:
         suffixes,
         f"{stem}{suffixes[0]}",
         more=lambda state, dialog: _draw_more(state, dialog, selection),
+        more_rows=N_ROWS + (1.5 if asks else 0.0),
         written=lambda path: motion_files(state, path, selection.everyone),
     )
+
+
+def _first(state: AppState, selection: _Selection) -> Actor:
+    """Return the first actor whose motion is exported."""
+    return moving_actors(state)[0] if selection.everyone else state.actor
 
 
 def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> None:
@@ -64,22 +70,5 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
             == "all"
         )
         explain("" if dialog.suffix == "" else "one file per actor, numbered by actor")
-        imgui.same_line()
-    kinds = {suffix: _title(suffix) for suffix in motion_suffixes()}
-    kinds[FOLDER] = _title(FOLDER)
-    typed = Path(dialog.name.strip()).suffix.lower()
-    now = typed if typed in kinds else dialog.suffix or FOLDER
-    kind = choice(state, "Format", now, kinds, 16.0)
-    if kind != now:
-        stem = dialog.name.strip()[: -len(typed)] if typed in kinds else dialog.name.strip()
-        dialog.suffix = "" if kind == FOLDER else kind
-        dialog.name = stem + dialog.suffix
-
-
-def _title(suffix: str) -> str:
-    """Return a suffix's description, from its exporters."""
-    titles = [
-        kind.title for kind in EXPORTERS.values() if kind.writes_motion and suffix in kind.suffixes
-    ]
-    start = "folder  " if suffix == FOLDER else f"{suffix}  "
-    return start + " or ".join(title.partition(":")[0] for title in titles)
+    actor = _first(state, selection)
+    draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))

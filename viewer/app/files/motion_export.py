@@ -8,10 +8,12 @@ from pathlib import Path
 
 from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
+from viewer.app.files.export_formats import FOLDER
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
     EXPORTERS,
+    Exporter,
     MotionOptions,
     animation_for,
     export_animation,
@@ -22,21 +24,28 @@ from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
+from viewer.rig.smpl_family import member_of
 
 _MANY = (".obj",)  # one file per frame: only exported by the command line
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
-__all__ = ["FOLDER", "motion_files", "motion_suffixes", "moving_actors", "save_motion"]
-
-FOLDER = "/"
-"""Placeholder, among suffixes, for a folder that contains all people of a capture."""
+__all__ = [
+    "motion_files",
+    "motion_formats",
+    "motion_suffixes",
+    "moving_actors",
+    "save_motion",
+    "unsuited_formats",
+]
 
 
 def moving_actors(state: AppState) -> list[Actor]:
     """Return the actors whose joints are moved by a motion."""
-    return [a for a in state.scene.actors if isinstance(a.clip, Clip | SampledClip)]
+    return [a for a in state.scene.actors if isinstance(a.clip, JointMotion)]
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -45,6 +54,22 @@ def motion_suffixes() -> tuple[str, ...]:
     found = dict.fromkeys(suffix for kind in kinds for suffix in kind.suffixes)
     others = (suffix for suffix in found if suffix.startswith(".") and suffix not in _MANY)
     return (".bvh", *(suffix for suffix in others if suffix != ".bvh"))
+
+
+def motion_formats(actor: Actor) -> dict[str, Exporter]:
+    """Return the exporters of motions by suffix; of several the one that suits the actor."""
+    found = {
+        suffix: EXPORTERS[suited_exporter(f"motion{suffix}", actor.figure)]
+        for suffix in motion_suffixes()
+    }
+    return {**found, FOLDER: EXPORTERS["easymocap"]}
+
+
+def unsuited_formats(actor: Actor) -> dict[str, str]:
+    """Return why formats cannot hold the motion of an actor, by suffix."""
+    skeleton = actor.figure.skeleton
+    is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
+    return {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
@@ -136,7 +161,8 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # Edits made during the export must not change what is written.
         copied = actor.copy()
-        rate = state.clock.frame_rate if isinstance(actor.clip, Clip) else None
+        is_keyed = isinstance(actor.clip, Clip | TransformClip)
+        rate = state.clock.frame_rate if is_keyed else None
         parts.append(_Part(copied, file, frames, rate, number))
     if not parts:
         raise RigError("all actors are absent in the playback range: nothing to export")

@@ -12,13 +12,15 @@ from viewer.app.core.key_names import key_name
 from viewer.app.core.reasons import no_panel, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.features import ACTIONS, KEYS, PANELS
+from viewer.app.playback.animations import choose_animation
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.shown_panels import is_open, set_open
 from viewer.app.view.display_actions import set_shading, show, show_bones
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN
-from viewer.rig.skeleton import joint_labels
+from viewer.rig.motion.animation_choice import animation_labels
+from viewer.rig.skeleton import joint_labels, shown_joints
 from viewer.rig.skinning import METHODS
 
 __all__ = ["Entry", "entries"]
@@ -54,7 +56,8 @@ class Entry:
 
 def entries(state: AppState) -> list[Entry]:
     """Return all entries for the current scene."""
-    return [*_actions(state), *_panels(state), *_choices(state), *_joints(state), *_figures(state)]
+    kinds = (_actions, _panels, _choices, _animations, _joints, _figures)
+    return [entry for kind in kinds for entry in kind(state)]
 
 
 def _actions(state: AppState) -> Iterator[Entry]:
@@ -108,11 +111,24 @@ def _skin(state: AppState, name: str) -> None:
     state.say_status(METHODS[name].title)
 
 
+def _animations(state: AppState) -> Iterator[Entry]:
+    """Yield the animations of the chosen actor."""
+    labels = animation_labels(state.actor.figure)
+    for index, label in enumerate(labels):
+        text = f"Play animation: {printable(label, _LONGEST)}"
+        yield Entry(text, "animation", partial(choose_animation, index=index))
+    if labels:
+        yield Entry("Play no animation", "animation", partial(choose_animation, index=-1))
+
+
 def _joints(state: AppState) -> Iterator[Entry]:
     """Yield the joints of the chosen actor."""
     skeleton = state.actor.figure.skeleton
-    for joint, label in enumerate(joint_labels(skeleton) if skeleton is not None else ()):
-        yield Entry(printable(label, _LONGEST), "joint", partial(select_joint, joint=joint))
+    if skeleton is None:
+        return
+    labels = joint_labels(skeleton)
+    for joint in shown_joints(skeleton).tolist():
+        yield Entry(printable(labels[joint], _LONGEST), "joint", partial(select_joint, joint=joint))
 
 
 def _figures(state: AppState) -> Iterator[Entry]:

@@ -6,6 +6,7 @@ from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Motion
 
 __all__ = ["no_gaps"]
@@ -23,6 +24,6 @@ def no_gaps(state: AppState) -> str:
 
 
 def _has_gaps(clip: Motion) -> bool:
-    if isinstance(clip, Clip):
+    if isinstance(clip, Clip | TransformClip):
         return False
     return _gaps.get(clip, None, lambda: not clip.timing.holds or not clip.timing.present.all())

@@ -17,10 +17,12 @@ from viewer.app.core.widgets import (
     disabled,
     explain,
     note_item,
+    offer_files,
     same_line_if_room,
     slider,
 )
 from viewer.app.playback.actions import go_to_end, play, step
+from viewer.app.playback.animations import animation_texts, choose_animation, played
 from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
 from viewer.app.playback.gaps import no_gaps
 from viewer.app.playback.tracks import draw_tracks
@@ -28,14 +30,19 @@ from viewer.rig.number_text import number_text
 
 __all__ = ["draw"]
 
+_WIDEST_LIST = 16.0  # font sizes
 _CLAMP = imgui.SliderFlags_.always_clamp
 
 
 def draw(state: AppState) -> None:
     """Draw the panel."""
+    if state.actor.figure.animations:
+        _draw_animation(state)
     if not state.clock.has_motion:
-        imgui.text_disabled(no_motion(state))
+        offer_files(state, f"There is {no_motion(state)}.")
         return
+    if state.actor.figure.animations:
+        same_line_if_room("M" * 12)
     _draw_transport(state)
     same_line_if_room("000000")
     _draw_place(state)
@@ -43,6 +50,15 @@ def draw(state: AppState) -> None:
     _draw_rate(state)
     _draw_settings(state)
     draw_tracks(state)
+
+
+def _draw_animation(state: AppState) -> None:
+    """Draw the list of the chosen actor's animations."""
+    texts = {str(index): text for index, text in animation_texts(state.actor).items()}
+    width = min(max(map(len, texts.values())) * 0.6 + 2.0, _WIDEST_LIST)
+    new = choice(state, "Animation", str(played(state.actor)), texts, width)
+    explain("motion of this file, played by all of its figures ([ and ])")
+    choose_animation(state, int(new))
 
 
 def _draw_transport(state: AppState) -> None:
@@ -89,7 +105,7 @@ def _draw_place(state: AppState) -> None:
 def _draw_rate(state: AppState) -> None:
     """Draw the field of the frame rate."""
     foreign = foreign_rate(state)
-    with disabled(foreign):
+    with disabled(state, foreign):
         typed = number_field(state, begin_field("Frames per second##rate", 4.0), rate_of(state))
         note_item(state, "Frame rate")
         explain("play the same frames faster or slower", foreign)

@@ -13,9 +13,10 @@ from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
 from viewer.phrases import printable
-from viewer.rendering.srgb import encode_color
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Motion
+from viewer.rig.srgb import encode_color
 
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
@@ -150,7 +151,7 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     list of (float, float)
         Start and end times in the clip's own time, seconds.
     """
-    if isinstance(clip, Clip):
+    if isinstance(clip, Clip | TransformClip):
         return [(clip.start, clip.end)]
     timing = clip.timing
     edges = np.flatnonzero(np.diff(np.concatenate([[False], timing.present, [False]])))

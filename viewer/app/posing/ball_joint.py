@@ -14,13 +14,22 @@ from viewer.app.posing.state import HeldVector, Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, rotation_vector_to_matrix
+from viewer.rig.memo import Memo
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose, joint_rotations
-from viewer.rig.posing.pose_vector import own_numbers, rotation_rows, set_joint_rotations
+from viewer.rig.posing.pose_vector import (
+    PoseLayout,
+    own_numbers,
+    rotation_rows,
+    set_joint_rotations,
+)
+from viewer.rig.skeleton import Skeleton
 
 __all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
 
-_SAME = 1e-9  # tolerance within which rotations are considered equal
+_SAME = 1e-9  # tolerance within which rotations are equal
+_rotations: Memo[Skeleton, Floats] = Memo()
+_numbers: Memo[Skeleton, Floats] = Memo()
 
 
 def is_ball(figure: Figure, joint: int) -> bool:
@@ -70,7 +79,7 @@ def _shown_vector(state: AppState, figure: Figure, pose: Pose, joint: int) -> Fl
     """Return a joint's rotation vector: the edited vector as long as it matches the rotation."""
     posing = state.of(Posing)
     assert figure.skeleton is not None  # checked by the caller
-    rotation = joint_rotations(figure.skeleton, pose)[joint]
+    rotation = _rotations_of(figure.skeleton, pose)[joint]
     held = posing.held_vector
     if held is not None and (held.joint, held.n_choices) == (joint, state.n_choices):
         if np.abs(held.rotation - rotation).max() < _SAME:
@@ -84,7 +93,7 @@ def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) ->
     layout, skeleton = figure.pose_layout, figure.skeleton
     if layout is None or skeleton is None:
         return
-    numbers = own_numbers(layout, joint_rotations(skeleton, pose))[joint]
+    numbers = _numbers_of(layout, skeleton, pose)[joint]
     kind = "angles z y x" if layout.is_euler[joint] else "vector"
     imgui.text_disabled(
         f"file: {'  '.join(number_text(number, '.4f') for number in numbers.tolist())}"
@@ -93,3 +102,14 @@ def draw_own_numbers(state: AppState, figure: Figure, pose: Pose, joint: int) ->
     if imgui.is_item_hovered():
         start = int(layout.starts[joint])
         show_tooltip(f"numbers {start} to {start + 2} of the file's pose vector: {kind}, radians")
+
+
+def _rotations_of(skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return the rotations of all joints, (J, 3, 3), computed once for all rows of the panel."""
+    return _rotations.get(skeleton, pose.skinning_key, lambda: joint_rotations(skeleton, pose))
+
+
+def _numbers_of(layout: PoseLayout, skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return the numbers of all joints, (J, 3), computed once for all rows of the panel."""
+    key = (layout, pose.skinning_key)
+    return _numbers.get(skeleton, key, lambda: own_numbers(layout, _rotations_of(skeleton, pose)))

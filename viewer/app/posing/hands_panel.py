@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import button, note_item, plain_zero, same_line_if_room
+from viewer.app.core.widgets import button, note_item, offer_files, plain_zero, same_line_if_room
 from viewer.app.posing.state import Posing
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -31,7 +31,7 @@ def draw(state: AppState) -> None:
     posing = state.of(Posing)
     figure, pose = state.actor.figure, state.actor.pose
     if not figure.hands or pose is None:
-        imgui.text_wrapped("This figure has no hand components.")
+        offer_files(state, "This figure has no hand components: open a body model with hands.")
         return
     most = min(len(hand.components) for hand in figure.hands)
     changed, count = slider_int(

@@ -1,8 +1,8 @@
 """Arcs of rotation limits, about the current axes of a joint.
 
 An arc covers the directions that the bone can reach: it starts at the bone's current direction
-perpendicular to the axis, and its ends are the limits. A bone that lies along the axis, as
-in a twist, is replaced by an axis of the joint that rotates with it.
+perpendicular to the axis, and its ends are the limits. If the bone lies along the axis, as for a
+twist, one of the joint's own axes is used instead.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from viewer.rig.posing.joint_rotation import rotation_dofs
 
 __all__ = ["LimitArc", "arc_points", "limit_arcs"]
 
-_ALONG = 0.35  # sine of the angle between bone and axis below which the bone shows no rotation
+_ALONG = 0.35  # sine of the angle between bone and axis below which the rotation is not visible
 _STEP = math.radians(4.0)
 _WHOLE = 2.0 * math.pi
 _ROUNDING = 1e-6  # tolerance within which a value is at a limit, radians
@@ -42,7 +42,7 @@ class LimitArc:
     low, high : float
         Limits relative to the current value, radians about the axis; low <= 0 <= high.
     is_limited : bool
-        Whether the value is at one of them.
+        Whether the value is at a limit.
     """
 
     dof: int
@@ -62,7 +62,7 @@ def limit_arcs(joint: PosedJoint, pose: Pose) -> list[LimitArc]:
     joint : PosedJoint
         The joint in the scene.
     pose : Pose
-        Pose of its actor.
+        Pose of the actor.
     """
     skeleton, found = joint.skeleton, []
     axes = rotation_axes(skeleton, pose, joint.joint)
@@ -115,7 +115,7 @@ def arc_points(arc: LimitArc, center: Floats, radius: float) -> Floats:
     Parameters
     ----------
     arc : LimitArc
-        Arc to draw; more than 2 pi is drawn as 2 pi.
+        Arc to draw, limited to 2 pi.
     center : (3,)
         Position of the joint.
     radius : float

@@ -39,7 +39,7 @@ LENGTH = 72.0
 
 _REACH = 7.0  # window coordinates around an arrow within which it is grabbed
 _SHORTEST = 12.0  # window coordinates: a shorter arrow points almost at the eye
-_BARE = 14.0  # window coordinates at an arrow's base that belong to the handle at the joint
+_BARE = 14.0  # window coordinates at an arrow's base that belong to the joint's handle
 _ITERATIONS = 40  # iterations of the solver: bounds the time per frame
 _MET = 1e-3  # smallest remaining distance that is shown, relative to the figure's size
 
@@ -66,7 +66,7 @@ def longest_chain(skeleton: Skeleton, joint: int) -> int:
 
 
 def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
-    """Return the joints that rotate when one is dragged, the nearest first: (N,) int32.
+    """Return the joints that rotate when a joint is dragged, the nearest first: (N,) int32.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     joint : int
         Index of the dragged joint.
     asked : int
-        Maximum number. With 0 it is two, and a root, which would rotate the whole figure, is
-        included only if nothing else can rotate.
+        Maximum number; 0 means two, with a root, which would rotate the whole figure, only if
+        nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)
     if not asked and len(chain) > 1:
@@ -120,7 +120,7 @@ def arrows(joint: PosedJoint, orientation: str) -> list[Arrow]:
 def grab_arrow(
     found: list[Arrow], center: Floats, frame: ViewFrame, place: Place, reach: float = _REACH
 ) -> Arrow | None:
-    """Return the arrow under the pointer, None if there is none.
+    """Return the arrow under the pointer, or None.
 
     Parameters
     ----------
@@ -240,9 +240,9 @@ class MoveHandle:
         return Outcome(pose, _shift_text(joint_label(skeleton, self.joint), done), limited)
 
     def _shift_figure(self, way: Floats) -> Outcome:
-        """Move the whole figure: its translation applies before its placement in the scene."""
+        """Move the whole figure by its translation, which precedes its placement in the scene."""
         pose = self.start.copy()
-        # Without the figure's own scale, this is the placement of the actor.
+        # This is the placement of the actor, without the figure's own scale.
         linear = self.posed.placement[:3, :3] / self.start.figure_scale
         pose.figure_translation = pose.figure_translation + np.linalg.solve(linear, way)
         return Outcome(pose, _shift_text("figure", way))

@@ -66,8 +66,8 @@ def copy_numbers(state: AppState) -> None:
 def paste_pose(state: AppState) -> None:
     """Pose the chosen actor from the clipboard: JSON, or the model's raw pose vector.
 
-    A pose copied from a figure with different DOFs is transferred joint by joint: JSON contains
-    their rotations.
+    A pose copied from a figure with different DOFs is transferred joint by joint: JSON contains the
+    joint rotations.
     """
     from viewer.formats import pose
 
@@ -102,7 +102,7 @@ def save_pose(state: AppState, path: Path) -> None:
 
 
 def save_export(state: AppState, path: Path) -> None:
-    """Write the chosen actor as it is posed, for other programs."""
+    """Write the chosen actor in its current pose, for other programs."""
     try:
         files = files_written(path)
     except ViewerError as problem:
@@ -133,7 +133,7 @@ def reset_pose(state: AppState) -> None:
 
 
 def reset_actor(state: AppState) -> None:
-    """Reset the chosen actor to the file's pose, morph targets included; its shape stays."""
+    """Reset the chosen actor to the file's pose, morph targets included; its shape is kept."""
     if _reset(state.actor):
         pause_for_edit(state)
 

@@ -46,7 +46,7 @@ class PosedJoint:
 
     @property
     def parent_linear(self) -> Floats:
-        """The parent's axes in the scene with their lengths: (3, 3); a root's are the figure's."""
+        """The parent's axes in the scene with their lengths: (3, 3); for a root, the figure's."""
         parent = int(self.skeleton.parents[self.joint])
         return np.asarray((self.placement if parent < 0 else self.world[parent])[:3, :3])
 
@@ -58,7 +58,7 @@ class PosedJoint:
     def rotation_axis(self, axis: Floats) -> Floats:
         """Return the axis of a rotation in the scene: cof(A) axis, with the parent's axes A.
 
-        Cofactors transform rotation axes correctly through reflected and stretched frames too.
+        Cofactors transform rotation axes correctly even through reflected and stretched frames.
 
         Parameters
         ----------
@@ -102,12 +102,12 @@ def _axes(linear: Floats) -> Floats:
 
 
 def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoint | None:
-    """Return a joint of an actor, None if it has no such joint.
+    """Return a joint of an actor, or None if it has no such joint.
 
     Parameters
     ----------
     actor : Actor
-        Actor, placed and posed.
+        A placed and posed actor.
     joint : int
         Index of the joint; -1 for none.
     pose : Pose, optional

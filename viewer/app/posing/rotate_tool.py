@@ -58,7 +58,7 @@ class Ring:
     size : float
         Radius, window coordinates.
     dof : int
-        DOF that it changes, -1 for the whole joint.
+        DOF that it changes; -1 for the whole joint.
     """
 
     axis: Floats
@@ -165,7 +165,7 @@ def grab_ring(
 
 
 def _distances(line: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Return a point's distances from the segments of a line, and the parameters: (N,) both."""
+    """Return a point's distances from the segments of a polyline, and the parameters: both (N,)."""
     starts, steps = line[:-1], np.diff(line, axis=0)
     lengths = np.maximum(np.einsum("na,na->n", steps, steps), 1e-12)
     fractions = np.clip(np.einsum("na,na->n", place - starts, steps) / lengths, 0.0, 1.0)
@@ -188,7 +188,7 @@ class RotateHandle:
     place : (float, float)
         Position of the pointer at the start of the drag.
     in_degrees : bool
-        Whether text gives angles in degrees instead of radians.
+        Whether angles are shown in degrees instead of radians.
     """
 
     def __init__(
@@ -218,7 +218,7 @@ class RotateHandle:
         return self._whole(turn)
 
     def _turned(self, frame: ViewFrame, place: Place) -> float | None:
-        """Return the angle from the grabbed point to the pointer, None if there is none."""
+        """Return the angle from the grabbed point to the pointer, or None."""
         if self.ring.color == 3:
             return self._on_screen(frame, place)
         axis, eye = self.ring.axis, toward_eye(frame, self.center)
@@ -251,7 +251,7 @@ class RotateHandle:
         return math.atan2(float(axis @ np.cross(self.held, away)), float(self.held @ away))
 
     def _along_edge(self, frame: ViewFrame, place: Place) -> float:
-        """Return the angle of a ring seen edge-on, which the pointer rolls like a wheel."""
+        """Return the angle of a ring seen edge-on, which is rolled like a wheel."""
         eye = toward_eye(frame, self.center)
         radius = self.ring.size * frame.unit_length(self.center)
         rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # movement of its front by 1 mrad

@@ -1,4 +1,4 @@
-"""Reset of shapes whose blend shape offsets are unreadable, before panels use them."""
+"""Reset of shapes whose blend shape offsets cannot be read, before panels use them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["drop_unreadable_shapes"]
 
 
 def drop_unreadable_shapes(state: AppState) -> None:
-    """Set all shapes to 0 if blend shape offsets, which are read on first use, are unreadable."""
+    """Set all shapes to 0 if blend shape offsets, which are read on first use, cannot be read."""
     try:
         for actor in state.scene.actors:
             if actor.pose is not None:

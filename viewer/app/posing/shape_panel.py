@@ -13,6 +13,7 @@ from viewer.app.core.widgets import (
     button,
     checkbox,
     note_item,
+    offer_files,
     plain_zero,
     same_line_if_room,
     show_tooltip,
@@ -30,7 +31,7 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
-_LABELS = 0.55  # largest width of the names, relative to that of the panel
+_LABELS = 0.55  # maximum width of the names, relative to the width of the panel
 _HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
@@ -39,7 +40,7 @@ def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor."""
     figure, pose = state.actor.figure, state.actor.pose
     if figure.blend_shapes is None or pose is None:
-        imgui.text_wrapped("This figure has no blend shapes.")
+        offer_files(state, "This figure has no blend shapes: open a body model or a .morph file.")
         return
     _draw_measures(figure, pose)
     varies = "shape" in figure.blend_shapes.groups
@@ -95,7 +96,7 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     if len(pose.shape_weights) < shapes.n_shapes:
         padding = np.zeros(shapes.n_shapes - len(pose.shape_weights))
         pose.shape_weights = np.concatenate([pose.shape_weights, padding])
-    # A heading is a row like the others, so that hundreds of rows can be clipped.
+    # A heading is a row like the others, so that long lists can be clipped.
     rows: list[int | str] = []
     for index, group in enumerate(shapes.groups):
         if index == 0 or shapes.groups[index - 1] != group:
@@ -133,14 +134,14 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
     if not is_morph:
         _draw_marks()
     if imgui.is_item_hovered():
-        unit = "at 1 the full morph" if is_morph else "standard deviations"
+        unit = "1 is the full morph target" if is_morph else "standard deviations"
         show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             pose.shape_weights[index] = 0.0
 
 
 def _draw_marks() -> None:
-    """Mark integer standard deviations under the slider drawn last, the mean more strongly."""
+    """Mark integer standard deviations under the last slider, with a stronger mark at the mean."""
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     width = high.x - low.x
     grab = imgui.get_style().grab_min_size * 0.5

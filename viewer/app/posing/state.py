@@ -28,7 +28,7 @@ ORIENTATIONS = {
     "parent": "Parent axes",
     "world": "World axes",
 }
-"""Orientations of rings and arrows, for joints free to rotate about or move along all axes."""
+"""Orientations of rings and arrows, for joints that can rotate about or move along all axes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,12 +91,12 @@ class Drag:
     outcome : Outcome
         Latest result.
     asked : tuple
-        Key of the pointer's position, the modifier and the camera for that result, which is
-        computed again only if the key changes.
+        Key of the pointer's position, the modifier and the camera for which the result was
+        computed.
     has_moved : bool
-        Whether the pointer has moved: a click on a handle changes nothing.
+        Whether the pointer has moved; a click on a handle changes nothing.
     is_over : bool
-        Whether it was cancelled and only waits for the release of the button.
+        Whether the drag was cancelled and only waits for the release of the button.
     """
 
     actor: Actor
@@ -111,12 +111,13 @@ class Drag:
 class HeldVector:
     """A joint's rotation vector as edited, which may be longer than pi.
 
-    Beyond pi a shorter vector gives the same rotation, so the rotation does not determine it.
+    Beyond pi, a shorter vector gives the same rotation, so the rotation does not determine the
+    vector.
 
     Attributes
     ----------
     joint : int
-        Joint of the actor that was chosen.
+        Joint of the actor that was chosen at that time.
     vector : (3,)
         The vector as edited.
     rotation : (3, 3)
@@ -142,8 +143,8 @@ class Posing:
     orientation : str
         A key of ``ORIENTATIONS``.
     chain_length : int
-        Number of joints above a dragged joint that may rotate; 0 for the default, two without the
-        root.
+        Number of joints above a dragged joint that may rotate; 0 for the default of two, excluding
+        the root.
     drag : Drag or None
         The handle that is held.
     has_missed : bool

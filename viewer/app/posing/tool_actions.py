@@ -10,6 +10,7 @@ from viewer.app.posing.move_tool import longest_chain, shifts, used_chain
 from viewer.app.posing.posed_joint import PosedJoint, posed_joint
 from viewer.app.posing.state import ORIENTATIONS, TOOLS, Posing
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.posing.joint_rotation import rotates_freely, rotation_dofs
 from viewer.rig.skeleton import joint_label
 
@@ -29,7 +30,7 @@ __all__ = [
 
 
 def choose_tool(state: AppState, tool: str) -> None:
-    """Choose a tool, a key of ``TOOLS``, and show its hint, or why it is disabled."""
+    """Choose a tool, a key of ``TOOLS``, and show a hint, or the reason why it is disabled."""
     why = no_tool(state)
     if tool != "select" and why:
         state.say_status(f"{TOOLS[tool][0]}: {why}")
@@ -42,7 +43,7 @@ def choose_tool(state: AppState, tool: str) -> None:
 
 
 def next_orientation(state: AppState) -> None:
-    """Switch to the next of local, parent and world axes."""
+    """Switch to the next orientation: local, parent or world axes."""
     posing = state.of(Posing)
     names = list(ORIENTATIONS)
     following = names[(names.index(posing.orientation) + 1) % len(names)]
@@ -69,7 +70,7 @@ def key_pose_now(state: AppState) -> None:
 
 
 def selected(state: AppState) -> PosedJoint | None:
-    """Return the selected joint in the scene, None if there is none that can be posed."""
+    """Return the selected joint in the scene; None if there is none that can be posed."""
     actor = state.actor
     if not actor.is_drawn or state.options.show == "binding":
         return None
@@ -131,6 +132,6 @@ def no_keys(state: AppState) -> str:
     clip = state.actor.clip
     if clip is None:
         return no_pose(state) or "there is no clip: create one with Edit > New clip"
-    if not isinstance(clip, Clip):
+    if not isinstance(clip, Clip | TransformClip):
         return "this motion is sampled and has no keys"
     return ""

@@ -36,7 +36,7 @@ def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
     Parameters
     ----------
     state : AppState
-        State that the tools act on.
+        State to which the tools apply.
     legend : Rect or None
         Rectangle of the legend: the tools are placed below it if there is no room next to it.
     """
@@ -82,13 +82,13 @@ def _draw_tools(state: AppState) -> None:
 
 
 def _item_width(count: int) -> float:
-    """Return the width of each of several widgets in a row: all rows are equally wide."""
+    """Return the width of each of several widgets in a row; all rows have the same width."""
     spacing = imgui.get_style().item_spacing.x
     return (_WIDTH * imgui.get_font_size() - spacing * (count - 1)) / count
 
 
 def _button(state: AppState, name: str, width: float, text: str, why: str) -> bool:
-    with disabled(why):
+    with disabled(state, why):
         pressed = imgui.button(name, (width, 0.0))
         note_item(state, f"tool {name}")
         explain(text, why)
@@ -99,7 +99,7 @@ def _draw_settings(state: AppState) -> None:
     """Draw the choice of axes, and the length of the chain for the tool that has one."""
     posing, has_chain = state.of(Posing), state.of(Posing).tool == "move"
     why = no_orientation(state)
-    with disabled(why):
+    with disabled(state, why):
         width = _item_width(2 if has_chain else 1) / imgui.get_font_size()
         posing.orientation = choice(state, "##axes", posing.orientation, ORIENTATIONS, width)
         explain(with_key(state, "orientation of the rings and arrows", "X"), why)
@@ -111,7 +111,7 @@ def _draw_settings(state: AppState) -> None:
 def _draw_chain(state: AppState) -> None:
     """Draw the slider of the number of joints that follow a dragged joint."""
     why, longest = no_chain(state), max(chain_limit(state), 1)
-    with disabled(why):
+    with disabled(state, why):
         imgui.set_next_item_width(_item_width(2))
         changed, length = slider_int(
             state,

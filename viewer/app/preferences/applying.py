@@ -21,7 +21,7 @@ def start_with(state: AppState, preferences: Preferences) -> None:
     Parameters
     ----------
     state : AppState
-        Its preferences and angle unit are set.
+        State whose preferences and angle unit are set.
     preferences : Preferences
         The stored preferences.
     """
@@ -47,7 +47,7 @@ def change(state: AppState, preferences: Preferences) -> None:
 
 
 def scale_of(state: AppState) -> float:
-    """Return the scale of the interface: the given, the preferred, or the monitor's scale."""
+    """Return the scale of the interface: as given, as preferred, or that of the monitor."""
     appearance = state.of(Appearance)
     return appearance.given_scale or state.of(Preferences).scale or appearance.screen_scale
 
@@ -66,7 +66,7 @@ def follow_preferences(state: AppState) -> None:
         change_scale(applied.scale, scale)
         applied.scale = scale
     if preferences.font_size != applied.font_size:
-        # A size set now would be overwritten at the end of the frame.
+        # If the size were set now, it would be overwritten at the end of the frame.
         imgui.get_style()._next_frame_font_size_base = preferences.font_size
         applied.font_size = preferences.font_size
     if preferences.keys != applied.keys:

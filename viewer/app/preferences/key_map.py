@@ -62,7 +62,7 @@ def chord_name(chord: int) -> str:
 
 
 def chords_of(shortcut: Shortcut, keys: Mapping[str, str]) -> tuple[int, ...]:
-    """Return the key codes of an action; those of the table unless the user chose another."""
+    """Return the key codes of an action: those of the table unless the user chose another key."""
     chord = parse_chord(keys.get(shortcut.name, ""))
     return (chord,) if chord else shortcut.chords
 
@@ -84,7 +84,7 @@ def conflicts(keys: Mapping[str, str]) -> dict[str, str]:
     Returns
     -------
     dict
-        Name of the action to the text of another action with the same key.
+        Maps the name of an action to the text of another action with the same key.
     """
     users: dict[int, list[Shortcut]] = {}
     for shortcut in KEYS:

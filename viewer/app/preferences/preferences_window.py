@@ -68,7 +68,7 @@ def draw_preferences(state: AppState) -> None:
         _draw_files(state, preferences)
         imgui.separator_text("Keys")
         _draw_keys(state, preferences)
-        why = "" if preferences != Preferences() else "all preferences have their defaults"
+        why = "" if preferences != Preferences() else "all preferences have their default values"
         if button(state, "Reset all###reset preferences", why):
             preferences = Preferences()
         change(state, preferences)
@@ -90,11 +90,11 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
     if preferences.theme == "system" != before:
         appearance.system_theme = system_theme()
     if preferences.theme == "system" and not appearance.system_theme:
-        imgui.text_disabled("this system does not tell its theme: dark is used")
+        imgui.text_disabled("the theme of this system is unknown: dark is used")
     why = "--scale was given on the command line" if appearance.given_scale else ""
     scales = {"0": f"automatic ({100.0 * appearance.screen_scale:.0f} %)"}
     scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
-    with disabled(why):
+    with disabled(state, why):
         chosen = choice(state, "Interface scale", f"{preferences.scale:g}", scales)
         explain("automatic follows the scale of the monitor", why)
     preferences.scale = float(chosen)
@@ -146,7 +146,7 @@ def _draw_keys(state: AppState, preferences: Preferences) -> None:
     if found:
         imgui.push_style_color(imgui.Col_.text, ink(WARNING))
         count = len(found)
-        imgui.text_unformatted(f"{count} actions share a key: only the first one listed runs")
+        imgui.text_unformatted(f"{count} actions share a key: only the first one in the list runs")
         imgui.pop_style_color()
 
 
@@ -156,7 +156,7 @@ def _draw_key(state: AppState, preferences: Preferences, shortcut: Shortcut, con
     label = "press a key…" if waits else label_of(shortcut, preferences.keys)
     width = 10.0 * imgui.get_font_size()
     why = "this key cannot be changed" if shortcut.label in FIXED else ""
-    with disabled(why):
+    with disabled(state, why):
         if conflict:
             imgui.push_style_color(imgui.Col_.text, ink(WARNING))
         pressed_button = imgui.button(f"{label}###key {name}", (width, 0.0))

@@ -55,7 +55,7 @@ class Preferences:
     up : str
         A key of ``UPS``.
     keys : dict
-        Keys that differ from the default: the name of the action to the name of the key.
+        Keys that differ from the default: maps names of actions to names of keys.
     """
 
     theme: str = "dark"

@@ -1,4 +1,4 @@
-"""Stored preferences: unknown and invalid entries get their defaults."""
+"""Stored preferences; unknown and invalid entries get their default values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Value = TypeVar("Value", str, float, int, bool)
 
 
 def preferences_file() -> Path:
-    """Return the file that holds the preferences."""
+    """Return the file that contains the preferences."""
     return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "preferences.json"
 
 
@@ -49,7 +49,7 @@ def load_preferences() -> Preferences:
 
 
 def _one_of(value: Any, known: Container[Value], usual: Value) -> Value:
-    """Return a stored value if it has the right type and is one of the known ones."""
+    """Return a stored value if it has the right type and is a known value."""
     fits = type(value) is type(usual) or (type(value) is int and type(usual) is float)
     return type(usual)(value) if fits and value in known else usual
 

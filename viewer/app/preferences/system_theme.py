@@ -1,4 +1,4 @@
-"""Theme of the desktop, where it can be queried: macOS, Windows, and desktops with gsettings."""
+"""Theme of the desktop, if it can be queried: macOS, Windows, and desktops with gsettings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 __all__ = ["system_theme"]
 
-_PATIENCE = 1.0  # seconds: the window must not wait for a desktop that does not answer
+_PATIENCE = 1.0  # seconds: the window must not wait for a desktop that does not respond
 _GSETTINGS = ("gsettings", "get", "org.gnome.desktop.interface", "color-scheme")
 _DEFAULTS = ("defaults", "read", "-g", "AppleInterfaceStyle")
 _PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"

@@ -16,7 +16,7 @@ _WIDEST, _HIGHEST = 320, 200  # pixels
 
 
 class Preview:
-    """Draws the preview into a texture whenever something about it changes.
+    """Draws the preview into a texture whenever the preview changes.
 
     Parameters
     ----------
@@ -29,6 +29,7 @@ class Preview:
         self.target: Target | None = None
         self._renderer: Renderer | None = None
         self._drawn: object = None
+        self._old: list[Target] = []
 
     def draw(self, state: AppState, key: object) -> None:
         """Draw the preview if the Record window is open and the image has changed.
@@ -36,15 +37,17 @@ class Preview:
         Parameters
         ----------
         state : AppState
-            The state, with the settings; receives the texture.
+            State with the settings; receives the texture.
         key : object
             Identifies the image of the view.
         """
         recording = state.of(Recording)
         settings = recording.settings
+        self._release_old()
         if settings is None:
-            self.release()
-            recording.preview = 0
+            self._drawn, recording.preview = None, 0
+            self._retire()
+            self._release_renderer()
             return
         size = preview_size(settings.pixels((state.view_rect[2], state.view_rect[3])))
         wanted = (key, size, settings.look, settings.background, settings.kind, settings.samples)
@@ -58,7 +61,7 @@ class Preview:
         options = recorded_options(state, settings, 2)
         target = self.target
         if target is None or (target.size, target.asked_samples) != (size, options.samples):
-            self._release_target()
+            self._retire()
             self.target = target = Target(self.context, size, options.samples)
         camera = state.camera.copy()
         selected = (state.chosen_actor, state.selected_joint)
@@ -68,18 +71,27 @@ class Preview:
         target.resolve()
         return int(target.texture.glo)
 
+    def _retire(self) -> None:
+        """Release the target in the next frame: panels of this frame may show its texture."""
+        if self.target is not None:
+            self._old.append(self.target)
+            self.target = None
+
+    def _release_old(self) -> None:
+        for target in self._old:
+            target.release()
+        self._old.clear()
+
     def release(self) -> None:
         """Release everything, as when the window is closed."""
-        self._drawn = None
-        self._release_target()
+        self._retire()
+        self._release_old()
+        self._release_renderer()
+
+    def _release_renderer(self) -> None:
         if self._renderer is not None:
             self._renderer.release()
             self._renderer = None
-
-    def _release_target(self) -> None:
-        if self.target is not None:
-            self.target.release()
-            self.target = None
 
 
 def preview_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -110,7 +110,7 @@ def _draw_file(state: AppState, settings: RecordSettings) -> None:
             state, "Compression quality###Quality", settings.quality, (0, 100)
         )
         settings.quality = min(max(settings.quality, 0), 100)
-        explain("higher is better and larger")
+        explain("higher quality gives larger files")
 
 
 def _draw_picture(state: AppState, settings: RecordSettings) -> None:
@@ -120,7 +120,7 @@ def _draw_picture(state: AppState, settings: RecordSettings) -> None:
         if size is not None:
             width, height = (min(max(side, LEAST_PIXELS), _MOST_PIXELS) for side in size)
             settings.own_size = width, height
-    looks = {"": "as the view, at most Normal for motions", **QUALITIES}
+    looks = {"": "as the view, but at most Normal for motions", **QUALITIES}
     settings.look = choice(state, "Quality##look", settings.look, looks)
     chosen = choice(state, "Samples##recorded", str(settings.samples), _SAMPLES)
     settings.samples = int(chosen)
@@ -131,7 +131,7 @@ def _draw_picture(state: AppState, settings: RecordSettings) -> None:
             settings.background = ""
     settings.background = choice(state, "Background##recorded", settings.background, backgrounds)
     if settings.kind == ".mp4":
-        explain("MP4 has no transparency: choose WebM or pictures for that")
+        explain("MP4 has no transparency: choose WebM or pictures")
     why = "" if state.options.shading == "scalar" else "no numbers are shown as colours"
     state.options.legend = checkbox(state, "Legend in pictures", state.options.legend, why)
 
@@ -158,7 +158,7 @@ def _draw_frames(state: AppState, settings: RecordSettings) -> None:
         note_item(state, "Seconds")
         if seconds is not None:
             settings.seconds = _within(state, seconds, 0.05, 3600.0)
-    why = "" if state.of(Following).target is not None else "start it in the Actors panel"
+    why = "" if state.of(Following).target is not None else "start following in the Actors panel"
     follows = settings.follows and not why
     chosen = checkbox(state, "Follow the followed actor###follow", follows, why)
     if not why:
@@ -167,7 +167,7 @@ def _draw_frames(state: AppState, settings: RecordSettings) -> None:
 
 
 def _draw_range(state: AppState, settings: RecordSettings) -> None:
-    """Draw the first and last frame; the playback range unless others are entered."""
+    """Draw the first and last frame, which are those of the playback range unless edited."""
     clock = state.clock
     lowest, highest = (clock.first_frame + frame for frame in clock.frame_range)
     shown = settings.frames or _playback_frames(state)

@@ -19,7 +19,7 @@ def recorded_options(state: AppState, settings: RecordSettings, n_frames: int) -
     Parameters
     ----------
     state : AppState
-        The state, with the options of the view, which are copied.
+        State with the options of the view, which are copied.
     settings : RecordSettings
         Settings of the recording.
     n_frames : int

@@ -54,7 +54,7 @@ def recording_steps(
     Yields
     ------
     (int, int)
-        Frames done, and number of frames.
+        Number of completed frames, and their total.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def recording_steps(
     files = [path]
     if settings.kind == "pictures":
         files = _numbered(path, numbers)
-    # The dialog asks about replacing a single file only, not about numbered ones.
+    # The dialog asks before replacing a single file, but not for numbered files.
     is_asked = settings.kind != "pictures"
     check_targets(files, state.inputs, is_asked, hint="choose another name")
     sink, size = _sink(settings, files, size, rate, numbers)

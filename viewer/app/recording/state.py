@@ -29,7 +29,7 @@ class RecordSettings:
     kind : str
         A key of ``KINDS``.
     size : str
-        A key of the sizes offered.
+        A key of the available sizes.
     own_size : (int, int)
         Width and height for the size ``"own"``.
     rate : float
@@ -48,9 +48,9 @@ class RecordSettings:
     samples : int
         Samples per pixel; 0 for those of the view.
     background : str
-        As in ``DisplayOptions``; empty for that of the view.
+        As in ``DisplayOptions``; empty for the background of the view.
     follows : bool
-        Whether the camera follows the actor or joint that it follows in the view.
+        Whether the camera follows the same actor or joint as in the view.
     frames : (int, int) or None
         First and last frame, numbered as in the timeline; None for the playback range.
     """
@@ -78,7 +78,7 @@ class RecordSettings:
         """Return the width and height of the recording for a given size of the view."""
         if self.size == "view":
             wide, high = (max(round(side), LEAST_PIXELS) for side in view)
-            # Videos need even sizes; a lost row of the view does not matter.
+            # Videos need even sizes; losing a row of the view does not matter.
             return wide - wide % 2, high - high % 2
         if self.size == "own":
             return self.own_size

@@ -55,9 +55,10 @@ _METHODS = {
     "given": "by hand",
 }
 """Labels of the alignment methods, the values of ``Alignment.how``."""
-_POSES = "; joints are rotated and limbs resized where that fits much better"
+_POSES = "; joints are rotated and limbs resized if that fits much better"
 _FITS = (
-    "; joints are rotated and limbs resized, or all of it stretched, where that fits much better"
+    "; joints are rotated and limbs resized, or the whole template is stretched, if that fits much "
+    "better"
 )
 _SCALE_TEXTS = {"uniform": "uniform", "axes": "one per axis", "none": "none"}
 
@@ -68,16 +69,16 @@ def draw_alignment(state: AppState) -> None:
     choices = rigging.choices
     axes = {"": "automatic", **{axis: axis for axis in AXES}}
     choices.up = choice(state, "Up", choices.up, axes)
-    explain("the target's axis that points up")
+    explain("up axis of the target")
     choices.facing = choice(state, "Facing", choices.facing, axes)
-    explain("the target's axis that points forward")
+    explain("forward axis of the target")
     choices.scale = choice(state, "Scale", choices.scale, {s: _SCALE_TEXTS[s] for s in SCALES})
     choices.fits = checkbox(state, "Fit pose and proportions", choices.fits)
     explain("rotate the template's joints and resize its limbs where the target differs")
     if button(state, "Align", why):
         start_align(state)
     if not why:
-        explain(f"finds the best placement by closest points{_FITS if choices.fits else ''}")
+        explain(f"find the best placement by closest points{_FITS if choices.fits else ''}")
     same_line_if_room("Refine")
     refuses = why or ("" if placing_now(state) else "align the template first")
     if button(state, "Refine", refuses):
@@ -93,7 +94,7 @@ def draw_alignment(state: AppState) -> None:
     if template is not None and (rigging.tool == "landmarks" or rigging.landmarks):
         _draw_landmarks(state, template)
     placing = placing_now(state)
-    # Lines that appear and disappear go below the controls, which must not move.
+    # Lines that appear and disappear are placed below the controls, which must not move.
     for line in placing.lines if placing is not None else ():
         imgui.text_wrapped(line.labelled)
     if is_posed_since(state):
@@ -109,7 +110,7 @@ def _draw_placing(placing: Placing | None) -> None:
 
 
 def _draw_error(found: Alignment | None) -> None:
-    """Draw the error: trimmed RMS, as in the report."""
+    """Draw the error, a trimmed RMS as in the report."""
     if found is None:
         imgui.text_disabled("error: not measured at this placement")
         return
@@ -122,26 +123,26 @@ def _draw_error(found: Alignment | None) -> None:
         imgui.text_wrapped(text)
     explain(
         "RMS distance of the best 90 % of the target from the template, relative to the target's "
-        f"size; of the template from the target: {100.0 * found.away:.2f} %"
+        f"size; distance of the template from the target: {100.0 * found.away:.2f} %"
     )
 
 
 def _method_text(found: Alignment) -> str:
-    """Return the label of an alignment method, which with fitted limbs has one scale only."""
+    """Return the label of an alignment method; with fitted limbs, there is only one scale."""
     scales = found.similarity.factors, found.similarity.own_factors
     is_even = all((factors == 1.0).all() for factors in scales)
     return _METHODS[found.how] if found.how != "fit" or is_even else _STRETCHED
 
 
 def _refine(state: AppState) -> None:
-    """Refine the current alignment by closest points: it is given as landmarks at box corners."""
+    """Refine the current alignment by closest points; it is given as landmarks at box corners."""
     rigging = state.of(Rigging)
     template = aligned_template(state)
     if template is None:
         return
     low, high = (f(posed_template(rigging, template).positions, axis=0) for f in (np.min, np.max))
     corners = np.array([low, *(np.where(np.eye(3)[axis] > 0, high, low) for axis in range(3))])
-    corners[1:] += (high == low) * np.eye(3)  # flat meshes need four different corners too
+    corners[1:] += (high == low) * np.eye(3)  # flat meshes also need four different corners
     pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
     start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
 
@@ -240,7 +241,7 @@ def _draw_landmarks(state: AppState, template: Template) -> None:
             start_align(state, landmark_settings(state, mesh, view.choices.refines))
         except ViewerError as problem:
             state.error = str(problem)
-    with disabled("" if view.landmarks else "there are no landmarks"):
+    with disabled(state, "" if view.landmarks else "there are no landmarks"):
         same_line_if_room("Delete all")
         if button(state, "Delete all"):
             view.landmarks, view.pending = [], None

@@ -68,7 +68,7 @@ def box_fit(template: Mesh, target: Mesh) -> Similarity:
 
 
 def placing_now(state: AppState) -> Placing | None:
-    """Return the template's placement, None if it is for another target or template."""
+    """Return the template's placement; None if it belongs to another target or template."""
     rigging, template = state.of(Rigging), current_template(state)
     placing = rigging.placing
     if placing is None or template is None or rigging.target is None:
@@ -92,7 +92,7 @@ def aligned_template(state: AppState) -> Template | None:
 
 
 def similarity_now(state: AppState, template: Template) -> Similarity:
-    """Return the similarity that places the template: by its box until it has been aligned."""
+    """Return the similarity that places the template; it is based on boxes until the alignment."""
     placing = placing_now(state)
     if placing is not None:
         return placing.similarity
@@ -100,12 +100,12 @@ def similarity_now(state: AppState, template: Template) -> Similarity:
 
 
 def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
-    """Return the similarity nearest to a matrix; its scale is the geometric mean of the axes'.
+    """Return the similarity nearest to a matrix; its scale is the geometric mean over the axes.
 
     Parameters
     ----------
     matrix : (4, 4)
-        Nearly a similarity, without reflection; rounding errors of its rotation are removed.
+        Matrix that is nearly a similarity, without reflection; rounding errors are removed.
     like : Similarity or None
         Similarity before the change. If it stretches the template along its own axes, so does the
         result.
@@ -123,7 +123,7 @@ def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
 
 
 def move_by_hand(state: AppState, template: Template, similarity: Similarity) -> None:
-    """Move the template; the error of its new placement is not known yet."""
+    """Move the template; the error of the new placement is still unknown."""
     own, before = current_template(state), placing_now(state)
     assert own is not None  # only an existing template can be moved
     fitted = template if before is not None and before.fitted is template else None
@@ -139,12 +139,12 @@ def move_by_hand(state: AppState, template: Template, similarity: Similarity) ->
 
 
 def _still_true(lines: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
-    """Return the messages about the fit of the template, without its distance from the target."""
+    """Return the messages about the fit of the template, except its distance from the target."""
     return tuple(line for line in lines if line.key in _DONE)
 
 
 def set_aside(state: AppState) -> None:
-    """Show the template to the right of the target, as the camera sees it."""
+    """Show the template to the right of the target, as seen from the camera."""
     view, template = state.of(Rigging), aligned_template(state)
     view.aside = np.zeros(3)
     if template is None or view.target is None:
@@ -161,7 +161,7 @@ def set_aside(state: AppState) -> None:
 
 
 def ghost_of(state: AppState) -> Ghost | None:
-    """Return the template to be drawn over the scene, None if it is hidden."""
+    """Return the template to be drawn over the scene; None if it is hidden."""
     view, template = state.of(Rigging), aligned_template(state)
     if template is None or view.target is None:
         return None

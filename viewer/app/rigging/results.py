@@ -21,8 +21,11 @@ from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import Pairs
 from viewer.rig.comparison.weights import row_distances
+from viewer.rig.motion.baking import baked
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skin import Skin, owners
 
@@ -78,7 +81,7 @@ def compare(first: Result, second: Result) -> Comparison:
 
 
 def _dominant(skin: Skin) -> Ints:
-    """Return each vertex's dominant joint, -1 for those without influences: (V,)."""
+    """Return each vertex's dominant joint, -1 if it has no influence: (V,)."""
     order = np.lexsort((-skin.joints, skin.weights, owners(skin)))
     last = np.cumsum(np.diff(skin.starts)) - 1
     has_some = np.diff(skin.starts) > 0
@@ -123,7 +126,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
 
 
 def _play(state: AppState, result: Result) -> None:
-    """Show the joints of a result, and play the template's motion, or else a trial motion."""
+    """Show the joints of a result, and play the template's motion, or a trial motion."""
     state.options.xray = True
     set_motion(state, result, plays=not no_motion_of(result))
     if result.actor.clip is None:
@@ -135,7 +138,7 @@ def _play(state: AppState, result: Result) -> None:
 
 
 def _row(actors: list[Actor], actor: Actor) -> int:
-    """Return an actor's index, -1 if it is not in the list."""
+    """Return an actor's index, or -1 if it is not in the list."""
     return next((row for row, one in enumerate(actors) if one is actor), -1)
 
 
@@ -154,7 +157,7 @@ def shown_version(state: AppState) -> str:
 
 
 def shown_result(state: AppState) -> Result | None:
-    """Return the visible result, or else the last one in the scene."""
+    """Return the visible result, or the last one in the scene."""
     known = versions(state)
     present = [one for name, one in state.of(Rigging).results.items() if name in known]
     visible = [one for one in present if one.actor.visible]
@@ -178,7 +181,7 @@ def switch_version(state: AppState) -> None:
 
 
 def show_version(state: AppState, name: str) -> None:
-    """Show one of ``versions``, without a step to undo."""
+    """Show one of ``versions`` without recording an undo step."""
     # Other changes in this frame keep their own undo step.
     state.history.observe(state.scene, state.options, busy=False)
     _look(state, name)
@@ -250,15 +253,17 @@ def no_motion_of(result: Result | None) -> str:
     """Return why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
-    if isinstance(result.template.clip, Clip | SampledClip):
+    if isinstance(result.template.clip, JointMotion):
         return ""
-    return "the template has no motion: it needs one before Run"
+    return "the template has no motion: it needs one before Run is pressed"
 
 
 def set_motion(state: AppState, result: Result, plays: bool) -> None:
     """Play the template's motion at the target's position, or pose the result like the target."""
     actor, rigged, clip = result.actor, result.rigged, result.template.clip
     place = target_place(result.target)
+    if isinstance(clip, TransformClip):
+        clip = baked(result.template.figure, clip, base=result.template.pose)
     if not plays or not isinstance(clip, Clip | SampledClip):
         actor.clip, actor.pose = None, rigged.pose.copy()
         actor.placement = place @ rigged.placement
@@ -285,7 +290,7 @@ def _template_space(result: Result) -> Floats:
 
 
 def save_rigged(state: AppState, result: Result, path: Path) -> None:
-    """Write a result in the background, all of its files or none."""
+    """Write a result in the background: all of its files or none."""
     try:
         files = files_of(path)
         # The dialog has already asked whether to replace existing files.

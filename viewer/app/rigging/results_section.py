@@ -58,7 +58,7 @@ def draw_results(state: AppState) -> None:
     tries, still = plays_trial(result), no_trial_of(result)
     chosen = checkbox(state, "Trial motion", tries, still)
     if not still:
-        explain("bend each joint to both sides, to see how the weights deform the mesh")
+        explain("bend each joint in both directions, to see how the weights deform the mesh")
     if chosen != tries:
         set_trial(state, result, chosen)
     _draw_table(state)
@@ -170,5 +170,5 @@ def _ask_where(state: AppState, result: Result) -> None:
 
 
 def _written(path: Path) -> list[Path]:
-    """Return all files written for a name; other suffixes are rejected when it is saved."""
+    """Return all files written for a name; other suffixes are rejected on saving."""
     return files_of(path) if path.suffix.lower() in RIGGED_SUFFIXES else [path]

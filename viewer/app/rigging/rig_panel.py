@@ -60,7 +60,7 @@ def draw(state: AppState) -> None:
     why = no_target(state)
     if why:
         imgui.text_wrapped(f"{why[0].upper()}{why[1:]}.")
-    with disabled(why):
+    with disabled(state, why):
         if _section("Align", "align the template with the target"):
             draw_alignment(state)
         if _section("Match", "conditions for taking the template's weights unchanged"):
@@ -70,7 +70,7 @@ def draw(state: AppState) -> None:
     if not rigging.results:
         return
     if rigging.scrolls:
-        # The height of the section is known from the second frame on.
+        # The height of the section is known only from the second frame on.
         rigging.scrolls -= 1
         imgui.set_scroll_here_y(0.0)
     if _section("Result", "the rigged mesh, in place of the target"):
@@ -90,7 +90,7 @@ def _draw_sources(state: AppState) -> None:
     view, found, why = state.of(Rigging), targets(state), no_job_room(state)
     names = {str(row): printable(actor.name, 60) for row, actor in enumerate(found)}
     rows = [str(row) for row, actor in enumerate(found) if actor is view.target]
-    with disabled("" if found else "no mesh without a rig"):
+    with disabled(state, "" if found else "no mesh without a rig"):
         chosen = choice(state, "Target", rows[0] if rows else "", names or {"": "none"})
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
@@ -98,14 +98,14 @@ def _draw_sources(state: AppState) -> None:
         _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES)
     if not why:
         explain("add a mesh without a rig to this scene")
-    with disabled(why):
+    with disabled(state, why):
         key = choice(state, "Template", view.template_key, template_texts(state))
     if key != view.template_key:
         choose_template(state, key)
     if button(state, "Template file…", why):
         _ask(state, _read_template, "Template: any rigged figure", ())
     if not why:
-        explain("any figure that opens: a body model, .npz, or .skel and .skin together")
+        explain("any figure that can be opened: a body model, .npz, or .skel and .skin together")
     template = current_template(state)
     # A template that has not been read yet has the same controls, so that buttons do not move.
     if template is None or template.actor is None:
@@ -169,13 +169,13 @@ def _draw_match(state: AppState) -> None:
     view = state.of(Rigging)
     choices = view.choices
     why = _NEAREST_WHY if choices.method == "nearest" else ""
-    with disabled(why):
+    with disabled(state, why):
         percent = 100.0 * choices.max_distance
         moved = slider(state, "Max. distance", percent, 0.1, 30.0, "%.1f %%")
-        explain("between the surfaces, relative to the target's size", why)
+        explain("maximum distance between the surfaces, relative to the target's size", why)
         choices.max_distance = min(max(moved, 0.0), 1000.0) / 100.0
         moved = slider(state, "Max. angle", choices.max_angle, 0.0, 180.0, "%.0f\N{DEGREE SIGN}")
-        explain("between the surfaces' normals", why)
+        explain("maximum angle between the normals of the surfaces", why)
         choices.max_angle = min(max(moved, 0.0), 180.0)
     why = no_job_room(state) or ("" if placing_now(state) else "align the template first")
     if button(state, "Show match", why):
@@ -205,7 +205,7 @@ def _draw_run(state: AppState) -> None:
     if button(state, "Run", why):
         start_run(state, (choices.method,))
     if not why:
-        explain("rig the target; aligns the template first if necessary")
+        explain("rig the target, after aligning the template if necessary")
     same_line_if_room("Compare methods")
     if button(state, "Compare methods", why):
         start_run(state, tuple(METHODS))
@@ -214,7 +214,7 @@ def _draw_run(state: AppState) -> None:
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
-    """Draw the rarely used settings, collapsed; the label counts those that were changed."""
+    """Draw the rarely used settings, collapsed; the label gives the number of changed ones."""
     usual = RigChoices()
     changed = sum(getattr(choices, name) != getattr(usual, name) for name in _ADVANCED)
     text = f"Advanced ({changed} changed)" if changed else "Advanced"
@@ -228,12 +228,14 @@ def _draw_advanced(state: AppState, choices: RigChoices) -> None:
 
 def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
     why = _NEAREST_WHY if choices.method == "nearest" else ""
-    with disabled(why):
+    with disabled(state, why):
         choices.refines = checkbox(state, "Refine alignment", choices.refines)
-        explain("refine the result of the search or the landmarks by closest points", why)
+        explain("refine the result of the search or of the landmarks by closest points", why)
         choices.joints = choice(state, "Joints##rig", choices.joints, {n: n for n in JOINTS})
         explain(
-            "surface: joints follow the surface around them; alignment: only the alignment", why
+            "surface: joints are placed by the surface around them; alignment: only by the "
+            "alignment",
+            why,
         )
         limits = (0, _MOST_ITERATIONS)
         count = count_slider(state, "Smoothing", choices.smoothing, limits)

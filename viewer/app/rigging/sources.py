@@ -49,7 +49,7 @@ def templates(state: AppState) -> list[Actor]:
 
 
 def refresh(state: AppState) -> None:
-    """Drop state of another scene, and choose a target and a template; called in each frame."""
+    """Discard state of another scene, and choose target and template; called in each frame."""
     view = state.of(Rigging)
     if view.scene is not state.scene:
         view = state.put(Rigging(scene=state.scene, choices=view.choices))
@@ -70,7 +70,7 @@ def target_mesh(state: AppState) -> Mesh:
 
 
 def choose_target(state: AppState, target: Actor | None) -> None:
-    """Choose the mesh to rig, and drop the placement and results of the previous one."""
+    """Choose the mesh to rig, and discard the placement and results of the previous one."""
     view = state.of(Rigging)
     if target is not view.target:
         view.target, view.placing, view.match_fraction = target, None, None

@@ -38,7 +38,7 @@ TOOLS = {
     "": ("None", "the mouse orbits and selects as usual"),
     "move": ("Move", "drag the template by its arrows and squares"),
     "rotate": ("Rotate", "rotate the template with its rings"),
-    "scale": ("Scale", "drag the ring out or in to scale the template uniformly"),
+    "scale": ("Scale", "drag the ring outwards or inwards to scale the template uniformly"),
     "landmarks": ("Landmarks", "click a point of the template, then the same point of the target"),
 }
 """Tools to align the template with the target by hand: label and tooltip."""
@@ -58,13 +58,13 @@ class Template:
     figure : Figure
         Figure with mesh, skeleton and skin.
     pose : Pose
-        Pose of the figure; for an actor of the scene its current pose.
+        Pose of the figure; for an actor of the scene, its current pose.
     clip : Motion or None
         Motion of the figure.
     actor : Actor or None
         Actor of the scene; None if the template was read from files.
     paths : tuple of Path
-        These files; empty for an actor.
+        The files of the template; empty for an actor.
     """
 
     key: str
@@ -94,7 +94,7 @@ class Placing:
     meshes : tuple of object
         Target mesh and template figure for which the placement is valid.
     pose : tuple
-        Key of the template's pose for which it was found.
+        Key of the template's pose for which the placement was found.
     """
 
     similarity: Similarity
@@ -146,7 +146,7 @@ class Comparison:
     Attributes
     ----------
     weights : float
-        Mean over vertices of sum_j |w - w'|; 2 if no vertex has a joint in common.
+        Mean over vertices of sum_j |w - w'|; 2 if no joint is common to both results at any vertex.
     dominant : float
         Fraction of vertices with the same dominant joint.
     """
@@ -171,13 +171,13 @@ class RigChoices:
     Attributes
     ----------
     up, facing : str
-        Up and forward axis of the target; empty to search for them.
+        Up and forward axes of the target; empty to search for them.
     scale : str
         One of ``SCALES``.
     refines : bool
         Whether an alignment is refined by closest points.
     fits : bool
-        Whether the template's joints are rotated and its limbs resized where necessary.
+        Whether the template's joints are rotated and its limbs resized if necessary.
     method, joints : str
         As in ``TransferSettings``.
     max_distance : float
@@ -219,7 +219,7 @@ class Rigging:
     template_key : str
         Chosen entry in the list of templates.
     template : Template or None
-        Template that was read from files; one of an actor is built on each use.
+        Template that was read from files; the template of an actor is built on each use.
     choices : RigChoices
         Settings of the controls.
     placing : Placing or None
@@ -236,17 +236,17 @@ class Rigging:
     was_dragged : bool
         Whether the gizmo has moved the template since its error was measured.
     landmarks : list of Landmark
-        Pairs that were clicked.
+        Pairs of clicked points.
     pending : RayHit or None
         Point of the template whose counterpart on the target has not been clicked yet.
     aside : (3,)
         Offset of the template from the target while landmarks are clicked.
     match_fraction : float or None
-        Fraction of matched vertices that the target's colours show.
+        Fraction of matched vertices, as shown by the target's colours.
     running : Running or None
         Job that is running.
     results : dict of str to Result
-        Latest result of each method, all for one target.
+        Latest result of each method, all for the same target.
     comparison : Comparison or None
         Comparison of the results of both methods.
     scrolls : int

@@ -52,21 +52,21 @@ def align_template(
     own : Template
         Template before any fit.
     target : Mesh
-        Mesh to align it with.
+        Mesh with which to align it.
     settings : AlignmentSettings
         Settings of the alignment.
     fits : bool
-        Whether its joints may be rotated and its limbs resized.
+        Whether joints may be rotated and limbs resized.
     progress : callable
         Called with the fraction done and the name of the current step; may raise to cancel.
 
     Raises
     ------
     RigError
-        As ``align``.
+        As for ``align``.
     """
     plain = template.pose.copy()
-    plain.shape_weights = np.zeros(0)  # the shape is part of the figure from here on
+    plain.shape_weights = np.zeros(0)  # from here on, the shape is part of the figure
     figure = shaped(template.figure, template.pose.shape_weights)
     found = align_posed(figure, plain, target, settings, fits, progress)
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
@@ -90,7 +90,7 @@ def with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
     rigged : Rigged
         Result of the transfer.
     placing : Placing or None
-        Placement that the transfer was given; None if it was given none.
+        Placement that was passed to the transfer; None if there was none.
     """
     known = placing.alignment if placing is not None else None
     if placing is None or known is None or rigged.alignment is None:
@@ -106,12 +106,12 @@ def with_known_method(rigged: Rigged, placing: Placing | None) -> Rigged:
 def match_fields(
     template: Template, similarity: Similarity, mesh: Mesh, settings: MatchSettings
 ) -> tuple[tuple[VertexField, ...], float]:
-    """Return which vertices of a target match an aligned template.
+    """Find the vertices of a target that match an aligned template.
 
     Parameters
     ----------
     template : Template
-        Template as it is posed.
+        Template in its current pose.
     similarity : Similarity
         Transform from template to target.
     mesh : Mesh

@@ -1,4 +1,4 @@
-"""Gizmo that moves the template over the target: that of ImGuizmo, with a custom ring for scaling.
+"""Gizmo that moves the template over the target: ImGuizmo with a custom ring for scaling.
 
 ImGuizmo rotates and translates a matrix in float32, so its results are projected back to
 similarities. Its scale handles cannot be grabbed from a distance, so a plain ring replaces them.
@@ -67,7 +67,7 @@ def use_gizmo(state: AppState, template: Template) -> None:
 
 
 def _manipulated(state: AppState, before: Floats) -> Floats | None:
-    """Return the matrix as moved by ImGuizmo, None if it is unchanged."""
+    """Return the matrix as moved by ImGuizmo; None if it is unchanged."""
     view = state.of(Rigging)
     size = float(np.cbrt(np.linalg.det(before[:3, :3])))
     rigid = before.copy()
@@ -82,7 +82,7 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
     changed = _G.manipulate(seen, projection, _OPERATIONS[view.tool], _G.MODE.world, now)
     hovers = _G.get_hovered_handle_type() != _G.MOVETYPE.mt_none
     view.holds_mouse = _G.is_using() or (hovers and not imgui.get_io().want_capture_mouse)
-    # ImGuizmo reports a change once more on release, which would be another undo step.
+    # ImGuizmo reports another change on release, which would become another undo step.
     if not changed or not imgui.is_mouse_down(imgui.MouseButton_.left):
         return None
     after = np.array(now.values, dtype=np.float64).reshape(4, 4).T
@@ -91,11 +91,11 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
 
 
 def _camera_matrices(state: AppState, middle: Floats) -> tuple[Floats, Floats]:
-    """Return view and projection for ImGuizmo: (4, 4) both.
+    """Return view and projection for ImGuizmo: both (4, 4).
 
     ImGuizmo computes wrong rays for parallel projections. They are replaced by a perspective from
     far away, which projects points at the depth of the gizmo's centre to the same positions, and
-    points near it to almost the same ones.
+    points near it to almost the same positions.
     """
     camera = state.camera
     view = camera.view_matrix()
@@ -142,7 +142,7 @@ def _scaled(state: AppState, before: Floats) -> Floats | None:
 
 
 def _draw_ring(center: tuple[float, float], radius: float, is_hot: bool) -> None:
-    """Draw the ring, with squares that indicate that it can be dragged out or in."""
+    """Draw the ring, with squares that indicate that it can be dragged outwards or inwards."""
     ink, color = imgui.get_background_draw_list(), imgui.get_color_u32(_HOT if is_hot else _INK)
     ink.add_circle(center, radius, color, 64, 3.0 if is_hot else 2.0)
     for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):

@@ -33,7 +33,7 @@ def choose_rig_tool(state: AppState, tool: str) -> None:
 
 
 def drop_rig_tool(state: AppState) -> bool:
-    """Drop an incomplete pair of landmarks, or else the tool; return whether there was one."""
+    """Drop an incomplete pair of landmarks, or the tool; return whether there was either."""
     view = state.of(Rigging)
     if view.pending is not None:
         view.pending = None

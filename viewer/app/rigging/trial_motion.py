@@ -1,4 +1,4 @@
-"""Trial motion of a rigged mesh: each joint bends to both sides, one after the other."""
+"""Trial motion of a rigged mesh: the joints bend in both directions, one after the other."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ TRIAL = "trial motion"
 
 _ANGLE = math.radians(35.0)
 _LONGEST, _WHOLE = 0.9, 20.0
-"""Seconds for a joint, and for all of them."""
+"""Seconds for a joint, and for all joints."""
 _FIRST_ROTATION = 3
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
     """Return a motion that begins and ends in a pose; None if no joint can rotate.
 
-    Each joint but the roots rotates about the axis with the widest range, within its limits.
+    Each joint except the roots rotates about the axis with the widest range, within its limits.
 
     Parameters
     ----------
     skeleton : Skeleton
-        J joints and their DOFs.
+        Skeleton with J joints and their DOFs.
     pose : Pose
         Pose of the skeleton.
     """
@@ -47,7 +47,7 @@ def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
 
 
 def _bending_dof(skeleton: Skeleton, joint: int) -> int:
-    """Return the rotation of a joint with the widest range, -1 if it has none or is a root."""
+    """Return the rotation DOF of a joint with the widest range; -1 if it has none or is a root."""
     if skeleton.parents[joint] < 0:
         return -1
     own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION))

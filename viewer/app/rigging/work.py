@@ -72,7 +72,7 @@ _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the
 
 
 def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> None:
-    """Start a thread; the function that it returns is later called in the frame loop."""
+    """Start a job in a thread; the function that it returns is later called in the frame loop."""
     if no_job_room(state):
         state.say_status(no_job_room(state))
         return
@@ -108,9 +108,7 @@ def start_adding(state: AppState, path: Path) -> None:
             raise RigError(f"{printable(path)}: expected a mesh to rig, found none")
         actor = found[0]
         if actor.figure.is_attached:
-            raise RigError(
-                f"{printable(path)}: expected a mesh without a rig, found one with a rig"
-            )
+            raise RigError(f"{printable(path)}: expected a mesh without a rig, found a rigged mesh")
 
         def finish(state: AppState) -> None:
             actor.called = free_title(state.scene.actors, actor.title)
@@ -135,7 +133,7 @@ def _show_added(state: AppState, actor: Actor) -> None:
 def start_reading(
     state: AppState, paths: tuple[Path, ...] = (), then: _Finish | None = None
 ) -> None:
-    """Read the chosen template, or one from other files, which is then chosen.
+    """Read the chosen template, or a template from other files, which is then chosen.
 
     Parameters
     ----------
@@ -165,7 +163,7 @@ def start_reading(
 
 
 def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
-    """Return a function that gives a thread the template in its current or its aligned pose.
+    """Return a function that gives a thread the template in its current or aligned pose.
 
     The thread reads the template first if necessary.
     """
@@ -195,7 +193,7 @@ def _keep(state: AppState, template: Template) -> None:
 def _part_progress(
     report: Report, low: float = 0.0, high: float = 1.0, title: str = ""
 ) -> Callable[[float, str], None]:
-    """Return a callable that reports the progress of one part of a job."""
+    """Return a function that reports the progress of one part of a job."""
 
     def progress(fraction: float, what: str) -> None:
         text = title + _STEPS.get(what, what)
@@ -296,7 +294,7 @@ def start_match(state: AppState) -> None:
 def start_run(state: AppState, methods: tuple[str, ...]) -> None:
     """Rig the target by one or several methods, and show the first result in its place.
 
-    The template is used as it is placed; if it has no placement, it is aligned first.
+    The template is used in its current placement; if it has none, it is aligned first.
     """
     target, choices, placing = (
         state.of(Rigging).target,

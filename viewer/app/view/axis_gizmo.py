@@ -21,10 +21,10 @@ _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
 _RADIUS, _ARM, _END = 40.0, 31.0, 8.5  # radii of the disc, of the arms and of their ends, points
 _GAP, _ABOVE = 8.0, 28.0  # distance from the edges of the view; the hints are below it
-_NARROWEST, _LOWEST = 240.0, 200.0  # points: smaller views have no room for it
+_NARROWEST, _LOWEST = 240.0, 200.0  # points: smaller views have no room for the gizmo
 _DEGREES_PER_POINT = 0.9
 _LEFT = imgui.MouseButton_.left
-_SAME = 1e-6  # of a direction
+_SAME = 1e-6  # tolerance of a direction
 _Color = tuple[float, float, float, float]
 
 
@@ -55,7 +55,7 @@ class _End(NamedTuple):
 
 
 def holds_gizmo(state: AppState) -> bool:
-    """Take the mouse input of this frame; return whether it belongs to the gizmo."""
+    """Handle the mouse input of this frame; return whether it belongs to the gizmo."""
     gizmo, io = state.of(AxisGizmo), imgui.get_io()
     if gizmo.is_held:
         _go_on(state, gizmo)
@@ -63,12 +63,12 @@ def holds_gizmo(state: AppState) -> bool:
     if io.want_capture_mouse or not is_over_gizmo(state):
         return False
     gizmo.is_held = imgui.is_mouse_clicked(_LEFT)
-    # The wheel zooms here too.
+    # The wheel also zooms here.
     return not io.mouse_wheel
 
 
 def _go_on(state: AppState, gizmo: AxisGizmo) -> None:
-    """Orbit while the pointer moves; look along the axis under it once it is released."""
+    """Orbit while the pointer moves; a click looks along the axis under the pointer."""
     io = imgui.get_io()
     has_moved = io.mouse_drag_max_distance_sqr[_LEFT] >= io.mouse_drag_threshold**2
     delta = imgui.get_mouse_drag_delta(_LEFT) if has_moved else imgui.ImVec2(0.0, 0.0)
@@ -85,7 +85,7 @@ def _go_on(state: AppState, gizmo: AxisGizmo) -> None:
 
 
 def draw_axis_gizmo(state: AppState) -> None:
-    """Draw the axes as seen by the camera, those that point towards the eye last."""
+    """Draw the axes as seen by the camera; axes that point towards the eye are drawn last."""
     center = _center(state)
     if center is None:
         return
@@ -133,12 +133,12 @@ def _write(text: str, place: tuple[float, float], is_dark: bool) -> None:
 
 
 def _unit() -> float:
-    """Return the size of a point of the gizmo: it grows with the letters."""
+    """Return the size of one point, which scales with the font."""
     return imgui.get_font_size() / _USUAL_FONT
 
 
 def _center(state: AppState) -> tuple[float, float] | None:
-    """Return the centre of the gizmo, None if it is not shown."""
+    """Return the centre of the gizmo; None if it is not shown."""
     x, y, width, height = state.view_rect
     unit = _unit()
     is_small = width < _NARROWEST * unit or height < _LOWEST * unit
@@ -167,7 +167,7 @@ def _ends(state: AppState) -> list[_End]:
     center = _center(state)
     if center is None:
         return []
-    rotation, reach = state.camera.view_matrix()[:3, :3], _ARM * _unit()
+    rotation, reach = state.camera.rotation(), _ARM * _unit()
     found = []
     for axis in range(3):
         right, up, depth = rotation[:, axis].tolist()
@@ -178,7 +178,7 @@ def _ends(state: AppState) -> list[_End]:
 
 
 def _end_at(state: AppState, place: tuple[float, float]) -> _End | None:
-    """Return the end of an axis at a window position; of several, the one nearest to the eye."""
+    """Return the end of an axis at a window position; of several ends, the nearest to the eye."""
     reach = (_END + 2.0) * _unit()
     near = [e for e in _ends(state) if np.hypot(e.x - place[0], e.y - place[1]) <= reach]
     return max(near, key=lambda end: end.depth, default=None)
@@ -191,7 +191,7 @@ def _view_at(state: AppState, place: tuple[float, float]) -> str:
 
 
 def _named(state: AppState, end: _End) -> str:
-    """Return the named view from an end; the opposite one if the camera looks from there."""
+    """Return the named view from an end; the opposite view if the camera is already there."""
     sides = {}
     for name in VIEWS:
         camera = state.camera.copy()

@@ -36,7 +36,7 @@ def fit_view(state: AppState) -> None:
 
 
 def fit_selection(state: AppState) -> None:
-    """Aim the camera at the selected joint, or else at the chosen actor, and fill the view."""
+    """Aim the camera at the selected joint, or at the chosen actor, and fill the view."""
     joint = posed_joint(state.actor, state.selected_joint)
     if joint is None or not state.actor.is_drawn:
         fit_actor(state)
@@ -66,14 +66,14 @@ def look(state: AppState, name: str) -> None:
 
 
 def fly_to(state: AppState, name: str) -> None:
-    """Do the same as ``look``, but let the camera move there within a fifth of a second."""
+    """Do the same as ``look``, but animate the camera for a fifth of a second."""
     before = state.camera.copy()
     look(state, name)
     fly_from(state, before)
 
 
 def face(state: AppState, front: Front) -> None:
-    """Set the axis that the figures face, "auto" to estimate it, and rotate the camera with it."""
+    """Set the axis that the figures face ("auto" estimates it), and rotate the camera with it."""
     state.set_front(front)
     fit_again(state)
 

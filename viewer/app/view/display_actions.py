@@ -37,7 +37,7 @@ def show(state: AppState, what: str) -> None:
 
 
 def set_shading(state: AppState, name: str) -> None:
-    """Choose the shading, a key of ``SHADING_CHOICES``; scalar quantities get one to show."""
+    """Choose the shading, a key of ``SHADING_CHOICES``, and a scalar quantity if needed."""
     state.options.shading = name
     if name == "scalar":
         start_heat_map(state)

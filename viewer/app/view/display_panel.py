@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field
+from viewer.app.core.key_names import with_key
 from viewer.app.core.reasons import no_mesh, no_skeleton, no_skin, no_texture
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -47,7 +48,7 @@ def draw(state: AppState) -> None:
         "binding": no_skin(state),
     }
     for key, text in SHOWN.items():
-        with disabled(missing[key]):
+        with disabled(state, missing[key]):
             if imgui.radio_button(text, options.show == key):
                 show(state, key)
             note_item(state, text)
@@ -93,13 +94,13 @@ def _draw_surface(state: AppState) -> None:
         for name in ("metallic", "roughness"):
             value = slider(state, name.capitalize(), getattr(options, name), 0.0, 1.0, flags=_CLAMP)
             setattr(options, name, value)
-            explain("Of materials that do not state it")
+            explain("for materials that do not specify it")
 
 
 def _draw_bones(state: AppState, why: str) -> None:
     """Draw the style of skeletons next to the button that shows them."""
-    imgui.same_line(imgui.get_content_region_avail().x * 0.5)
-    with disabled(why):
+    imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x * 0.5)
+    with disabled(state, why):
         imgui.set_next_item_width(-1.0)
         state.options.bones = choice(state, "##bones", state.options.bones, BONES)
         note_item(state, "Bones")
@@ -126,12 +127,15 @@ def _draw_joint_toggles(state: AppState) -> None:
             same_line_if_room(short)
         label = f"{short}###{name}"
         setattr(options, name, checkbox(state, label, getattr(options, name), why))
-        explain(f"{text} ({key})")
+        explain(with_key(state, text, key))
 
 
 def _draw_extras(state: AppState) -> None:
-    """Draw settings that only some figures have: keypoints, a reduced mesh, body parts."""
+    """Draw settings that apply only to some figures: colours, keypoints, meshes, body parts."""
     options, figure = state.options, state.actor.figure
+    if any(one.figure.mesh and one.figure.mesh.colors is not None for one in state.scene.actors):
+        options.vertex_colors = checkbox(state, "Vertex colours", options.vertex_colors)
+        explain("Of the file; they multiply the colours of materials")
     if figure.keypoints is not None:
         options.keypoints = checkbox(state, "Keypoints", options.keypoints)
         if figure.reduced is not None:
@@ -162,16 +166,16 @@ def _draw_parts(state: AppState, parts: BodyParts) -> None:
 
 
 def _beside(text: str) -> None:
-    """Place a check box with this text in the right half of the last one's line if it fits."""
+    """Place a check box with this text in the right half of the last line if it fits."""
     start, room = imgui.get_cursor_screen_pos().x, imgui.get_content_region_avail().x
     gap = imgui.get_style().item_spacing.x
     begins_free = imgui.get_item_rect_max().x + gap <= start + room * 0.5
     if begins_free and imgui.get_frame_height() + gap + imgui.calc_text_size(text).x <= room * 0.5:
-        imgui.same_line(room * 0.5)
+        imgui.same_line(imgui.get_cursor_pos_x() + room * 0.5)
 
 
 def _draw_background(state: AppState) -> None:
-    """Draw the choice of a background, with its colour if it is plain."""
+    """Draw the choice of a background, and its colour if it is plain."""
     options = state.options
     is_color = options.background.startswith("#")
     chosen = choice(state, "Background", "#" if is_color else options.background, _BACKGROUNDS)

@@ -41,7 +41,7 @@ class Flight:
     seconds : float
         Time since its start.
     placed : _Place or None
-        Position at which it last put the camera.
+        Position at which the animation last placed the camera.
     """
 
     ends: tuple[_Place, _Place] | None = None
@@ -60,7 +60,7 @@ def fly_from(state: AppState, before: Camera) -> None:
     Parameters
     ----------
     state : AppState
-        The state; its camera is already at the end of the animation.
+        State whose camera is already at the end of the animation.
     before : Camera
         A copy of the camera at the start.
     """
@@ -109,7 +109,7 @@ def _put(state: AppState, flight: Flight, place: _Place) -> None:
 
 
 def _between(start: _Place, end: _Place, share: float) -> _Place:
-    """Return an interpolated position; azimuths take the shorter way around."""
+    """Return an interpolated position; azimuths are interpolated along the shorter arc."""
     angle = (end.azimuth - start.azimuth + 180.0) % 360.0 - 180.0
     azimuth = (start.azimuth + share * angle + 180.0) % 360.0 - 180.0
     ratio = np.log(end.distance / start.distance)

@@ -20,7 +20,7 @@ from viewer.rig.skeleton import joint_label
 __all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are picked
-_MOST = 16  # maximum number of actors for this: picking in crowds is slow in software
+_MOST = 16  # maximum number of actors for this: with more, picking is slow in software
 _AWAY = 14.0  # points between the pointer and the name
 
 
@@ -59,12 +59,12 @@ def hover_joint(state: AppState) -> None:
 
 
 def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scale: float) -> None:
-    """Find the actor under a resting pointer if there are several actors, but not a crowd.
+    """Find the actor under a resting pointer if there are several actors, but not too many.
 
     Parameters
     ----------
     state : AppState
-        The state; its ``Hovered`` receives the actor.
+        State whose ``Hovered`` receives the actor.
     renderer : Renderer
         The renderer that drew the scene.
     size : (int, int)
@@ -93,7 +93,7 @@ def hover_actor(state: AppState, renderer: Renderer, size: tuple[int, int], scal
 
 
 def joint_near(state: AppState, place: tuple[float, float]) -> int:
-    """Return the chosen actor's joint near a window position if joints are visible; else -1."""
+    """Return the chosen actor's visible joint near a window position, or -1."""
     posing, actor = state.of(Posing), state.actor
     if actor.figure.skeleton is None or actor.pose is None or not actor.is_drawn:
         return -1

@@ -17,7 +17,7 @@ from viewer.app.core.widgets import (
 )
 from viewer.app.view.display_actions import reset_lights
 from viewer.rendering.options import Color, Light
-from viewer.rendering.srgb import decode_color, encode_color
+from viewer.rig.srgb import decode_color, encode_color
 
 __all__ = ["draw"]
 

@@ -1,7 +1,7 @@
 """Image of the outlines over the view, separate from that of the scene.
 
-The item under the pointer changes often; the image of the scene, which may be the average of many
-passes, is kept.
+The item under the pointer changes often, whereas the image of the scene, which may be the average
+of many passes, is kept.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class OutlineLayer:
         Parameters
         ----------
         state : AppState
-            The state, with the selected and hovered parts.
+            State with the selected and hovered parts.
         renderer : Renderer
             The renderer that drew the scene.
         size : (int, int)

@@ -37,8 +37,9 @@ def toggle_outlines(state: AppState) -> None:
 def outlined_parts(state: AppState) -> tuple[Outlined, ...]:
     """Return the outlines of the current frame.
 
-    The selected joint is outlined where the skeleton is drawn; without one, the actor that the user
-    chose among several. The pinned vertex and the item under the pointer are outlined too.
+    The selected joint is outlined if the skeleton is drawn; if no joint is selected, the actor that
+    the user chose among several. The pinned vertex and the item under the pointer are also
+    outlined.
     """
     if not state.of(Outlines).is_shown:
         return ()

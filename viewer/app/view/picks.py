@@ -41,7 +41,7 @@ _REST = 0.2  # seconds without mouse movement before a vertex is described
 def answer_picks(
     state: AppState, renderer: Renderer, size: tuple[int, int], scale: float, picture: object
 ) -> None:
-    """Handle the pending click, and describe the vertex under the mouse once it is still.
+    """Handle the pending click, and describe the vertex under the mouse once the mouse is still.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def answer_picks(
     scale : float
         Pixels per window coordinate.
     picture : object
-        Key of the drawn image, which changes whenever the image does.
+        Key of the drawn image, which changes whenever the image changes.
     """
     picking = state.of(Picking)
     wanted, picking.wanted = picking.wanted, None
@@ -75,7 +75,7 @@ def _take_click(
     pixel: tuple[float, float],
     aims: bool,
 ) -> None:
-    """Pin the vertex at a pixel if vertices are picked; otherwise select there or aim the camera.
+    """Pin the vertex at a pixel if vertices are picked; otherwise select or aim the camera.
 
     A click on a skin selects the joint with the largest weight there; one on the background
     deselects.
@@ -113,7 +113,8 @@ class Spot:
     actor : int
         Index of an actor.
     joint : int
-        Joint drawn at or near the pixel, else the one that moves the surface most; -1 for none.
+        Joint drawn at or near the pixel, or else the one with the most influence there; -1 for
+        none.
     vertex : int
         Nearest vertex of the surface; -1 for none.
     part : int
@@ -129,7 +130,7 @@ class Spot:
 def spot_at(
     state: AppState, renderer: Renderer, size: tuple[int, int], pixel: tuple[float, float]
 ) -> Spot | None:
-    """Return the item at a pixel, None for the background; parameters are those of ``vertex_at``.
+    """Return the item at a pixel, None for the background; see ``vertex_at`` for the parameters.
 
     Raises
     ------
@@ -211,16 +212,16 @@ def vertex_at(
     state : AppState
         State with the scene.
     renderer : Renderer
-        Renderer that has drawn it.
+        Renderer that has drawn the scene.
     size : (int, int)
         Size of the view, pixels.
     pixel : (float, float)
-        From its left and upper edge.
+        Distance from the left and upper edges of the view.
 
     Returns
     -------
     (actor, vertex, triangle) or None
-        Indices; the triangle is -1 if the reduced mesh, which has other triangles, is drawn.
+        Indices; the triangle is -1 if the reduced mesh is drawn, which has different triangles.
     """
     options = state.options
     # Only surfaces are picked, even where joints or keypoints are drawn over them.
@@ -289,7 +290,7 @@ def _look_under_mouse(
 
 
 def _click_text(state: AppState, pick: Pick | None) -> tuple[str, ...]:
-    """Return a line with the joint that a click would select; no lines if it would select none."""
+    """Return a line with the joint that a click would select; empty if it would select none."""
     mouse = imgui.get_io().mouse_pos
     if wants_vertex(state.of(Weights)) or pick is None:
         return ()

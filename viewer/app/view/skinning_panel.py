@@ -6,12 +6,12 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
-    button,
     checkbox,
     count_slider,
     disabled,
     explain,
     note_item,
+    offer_files,
     slider,
 )
 from viewer.rig.figure import Figure
@@ -28,9 +28,10 @@ def draw(state: AppState) -> None:
     """Draw the panel for the chosen actor; the settings apply to all actors."""
     figure, skinning = state.actor.figure, state.options.skinning
     if not figure.is_attached:
-        imgui.text_wrapped("This figure has no skin attached to a skeleton.")
-        if button(state, "Open files…##skinning"):
-            state.wants.add("open dialog")
+        offer_files(
+            state,
+            "This figure has no skin attached to a skeleton: open its .skel and .skin together.",
+        )
         return
     _draw_method(state, skinning)
     imgui.separator()
@@ -73,7 +74,7 @@ def _draw_influences(state: AppState, figure: Figure, skinning: Skinning) -> Non
     note_item(state, "engine")
     explain("preview of an engine that supports this many influences per vertex")
     why = "" if skinning.max_influences else "the number of influences is not limited"
-    with disabled(why):
+    with disabled(state, why):
         limits = (1, max(most, _ENGINE))
         chosen = count_slider(state, "Influences", count, limits, flags=_CLAMP)
         explain(f"the file has up to {most} per vertex", why)

@@ -9,6 +9,7 @@ from viewer.phrases import printable
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.scene import Scene
+from viewer.rig.skeleton import shown_joints
 from viewer.rig.skin import influence_counts
 
 __all__ = ["draw"]
@@ -38,7 +39,7 @@ def _counts(figures: tuple[Figure, ...]) -> tuple[tuple[str, str], ...]:
     most = max((int(influence_counts(skin).max()) for skin in skins), default=0)
     return (
         ("Figure", printable(", ".join(figure.name for figure in figures), 60)),
-        ("Joints", f"{sum(skeleton.n_joints for skeleton in skeletons):,}"),
+        ("Joints", f"{sum(len(shown_joints(skeleton)) for skeleton in skeletons):,}"),
         ("DOFs", f"{sum(skeleton.n_dofs for skeleton in skeletons):,}"),
         ("Vertices", f"{sum(mesh.n_vertices for mesh in meshes):,}"),
         ("Triangles", f"{sum(mesh.n_triangles for mesh in meshes):,}"),

@@ -56,10 +56,11 @@ def no_view(state: AppState, key: str) -> str:
 
 
 def start_heat_map(state: AppState) -> None:
-    """Show a scalar quantity as colours, replacing a choice for which nothing would be visible.
+    """Show a scalar quantity as colours; choices that would show nothing are replaced.
 
-    A quantity that no figure has is replaced by an available one; a joint without influence, or
-    none, by the joint with the most; a field that is 0 everywhere by the first one that is not.
+    A quantity that no figure has is replaced by an available one; a missing joint, or one without
+    influence, by the joint with the most influence; a field that is 0 everywhere by the first one
+    that is not.
     """
     options = state.options
     options.shading = "scalar"
@@ -136,7 +137,7 @@ def toggle_vertex_info(state: AppState) -> None:
 
 
 def toggle_picking(state: AppState) -> None:
-    """Switch between clicks that pin vertices and clicks that select actors and joints."""
+    """Switch between pinning vertices and selecting actors and joints by clicks."""
     view = state.of(Weights)
     view.picks_vertices = not view.picks_vertices
     state.say_status(
@@ -154,7 +155,7 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
     actor : int
         Index of the actor in the scene.
     vertex : int
-        Index of the vertex in its figure.
+        Index of the vertex in the figure.
     """
     figure = state.scene.actors[actor].figure
     if not figure.is_attached:

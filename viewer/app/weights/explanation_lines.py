@@ -34,7 +34,7 @@ _palettes: Memo[Skeleton, Bytes] = Memo()
 
 
 def influence_colors(explanation: Explanation, skeleton: Skeleton) -> Floats:
-    """Return the colours of the influences, those of dominant joints: (K, 3), sRGB.
+    """Return the colours of the influences, as for dominant joints: (K, 3), sRGB.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def vertex_annotation(
 def _image_lines(
     vertex: Floats, images: Floats, colors: Floats, weights: Floats, scale: float
 ) -> Segments:
-    """Return a line and a dot for each influence, both with a dark rim; the strongest on top."""
+    """Return a line and a dot for each influence, both with a dark rim; the strongest is on top."""
     strengths = np.clip(np.abs(weights), 0.0, 1.0)
     opacities = _FAINTEST + (1.0 - _FAINTEST) * strengths
     widths = _THINNEST + (_THICKEST - _THINNEST) * strengths
@@ -129,7 +129,7 @@ def _image_lines(
     shades = np.stack([dark, faint, dark, solid], axis=1)
     dot = np.full(count, _DOT)
     thick = scale * np.stack([widths + _BORDER, widths, dot + _RIM, dot], axis=1)
-    # Draw the weakest first; explanations list them last.
+    # The weakest influence is drawn first; explanations list it last.
     order = np.arange(count)[::-1]
     return Segments(
         starts[order].reshape(-1, 3),
@@ -140,7 +140,7 @@ def _image_lines(
 
 
 def draw_hovered(state: AppState) -> None:
-    """Mark the vertex that the hover text describes, in the window only, not in screenshots."""
+    """Mark the vertex that the hover text describes, only in the window, not in screenshots."""
     hover = state.of(Weights).hover
     if not hover.lines:
         return

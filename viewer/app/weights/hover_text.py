@@ -15,7 +15,7 @@ _AWAY = 16.0  # points between the mouse and the text
 
 
 def draw_hover_text(state: AppState) -> None:
-    """Draw the hover text as long as the mouse does not move."""
+    """Draw the hover text while the mouse does not move."""
     hover = state.of(Weights).hover
     mouse = imgui.get_io().mouse_pos
     if not hover.lines or hover.place != (mouse.x, mouse.y) or not shows_vertex_info(state):
@@ -32,7 +32,7 @@ def draw_hover_text(state: AppState) -> None:
 
 
 def shows_vertex_info(state: AppState) -> bool:
-    """Return whether hover text is shown at present."""
+    """Return whether hover text is currently shown."""
     view, io = state.of(Weights), imgui.get_io()
     shows_panel = view.panel_frame == imgui.get_frame_count()
     is_covered = bool(state.error) or state.of(Files).dialog is not None or io.want_capture_mouse

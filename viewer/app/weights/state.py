@@ -81,15 +81,15 @@ class Weights:
     pinned : Pinned or None
         The vertex that is explained.
     draws_lines : bool
-        Whether lines are drawn from it to its images under each joint alone.
+        Whether lines are drawn from the vertex to its images under each joint alone.
     explanation : Explanation or None
-        Its latest explanation.
+        Latest explanation of the vertex.
     explanation_key : object
         Key of the state for which the explanation was computed.
     annotations : tuple of Annotation
-        Its drawing in the view; at most one.
+        Annotation of the vertex in the view; at most one.
     annotation_key : object
-        Key of the state for which the annotation was made.
+        Key of the state for which the annotation was created.
     """
 
     panel_frame: int = -1

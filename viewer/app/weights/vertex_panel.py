@@ -52,8 +52,9 @@ def draw(state: AppState) -> None:
             toggle_picking(state)
         return
     _draw_head(state, explanation)
-    # The horizontal scroll bar keeps numbers readable in the narrowest panel. If the vertical one
-    # were optional, the scaled text could hide it, grow in the space gained, and flicker.
+    # The horizontal scroll bar keeps numbers readable in the narrowest panel. If the vertical
+    # scroll bar were optional, the scaled text could hide it, grow into the freed space, and
+    # flicker.
     bars = imgui.WindowFlags_.horizontal_scrollbar | imgui.WindowFlags_.always_vertical_scrollbar
     if imgui.begin_child("numbers", (0.0, 0.0), 0, bars):
         scale, digits = fitting(imgui.get_content_region_avail().x, imgui.get_font_size())
@@ -106,7 +107,7 @@ class _Sheet:
 
 
 def _draw_steps(sheet: _Sheet, one: Explanation, colors: Floats) -> None:
-    """Draw the steps of the skinning of the vertex in their order."""
+    """Draw the steps of the skinning of the vertex in order."""
     _draw_rest(sheet, one)
     if one.is_free:
         imgui.text_wrapped("No influence: the vertex stays at its bind position.")
@@ -134,7 +135,10 @@ def _draw_head(state: AppState, one: Explanation) -> None:
     explain(with_key(state, "unpin the vertex", "Esc"))
     same_line_if_room("Lines")
     weights.draws_lines = checkbox(state, "Lines", weights.draws_lines)
-    explain("draw lines to the vertex as moved by each joint alone; thicker for larger weights")
+    explain(
+        "draw lines to the vertex as transformed by each joint alone; larger weights have "
+        "thicker lines"
+    )
 
 
 def _draw_rest(sheet: _Sheet, one: Explanation) -> None:
@@ -210,7 +214,7 @@ def _draw_dual(sheet: _Sheet, dual: DualTerms) -> None:
     """Draw the quaternions that dual quaternion skinning adds (Kavan et al. 2008)."""
     imgui.separator_text("Dual quaternions")
     for index, values in enumerate(dual.duals):
-        flip = "" if dual.signs[index] > 0.0 else ", negated to the hemisphere of q1"
+        flip = "" if dual.signs[index] > 0.0 else ", negated into the hemisphere of q1"
         weight = f"{dual.fractions[index]:.{_DIGITS}f}"
         imgui.text_wrapped(f"q{index + 1}: normalised weight {weight}{flip}")
         _draw_quaternions(sheet, f"dual {index}", values)

@@ -52,7 +52,7 @@ def draw(state: AppState) -> None:
     if SCALARS[key].about == "field":
         _draw_fields(state, key)
     _draw_largest(state, key)
-    with disabled("" if options.shading == "scalar" else "the heat map is off"):
+    with disabled(state, "" if options.shading == "scalar" else "the heat map is off"):
         _draw_range(state, key)
         _draw_marks(state, key)
     imgui.separator()
@@ -71,7 +71,7 @@ def _draw_views(state: AppState) -> None:
         return
     for name in SCALARS:
         why = no_view(state, name)
-        with disabled(why):
+        with disabled(state, why):
             # Choosing the current quantity again keeps a joint named on the command line.
             if imgui.selectable(menu_title(name, skinning), name == key)[0]:
                 show_scalar(state, state.options.scalar if name == key else name)
@@ -81,7 +81,7 @@ def _draw_views(state: AppState) -> None:
 
 
 def _draw_joint(state: AppState) -> None:
-    """Draw the name of the joint whose weights are shown, the selected or an explicit one."""
+    """Draw the name of the joint whose weights are shown: the selected joint or an explicit one."""
     joint, named = shown_joint(state), split_name(state.options.scalar)[1]
     if not joint:
         imgui.text_wrapped("Click the skin in the view, or a joint in the tree.")
@@ -90,7 +90,7 @@ def _draw_joint(state: AppState) -> None:
     if named and button(state, "Of the selected joint"):
         state.options.scalar = split_name(state.options.scalar)[0]
     shown = printable(joint, _LONGEST)
-    explain(f"now {shown} is shown, whichever joint is selected" if named else "")
+    explain(f"{shown} is currently shown, regardless of the selected joint" if named else "")
 
 
 def _draw_fields(state: AppState, key: str) -> None:
@@ -118,10 +118,10 @@ def _draw_largest(state: AppState, key: str) -> None:
 
 
 def _draw_range(state: AppState, key: str) -> None:
-    """Draw the choice of the colours' range: automatic, or fixed by two numbers."""
+    """Draw the choice of the colour range: automatic, or fixed by two numbers."""
     options = state.options
     why = "this quantity has one colour per integer" if SCALARS[key].kind in _WHOLE else ""
-    with disabled(why):
+    with disabled(state, why):
         if imgui.radio_button("Automatic", options.scalar_range is None):
             options.scalar_range = None
         note_item(state, "Automatic")
@@ -136,7 +136,7 @@ def _draw_range(state: AppState, key: str) -> None:
         if imgui.radio_button("Fixed", options.scalar_range is not None):
             options.scalar_range = options.scalar_range or _present_range(state)
         note_item(state, "Fixed")
-        explain("the range does not change with the pose; values outside get the end "
+        explain("the range does not change with the pose; values outside it get the end "
                 "colours", why)  # fmt: skip
     if options.scalar_range is not None and not why:
         low, high = options.scalar_range

@@ -19,6 +19,7 @@ from viewer.diagnostics.wording import (
     export,
     fbx,
     gltf,
+    gltf_materials,
     joints,
     kinds,
     loading,
@@ -40,7 +41,7 @@ from viewer.diagnostics.wording import (
 
 TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
-    *(archives, body_models, easymocap, poses, pictures),
+    *(gltf_materials, archives, body_models, easymocap, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
 _CODED = (

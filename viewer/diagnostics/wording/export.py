@@ -57,11 +57,16 @@ MESSAGES = {
     "X003.clip-placement": "the placement of the whole figure is not part of its clip and is "
     "omitted",
     "X003.clip-scale": ".anim cannot store the figure's scale of {scale:g}, which is omitted",
+    "X003.clip-joint-scales": ".anim cannot animate scales of joints ({low:g} to {high:g}), which "
+    "are omitted",
     "X003.clip-translations": ".anim translates only the root: translations of other joints, up to "
     "{length}, are omitted",
     "X003.clip-shape": ".anim stores no shape: the weights of blend shapes are omitted",
     "X003.body-translations": "translations of joints are omitted (up to {distance:.3g} m)",
     "X003.body-scale": "the figure's scale is omitted ({low:.6g} to {high:.6g})",
+    "X003.body-joint-scales": "animated scales of joints are omitted ({low:.6g} to {high:.6g})",
+    "X003.bvh-joint-scales": "BVH cannot animate scales of joints ({low:g} to {high:g}): only the "
+    "positions of joints follow them",
     "X003.rigged-correctives": "pose correctives cannot be stored in .skel and .skin: the rest "
     "mesh is adjusted to match the target without them",
     "X003.empty-mesh": "the mesh has no vertices and is omitted",
@@ -175,6 +180,8 @@ PHRASES = {
     "part-unlit": "unlit surfaces",
     "part-single-sided": "single-sided surfaces",
     "part-second-uvs": "second texture coordinates",
+    "part-vertex-colors": "vertex colours",
+    "part-mesh-parts": "names of its parts",
     "part-texture-rotation": "rotated or mirrored textures",
     "part-unfiltered": "unfiltered textures",
 }

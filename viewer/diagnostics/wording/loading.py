@@ -10,6 +10,8 @@ MESSAGES = {
     "B001.joints": "expected {joints:#bind matrix}, one per joint of {skeleton:text}, found {n}",
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
     "F002.no-body-model": "--model: not a body model",
+    "F004.animation": "no animation is called {name:quoted}; {hint}",
+    "F004.no-animations": "no animation is called {name:quoted}: the files have none",
     "F004.capture": "{problem}; specify the model with --model",
     "F004.capture-of-member": "{problem}; specify a {member} model with --model",
     "F004.clip-alone": "a clip without a skeleton: open it together with its .skel",

@@ -65,11 +65,9 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
     }
     if mesh.uvs is not None and len(mesh.uvs):
         # In glTF, the first image row is at v = 0, in this program at v = 1.
-        uvs = mesh.uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
-        attributes["TEXCOORD_0"] = document.array(uvs, "VEC2", VERTICES)
-        if mesh.second_uvs is not None:
-            uvs = mesh.second_uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
-            attributes["TEXCOORD_1"] = document.array(uvs, "VEC2", VERTICES)
+        for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
+            flipped = uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
+            attributes[f"TEXCOORD_{number}"] = document.array(flipped, "VEC2", VERTICES)
     return attributes
 
 

@@ -21,12 +21,18 @@ def moving(skeleton: Skeleton, frames: Frames) -> Bools:
     return np.asarray((np.ptp(frames.translations, axis=0) > _NOISE * size).any(axis=1))
 
 
+def scaling(frames: Frames) -> Bools:
+    """Return which joints change their scale: (J,) bool."""
+    return np.asarray((np.ptp(frames.scales, axis=0) > _NOISE).any(axis=1))
+
+
 def still_locals(skeleton: Skeleton, rest: Locals, frames: Frames) -> Locals:
-    """Return the rest pose; joints whose translation is constant have that translation."""
+    """Return the rest pose, with constant translations and scales of joints."""
     there = skeleton.rest_translations + frames.translations[0]
     chosen = moving(skeleton, frames)[:, None]
     translations = np.where(chosen, rest.translations, there)
-    return Locals(translations, rest.rotations, skeleton.rest_scales)
+    scales = np.where(scaling(frames)[:, None], rest.scales, frames.scales[0])
+    return Locals(translations, rest.rotations, scales)
 
 
 def add_animation(
@@ -38,7 +44,7 @@ def add_animation(
     tree: Tree,
     morph: tuple[int, Floats] | None,
 ) -> int:
-    """Add rotations of all joints, translations where they change, and the figure's placement.
+    """Add rotations of all joints, other properties where they change, and the figure's placement.
 
     Quaternions have the sign nearest to the previous frame, since some programs interpolate
     components.
@@ -66,6 +72,11 @@ def add_animation(
         outputs = document.arrays(np.swapaxes(places, 0, 1), "VEC3")
         for joint, output in zip(moves, outputs, strict=True):
             keys.add(tree.joints[joint], "translation", output)
+    stretches = np.flatnonzero(scaling(frames))
+    if len(stretches):
+        outputs = document.arrays(np.swapaxes(frames.scales[:, stretches], 0, 1), "VEC3")
+        for joint, output in zip(stretches, outputs, strict=True):
+            keys.add(tree.joints[joint], "scale", output)
     if np.ptp(frames.figure_translations, axis=0).any():
         keys.add(tree.place, "translation", document.array(frames.figure_translations, "VEC3"))
     if np.ptp(frames.figure_scales):

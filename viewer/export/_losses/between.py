@@ -17,6 +17,7 @@ from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skinning import Skinning
 
 _ON_FRAME = 1e-6  # tolerance in frames for a time to be on a frame
@@ -41,6 +42,7 @@ def resampling_losses(path: Path, animation: SampledAnimation, how: Skinning) ->
         frames.figure_translations,
         frames.figure_scales,
         frames.shape_weights,
+        frames.scales,
     )
     first = frames.times[0]
 
@@ -59,7 +61,7 @@ def between_losses(
 ) -> list[Diagnostic]:
     """Return a note with the largest errors between an animation's frames, if there are any.
 
-    Keyframed curves are searched for the times of the largest error. A capture is defined only at
+    Keys are searched for the times of the largest error. A capture is defined only at
     its own frames, and is compared there.
 
     ``path``: the written file.
@@ -69,7 +71,7 @@ def between_losses(
     ``also`` (T,): additional times at which captures are compared, seconds.
     """
     estimate: Phrase | str = ""
-    if isinstance(animation.motion, Clip):
+    if isinstance(animation.motion, Clip | TransformClip):
         edges = np.union1d(
             animation.frames.times,
             key_times(animation.motion, *animation.frames.times[[0, -1]].tolist()),

@@ -26,6 +26,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import SHORTEST, Channel, Clip
 from viewer.rig.motion.evaluation import Frames
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.skinning import Skinning
 
 Sampler = Callable[[Floats], Frames]
@@ -64,9 +65,12 @@ class WorstTimes:
     is_estimate: bool
 
 
-def key_times(clip: Clip, start: float, stop: float) -> Floats:
+def key_times(clip: Clip | TransformClip, start: float, stop: float) -> Floats:
     """Return the times of all keys within a range, including repetitions of curves, seconds."""
-    every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
+    if isinstance(clip, Clip):
+        every = [_repeated(channel, start, stop) for channel in clip.channels if len(channel.times)]
+    else:
+        every = [channel.times for channel in clip.channels]
     times = np.unique(np.concatenate([np.zeros(0), *every]))
     return times[(times > start) & (times < stop)]
 

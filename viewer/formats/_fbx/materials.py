@@ -42,7 +42,7 @@ def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[
         return Texture(
             name,
             pictures[number],
-            uv_set=min(place, 1),
+            uv_set=place,
             transform=matrix[:2][:, [0, 1, 3]],
             wrap=tuple(stated["wrap"]),
         )

@@ -16,8 +16,6 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Placed", "mesh_on_node", "skin_of"]
 
-_MOST_UV_SETS = 2
-
 
 @dataclass(frozen=True, slots=True)
 class Placed:
@@ -96,7 +94,7 @@ def _slots(arrays: Arrays, placed: Placed) -> Ints:
 
 def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
     """Return the names of the attributes per corner that the mesh has."""
-    sets = range(min(len(placed.told["uv_sets"]), _MOST_UV_SETS))
+    sets = range(len(placed.told["uv_sets"]))
     names = ["normals", "colors", *(f"uvs{row}" for row in sets)]
     return [name for name in names if f"{placed.prefix}.{name}" in arrays]
 
@@ -204,12 +202,12 @@ def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
 
 
 def _with_bone(get: Any) -> NDArray[np.bool_]:
-    """Return which clusters have a joint."""
+    """Return a mask of the clusters that have a joint."""
     return get("bones") >= 0
 
 
 def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -> NodeSkin | None:
-    """Return the skin of a mesh, and say what of it is not used."""
+    """Return the skin of a mesh, and record which parts of it are not used."""
     if told["skin"] is None:
         return None
     get = _getter(arrays, f"{prefix}.skin")

@@ -1,4 +1,4 @@
-"""Animations of a glTF document: names, ranges and nodes at once, keys when they are played."""
+"""Animations of a glTF document: names, ranges and nodes are read at once, keys when played."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SAME_TIME = 1e-4  # s; decimals of times in JSON
 
 @dataclass(slots=True)
 class _Unused:
-    """Channels that move nothing that is shown."""
+    """Channels without visible effect."""
 
     n: int = 0
     names: dict[str, None] = field(default_factory=dict)
@@ -30,9 +30,9 @@ class _Unused:
 
 
 def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation, ...]:
-    """Return the animations that are valid as far as their keys need not be read.
+    """Return the animations that are valid, except for keys that are read later.
 
-    An invalid animation is left out with a warning. The keys of the first one are read, because
+    An invalid animation is omitted with a warning. The keys of the first one are read, because
     it is the one that is played by default; those of all are if errors are kept.
     """
     table = document.table("animations")
@@ -94,7 +94,7 @@ def _channels(
 def _plain_channels(
     channels: list[Any], samplers: list[Any], targets: Targets
 ) -> tuple[set[int], set[int]] | None:
-    """Return the nodes and the accessors of times of channels as nearly all files have them.
+    """Return the nodes and the time accessors of channels in the form that nearly all files use.
 
     None if any channel is invalid or unusual. Files have tens of thousands of channels, so this
     takes less time than parsing them did.
@@ -115,7 +115,7 @@ def _plain_channels(
 def _any_channels(
     document: Document, targets: Targets, animation: Element, unused: _Unused
 ) -> tuple[set[int], set[int]]:
-    """Return the nodes and the accessors of times of any channels; raises FormatError."""
+    """Return the nodes and the time accessors of any channels; raises FormatError."""
     channels, samplers = animation.table("channels"), animation.table("samplers")
     nodes: set[int] = set()
     inputs: set[int] = set()

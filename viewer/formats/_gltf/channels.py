@@ -32,7 +32,7 @@ class _Reading:
 def read_channels(
     document: Document, targets: Targets, animation: Element
 ) -> tuple[NodeChannel, ...]:
-    """Return the channels of an animation that move something that is shown.
+    """Return the channels of an animation that have a visible effect.
 
     Raises
     ------

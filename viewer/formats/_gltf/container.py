@@ -38,7 +38,7 @@ class Container:
     root : dict
         Parsed JSON.
     binary : memoryview or None
-        Contents of the binary chunk, with its padding; None without one.
+        Contents of the binary chunk, with its padding; None if there is none.
     """
 
     root: dict[str, Any]

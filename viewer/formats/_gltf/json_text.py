@@ -34,7 +34,7 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     Raises
     ------
     FormatError
-        If it is no valid JSON object.
+        If it is not a valid JSON object.
     """
     text = _text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []

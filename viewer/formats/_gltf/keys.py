@@ -71,7 +71,7 @@ def read_keys(
     sampler : Element
         A sampler.
     times : (N,)
-        Its times; the last of several keys at the same time counts.
+        Times of the keys; of several keys at the same time, the last one counts.
     path : str
         Property that it moves.
     n_shapes : int
@@ -80,7 +80,7 @@ def read_keys(
     Raises
     ------
     FormatError
-        If the values are malformed, too many or too few, not finite, or no rotations.
+        If the values are malformed, too many or too few, not finite, or not rotations.
     """
     names = tuple(_INTERPOLATIONS)
     interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]

@@ -44,7 +44,7 @@ def _skin(document: Document, skin: Element) -> NodeSkin:
 
 
 def _inverse_bind(document: Document, skin: Element, n_joints: int) -> Floats:
-    """Return one matrix per joint; identities without any."""
+    """Return one matrix per joint; identities if there are none."""
     name = "inverseBindMatrices"
     accessor = skin.index(name, len(document.accessors), "accessors")
     if accessor < 0:

@@ -71,7 +71,7 @@ def shape_weights(mesh: Element, count: int) -> Floats:
     Raises
     ------
     FormatError
-        If they are no numbers.
+        If they are not numbers.
     """
     weights = mesh.numbers("weights")
     return np.zeros(count) if weights is None else _fitted(mesh, weights, count)
@@ -97,7 +97,7 @@ def _fitted(element: Element, weights: Floats, count: int) -> Floats:
 
 
 def target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
-    """Return the names of the morph targets, empty strings without.
+    """Return the names of the morph targets; empty strings if there are none.
 
     Names are application data: of the mesh, of a primitive, or of the targets themselves.
     """
@@ -117,6 +117,6 @@ def _listed(element: Element) -> list[Any]:
 
 
 def _extra(values: Any, name: str) -> Any:
-    """Return application data of an object; None without."""
+    """Return application data of an object; None if there is none."""
     extras = values.get("extras") if type(values) is dict else None
     return extras.get(name) if type(extras) is dict else None

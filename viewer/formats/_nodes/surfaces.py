@@ -1,4 +1,4 @@
-"""One mesh and skin made of all meshes of a figure, in its binding space."""
+"""One mesh and skin made from all meshes of a figure, in its binding space."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Piece:
     influences : Influences
         Of the V vertices.
     sources : (V,) int32
-        Vertex of the primitive that each vertex is a copy of: flat shading splits vertices.
+        Vertex of the primitive of which each vertex is a copy: flat shading splits vertices.
     triangles : (T, 3) int32
         Of the piece's vertices, counter-clockwise from outside in binding space.
     normals : (V, 3)
@@ -111,7 +111,7 @@ def _counted_as(split: Influences, whole: Influences) -> Influences:
 
 
 def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
-    """Return the mesh of a figure; what only some primitives have is filled with neutral values.
+    """Return the mesh of a figure; attributes of only some primitives get neutral values elsewhere.
 
     Parameters
     ----------
@@ -128,12 +128,13 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     counts = [len(piece.triangles) for piece in pieces]
     used = sorted({piece.primitive.material for piece in pieces} - {-1})
     slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
+    uvs = _uv_sets(pieces)
     return Mesh(
         positions=np.concatenate([_positions(piece) for piece in pieces]),
         normals=np.concatenate([_normals(piece) for piece in pieces]),
         triangles=triangles.astype(np.int32),
-        uvs=_filled(pieces, lambda primitive: _uv_set(primitive, 0), np.zeros(2)),
-        second_uvs=_filled(pieces, lambda primitive: _uv_set(primitive, 1), np.zeros(2)),
+        uvs=uvs[0] if uvs else None,
+        other_uvs=uvs[1:],
         colors=_filled(pieces, lambda primitive: primitive.colors, np.ones(4)),
         materials=tuple(file.materials[material] for material in used),
         triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
@@ -143,7 +144,7 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
 
 
 def part_name(file: NodeFile, node: int) -> str:
-    """Return the name of a node's part: that of the node, else of its mesh."""
+    """Return the name of a node's part: that of the node, or of its mesh."""
     return file.tree.names[node] or file.meshes[int(file.tree.meshes[node])].name
 
 
@@ -156,14 +157,21 @@ def _normals(piece: Piece) -> Floats:
     return piece.normals @ np.linalg.inv(piece.baked[:3, :3])
 
 
-def _uv_set(primitive: Primitive, index: int) -> Floats | None:
-    return primitive.uvs[index] if index < len(primitive.uvs) else None
+def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
+    """Return every set of texture coordinates that a primitive has: (V, 2) each."""
+    count = max(len(piece.primitive.uvs) for piece in pieces)
+
+    def of(index: int) -> Callable[[Primitive], Floats | None]:
+        return lambda primitive: primitive.uvs[index] if index < len(primitive.uvs) else None
+
+    sets = (_filled(pieces, of(index), np.zeros(2)) for index in range(count))
+    return tuple(values for values in sets if values is not None)
 
 
 def _filled(
     pieces: list[Piece], values_of: Callable[[Primitive], Floats | None], neutral: Floats
 ) -> Floats | None:
-    """Return values per vertex, neutral where a primitive has none; None if none has any."""
+    """Return values per vertex, neutral for primitives without any; None if all lack them."""
     given = [values_of(piece.primitive) for piece in pieces]
     if all(values is None for values in given):
         return None

@@ -1,4 +1,4 @@
-"""Instances of the shapes that a skeleton is drawn with, moved by its joint matrices."""
+"""Instances of the shapes of a skeleton, moved by its joint matrices."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class BoneBuffers:
     context : moderngl.Context
         The context in use.
     skeleton : Skeleton
-        In its rest pose, which determines directions and sizes of ends without a child.
+        Skeleton in its rest pose, which determines directions and sizes of ends without a child.
     style : str
         ``"octahedra"``, ``"sticks"`` or ``"axes"``.
     """
@@ -128,11 +128,11 @@ def _axes(links: BoneLinks, n_joints: int) -> list[tuple[Floats, _Rows]]:
     """Return arrows along the axes of each joint, and thin sticks between joints."""
     thin = _bone_rows(links, n_joints, _THIN_STICK)
     thin = _Rows(thin.links, thin.ends, thin.widths, np.full_like(thin.colors, _GREY))
-    joints = np.repeat(np.arange(n_joints), 3)
-    axes = np.tile(np.arange(3), n_joints)
-    ids = np.stack([joints, np.full(3 * n_joints, -1), axes], axis=1).astype(np.int32)
-    ends = np.hstack([np.eye(3)[axes], np.repeat(links.axis_lengths, 3)[:, None]])
-    colors = np.repeat(joint_colors(n_joints), 3, axis=0)
+    joints = np.repeat(links.joints, 3)
+    axes = np.tile(np.arange(3), len(links.joints))
+    ids = np.stack([joints, np.full(len(joints), -1), axes], axis=1).astype(np.int32)
+    ends = np.hstack([np.eye(3)[axes], links.axis_lengths[joints, None]])
+    colors = joint_colors(n_joints)[joints]
     arrows = _Rows(ids, ends, _widths(links, len(ids), _ARROW), colors)
     balls = _ball_parts(links, n_joints, _ARROW, 1.6)
     return [(stick(), thin), (arrow(), arrows), *balls]
@@ -164,7 +164,9 @@ def _ball_parts(
     share, low, high = sizes
     widths = np.clip(share * links.longest, low * links.size, high * links.size)
     radii = factor * np.minimum(widths, np.where(links.longest > 0.0, 0.3 * links.longest, np.inf))
-    ids = np.zeros((n_joints, 3), dtype=np.int32)
-    ids[:, 0], ids[:, 1] = np.arange(n_joints), _BALL
-    sizes_of = np.repeat(radii[:, None], 3, axis=1)
-    return [(ball(), _Rows(ids, np.zeros((n_joints, 4)), sizes_of, joint_colors(n_joints)))]
+    joints, count = links.joints, len(links.joints)
+    ids = np.zeros((count, 3), dtype=np.int32)
+    ids[:, 0], ids[:, 1] = joints, _BALL
+    sizes_of = np.repeat(radii[joints, None], 3, axis=1)
+    colors = joint_colors(n_joints)[joints]
+    return [(ball(), _Rows(ids, np.zeros((count, 4)), sizes_of, colors))]

@@ -11,11 +11,11 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import rest_pose
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
 
 __all__ = ["BoneLinks", "bone_links"]
 
-_END = 0.4  # length of an end, relative to the bone before it
+_END = 0.4  # length of an end, relative to the previous bone
 _END_LIMITS = 0.01, 0.07  # minimum and maximum, relative to the figure's size
 _AXIS = 0.4  # length of axes, relative to the shortest bone at the joint
 _AXIS_LIMITS = 0.008, 0.06  # minimum and maximum, relative to the figure's size
@@ -29,8 +29,10 @@ class BoneLinks:
 
     Attributes
     ----------
+    joints : (K,) int32
+        Joints that are drawn.
     ids : (N, 3) int32
-        Joint; its child, -1 for an end; the joint's axis that lies most across the bone.
+        Joint; its child, -1 for an end; the joint's axis that is most perpendicular to the bone.
     ends : (N, 4)
         For an end, its direction in joint space and its length in figure units; otherwise 0.
     longest : (J,)
@@ -38,9 +40,10 @@ class BoneLinks:
     axis_lengths : (J,)
         Length of the axes drawn at each joint, figure units.
     size : float
-        Size that widths are derived from, figure units.
+        Size from which widths are derived, figure units.
     """
 
+    joints: Ints
     ids: Ints
     ends: Floats
     longest: Floats
@@ -51,9 +54,9 @@ class BoneLinks:
 def bone_links(skeleton: Skeleton) -> BoneLinks:
     """Return the links of a skeleton.
 
-    A joint with several children has a bone to each. One without children has a short end in the
-    direction of the bone before it if it can rotate, so that its rotation is visible. Bones between
-    coincident joints have length 0.
+    A joint with several children has a bone to each. A joint without children has a short end in
+    the direction of the previous bone if it can rotate, so that its rotation is visible. Bones
+    between coincident joints have length 0.
 
     Parameters
     ----------
@@ -62,14 +65,14 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     """
     worlds = world_matrices(skeleton, rest_pose(skeleton))
     points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
-    parents = np.asarray(skeleton.parents)
-    children = np.flatnonzero(parents >= 0)
+    parents, drawn = shown_parents(skeleton), shown_joints(skeleton)
+    children = drawn[parents[drawn] >= 0]
     above = parents[children]
     spans = points[children] - points[above]
     lengths = np.linalg.norm(spans, axis=1)
-    size = _size(points, lengths)
+    size = _size(points[drawn], lengths)
     lengths = np.where(lengths > _SAME * size, lengths, 0.0)
-    ends = _end_joints(skeleton)
+    ends = _end_joints(skeleton, above)
     ways, reach = _ends(points, parents, ends, axes, size)
     joints = np.concatenate([above, ends])
     along = np.abs(np.einsum("nka,na->nk", axes[joints], np.concatenate([unit(spans), ways])))
@@ -84,20 +87,20 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
         np.maximum.at(longest, beside, lengths)
         np.minimum.at(nearest, beside, np.where(lengths > 0.0, lengths, np.inf))
     shown = np.clip(_AXIS * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
-    return BoneLinks(ids.astype(np.int32), free, longest, shown, size)
+    return BoneLinks(drawn, ids.astype(np.int32), free, longest, shown, size)
 
 
 def _size(points: Floats, lengths: Floats) -> float:
-    """Return the size of a figure, without a root that is far from everything else."""
+    """Return the size of a figure, excluding a root that is far from everything else."""
     whole = box_size(bounding_box(points))
     long = float(np.quantile(lengths, 0.9)) if len(lengths) else 0.0
     return (min(whole, _REACH * long) if long > 0.0 else whole) or 1.0
 
 
-def _end_joints(skeleton: Skeleton) -> Ints:
-    """Return the joints without children that can rotate."""
+def _end_joints(skeleton: Skeleton, above: Ints) -> Ints:
+    """Return the joints that can rotate and are not among the parents of others."""
     is_end = np.ones(skeleton.n_joints, dtype=bool)
-    is_end[skeleton.parents[skeleton.parents >= 0]] = False
+    is_end[above] = False
     turns = np.zeros(skeleton.n_joints, dtype=bool)
     turns[skeleton.dof_joints[(skeleton.dof_kinds >= 3) & ~skeleton.locked]] = True
     return np.flatnonzero(is_end & turns).astype(np.int32)

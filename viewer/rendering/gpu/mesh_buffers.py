@@ -10,7 +10,7 @@ import numpy as np
 from viewer.rendering.gpu.index_sets import IndexSet, index_set, kept_triangles
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
-from viewer.rendering.gpu.surfaces import needs_materials, upload_surfaces
+from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
 from viewer.rendering.gpu.upload import buffer, float32, offset_texture
 from viewer.rendering.part_colors import part_colors
 from viewer.rig.arrays import Floats, Ints
@@ -26,16 +26,16 @@ _MOST_VISIBLE = 64  # combinations of hidden parts whose runs are kept
 class MeshBuffers:
     """Rest vertices, triangle indices, influences and textures of one figure.
 
-    Along texture seams a vertex is uploaded once per texture coordinate, as several split vertices.
-    Positions are stored relative to the centre of the mesh, so that float32 keeps its precision
-    however far the mesh is from the origin.
+    Along texture seams, a vertex is uploaded once per texture coordinate, as several split
+    vertices. Positions are stored relative to the centre of the mesh, so that float32 keeps its
+    precision even if the mesh is far from the origin.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use; ``release`` frees all buffers.
     figure : Figure
-        A figure with a mesh.
+        Figure with a mesh.
     notes : list of str
         Receives messages about limitations of the driver.
 
@@ -48,9 +48,9 @@ class MeshBuffers:
     copies : (V,) int32
         One split vertex for each vertex of the figure.
     surfaces : list of Surface
-        Of each material.
+        Surface of each material.
     has_materials : bool
-        Whether any of these has more than a base colour texture.
+        Whether any surface has more than a base colour texture.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
@@ -79,18 +79,23 @@ class MeshBuffers:
         self.uvs: moderngl.Buffer | None = None
         if mesh.uvs is not None and len(mesh.uvs):
             self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
-        self.second_uvs: moderngl.Buffer | None = None
-        if mesh.second_uvs is not None and self.uvs is not None:
-            self.second_uvs = keep(buffer(self.context, mesh.second_uvs[uv_indices], "f4"))
-        self.has_materials = needs_materials(mesh.materials)
+        sets = drawn_sets(mesh, notes)
+        self.other_uvs: moderngl.Buffer | None = None
+        if self.uvs is not None and len(sets) > 1:
+            rows = np.zeros((len(uv_indices), 4), "f4")
+            for slot, number in enumerate(sets[1:]):
+                rows[:, 2 * slot : 2 * slot + 2] = mesh.other_uvs[number - 1][uv_indices]
+            self.other_uvs = keep(buffer(self.context, rows, "f4"))
+        self.tints = None if mesh.colors is None else self.upload(mesh.colors)
+        self.has_materials = needs_materials(mesh)
         self.surfaces = upload_surfaces(
-            self.context, mesh.materials, self.uvs is not None, notes, self._owner
+            self.context, mesh.materials, sets if self.uvs is not None else (), notes, self._owner
         )
         self.index_set(False, ())
         self.skin(Skinning())
 
     def upload(self, rows: Floats) -> moderngl.Buffer:
-        """Return a buffer with the row of its vertex, from (V, 3), for every split vertex."""
+        """Return a buffer with a row per split vertex, copied from rows (V, 3) per vertex."""
         return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
 
     def index_set(
@@ -158,7 +163,7 @@ class MeshBuffers:
 
     @property
     def is_physical(self) -> bool:
-        """Whether a material is described by metallic and roughness."""
+        """Whether a material is described by metalness and roughness."""
         return any(surface.is_physical for surface in self.surfaces)
 
     @property

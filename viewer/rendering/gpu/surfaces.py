@@ -14,8 +14,9 @@ from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import picture_texture
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Texture
+from viewer.rig.mesh import Mesh
 
-__all__ = ["PLAIN", "SAMPLERS", "Surface", "needs_materials", "upload_surfaces"]
+__all__ = ["PLAIN", "SAMPLERS", "Surface", "drawn_sets", "needs_materials", "upload_surfaces"]
 
 SAMPLERS = {
     "u_texture": 5,
@@ -25,9 +26,10 @@ SAMPLERS = {
     "u_occlusion_map": 11,
     "u_emissive_map": 12,
 }
-"""Texture unit of each entry of ``TEXTURES``; lower ones are the skinning shader's."""
+"""Texture unit of each entry of ``TEXTURES``; the skinning shader uses lower units."""
 
 _UNITS = tuple(SAMPLERS.values())
+_MOST_SETS = 3  # sets of texture coordinates that one figure's textures may use
 _COLORS = ("base_texture", "emissive_texture")  # sRGB
 _UNTEXTURED: dict[str, Any] = {
     "u_textured": False,
@@ -41,7 +43,7 @@ _UNTEXTURED: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """How the triangles of one material are drawn.
+    """Drawing properties of the triangles of one material.
 
     Attributes
     ----------
@@ -50,7 +52,7 @@ class Surface:
     untextured : dict
         Uniforms that differ while textures are off.
     textures : tuple of (unit, texture)
-        Bound before the triangles are drawn.
+        Textures to bind before the triangles are drawn.
     is_physical : bool
         Whether the material has its own metallic and roughness values.
     is_blended : bool
@@ -59,7 +61,7 @@ class Surface:
         Whether back faces are drawn.
     """
 
-    uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}))
+    uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}, ()))
     untextured: dict[str, Any] = field(default_factory=dict)
     textures: tuple[tuple[int, moderngl.Texture], ...] = ()
     is_physical: bool = False
@@ -76,19 +78,44 @@ class Surface:
             texture.use(unit)
 
 
-def needs_materials(materials: Sequence[Material]) -> bool:
-    """Return whether a material has more than a plain base colour texture, see ``MATERIALS``."""
-    return any(
+def needs_materials(mesh: Mesh) -> bool:
+    """Return whether a mesh has more than plain base colour textures, see ``MATERIALS``."""
+    return mesh.colors is not None or any(
         not material.is_plain
         or (material.base_texture is not None and "mirror" in material.base_texture.wrap)
-        for material in materials
+        for material in mesh.materials
     )
+
+
+def drawn_sets(mesh: Mesh, notes: list[str]) -> tuple[int, ...]:
+    """Return the sets of texture coordinates that are drawn, the first set first.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Sets that no texture uses are left out.
+    notes : list of str
+        Receives a message if textures use more sets than can be drawn.
+    """
+    used = {
+        texture.uv_set
+        for material in mesh.materials
+        for texture in material.textures.values()
+        if texture.image is not None and 0 < texture.uv_set <= len(mesh.other_uvs)
+    }
+    sets = (0, *sorted(used))
+    if len(sets) > _MOST_SETS:
+        notes.append(
+            f"textures use {len(sets)} sets of texture coordinates; those that use set "
+            f"{sets[_MOST_SETS]} or a higher one are not drawn"
+        )
+    return sets[:_MOST_SETS]
 
 
 def upload_surfaces(
     context: moderngl.Context,
     materials: Sequence[Material],
-    has_uvs: bool,
+    sets: Sequence[int],
     notes: list[str],
     owner: Owner,
 ) -> list[Surface]:
@@ -100,8 +127,8 @@ def upload_surfaces(
         The context in use.
     materials : sequence of Material
         Materials of one mesh.
-    has_uvs : bool
-        Whether the mesh has texture coordinates.
+    sets : sequence of int
+        Sets of texture coordinates that are drawn; textures of other sets are left out.
     notes : list of str
         Receives messages about limitations of the driver.
     owner : Owner
@@ -111,31 +138,33 @@ def upload_surfaces(
     surfaces = []
     for material in materials:
         found: dict[str, moderngl.Texture] = {}
-        for name, texture in material.textures.items() if has_uvs else ():
-            if texture.image is None:
+        for name, texture in material.textures.items():
+            if texture.image is None or texture.uv_set not in sets:
                 continue
             is_linear = name not in _COLORS
-            key = id(texture.image), is_linear, texture.wrap, texture.is_smooth
+            filters = texture.is_smooth, texture.minification
+            key = id(texture.image), is_linear, texture.wrap, filters
             if key not in made:
                 made[key] = owner.keep(_upload(context, texture, is_linear, notes))
             found[name] = made[key]
-        surfaces.append(_surface(material, found))
+        surfaces.append(_surface(material, found, sets))
     return surfaces
 
 
 def _upload(
     context: moderngl.Context, texture: Texture, is_linear: bool, notes: list[str]
 ) -> moderngl.Texture:
-    assert texture.image is not None  # the caller looked
+    assert texture.image is not None  # checked by the caller
     made = picture_texture(context, _mirrored(texture.image, texture.wrap), notes, is_linear)
     made.repeat_x, made.repeat_y = (side != "clamp" for side in texture.wrap)
-    if not texture.is_smooth:
-        made.filter = (moderngl.NEAREST_MIPMAP_LINEAR, moderngl.NEAREST)
+    usual = "linear_mipmap_linear" if texture.is_smooth else "nearest_mipmap_linear"
+    minified = getattr(moderngl, (texture.minification or usual).upper())
+    made.filter = minified, moderngl.LINEAR if texture.is_smooth else moderngl.NEAREST
     return made
 
 
 def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
-    """Return an image next to its mirror image: moderngl lacks the mirrored repeat mode."""
+    """Return an image joined with its mirror image: moderngl lacks the mirrored repeat mode."""
     if wrap[0] == "mirror":
         image = np.concatenate([image, image[:, ::-1]], axis=1)
     if wrap[1] == "mirror":
@@ -144,13 +173,15 @@ def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
     return image
 
 
-def _surface(material: Material, textures: dict[str, moderngl.Texture]) -> Surface:
+def _surface(
+    material: Material, textures: dict[str, moderngl.Texture], sets: Sequence[int]
+) -> Surface:
     units = dict(zip(TEXTURES, _UNITS, strict=True))
     untextured: dict[str, Any] = dict(_UNTEXTURED)
     if material.base_texture is not None:
         untextured["u_has_base_factor"] = False
     return Surface(
-        uniforms=_uniforms(material, textures),
+        uniforms=_uniforms(material, textures, sets),
         untextured=untextured,
         textures=tuple((units[name], texture) for name, texture in textures.items()),
         is_physical=material.is_physical,
@@ -159,10 +190,13 @@ def _surface(material: Material, textures: dict[str, moderngl.Texture]) -> Surfa
     )
 
 
-def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict[str, Any]:
+def _uniforms(
+    material: Material, textures: dict[str, moderngl.Texture], sets: Sequence[int]
+) -> dict[str, Any]:
     """Return all uniforms of a material, since programs keep the values of the previous one."""
     placed = [getattr(material, name) or Texture("") for name in TEXTURES]
     channels = np.eye(4, dtype="f4")[[texture.channel for texture in placed]]
+    slots = [sets.index(one.uv_set) if one.uv_set in sets else 0 for one in placed]
     values: dict[str, Any] = {
         "u_textured": "base_texture" in textures,
         "u_base_factor": material.base_color or (1.0, 1.0, 1.0, 1.0),
@@ -170,7 +204,7 @@ def _uniforms(material: Material, textures: dict[str, moderngl.Texture]) -> dict
         "u_alpha_mode": ALPHA_MODES.index(material.alpha_mode),
         "u_alpha_cutoff": material.alpha_cutoff,
         "u_places": np.stack([_place(texture) for texture in placed]).tobytes(),
-        "u_uv_sets": np.array([texture.uv_set for texture in placed], dtype="i4").tobytes(),
+        "u_uv_sets": np.array(slots, dtype="i4").tobytes(),
         "u_channels": channels.tobytes(),
         "u_has_metallic_map": "metallic_texture" in textures,
         "u_has_roughness_map": "roughness_texture" in textures,

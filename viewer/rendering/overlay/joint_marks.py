@@ -1,4 +1,4 @@
-"""Joint marks drawn over the image: X-ray bones and axes; and the joint at a pixel."""
+"""Joint marks drawn over the image (X-ray bones and axes), and the joint at a pixel."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
 from viewer.rendering.projection import picture_scale, project, project_segments
-from viewer.rendering.srgb import encode_srgb
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
@@ -19,7 +18,8 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
+from viewer.rig.srgb import encode_srgb
 
 __all__ = [
     "HIGHLIGHT",
@@ -66,6 +66,13 @@ class JointMarks:
         """Positions of the joints, (J, 3), scene space."""
         return self.matrices[:, :3, 3]
 
+    @property
+    def bones(self) -> tuple[Ints, Ints]:
+        """Shown joints with a parent, and these parents: (N,) and (N,)."""
+        parents, shown = shown_parents(self.skeleton), shown_joints(self.skeleton)
+        children = shown[parents[shown] >= 0]
+        return children, parents[children]
+
 
 def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
     """Return the joints of all drawn actors that have a skeleton."""
@@ -94,9 +101,7 @@ def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
     scale : float
         Scale of the marks relative to their standard size.
     """
-    parents = marks.skeleton.parents
-    children = np.flatnonzero(parents >= 0)
-    points, above = marks.points, parents[children]
+    points, (children, above) = marks.points, marks.bones
     colors = _colors(marks.skeleton, selected)[above]
     # A dark outline makes each bone visible on any background.
     starts = np.concatenate([points[above], points[above]])
@@ -109,11 +114,12 @@ def bone_segments(marks: JointMarks, selected: int, scale: float) -> Segments:
 
 def joint_dots(marks: JointMarks, selected: int, scale: float) -> list[Segments]:
     """Return a dark-rimmed dot at each joint; the parameters are those of ``bone_segments``."""
-    colors, points = _colors(marks.skeleton, selected), marks.points
+    shown = shown_joints(marks.skeleton)
+    colors, points = _colors(marks.skeleton, selected)[shown], marks.points[shown]
     parts = [dots(points, np.array(_DARK), scale * (_DOT + _OUTLINE))]
     parts.append(dots(points, colors, scale * _DOT))
     if selected >= 0:
-        chosen = points[selected : selected + 1]
+        chosen = marks.points[selected : selected + 1]
         parts.append(dots(chosen, np.array(_DARK), scale * (1.5 * _DOT + _OUTLINE)))
         parts.append(dots(chosen, np.array(HIGHLIGHT), scale * 1.5 * _DOT))
     return parts
@@ -132,9 +138,10 @@ def axis_segments(marks: JointMarks, scale: float) -> Segments:
     scale : float
         Scale of the marks relative to their standard size.
     """
-    points, count = marks.points, len(marks.points)
-    lengths = _axis_lengths(points, marks.skeleton)
-    axes = unit(np.swapaxes(marks.matrices[:, :3, :3], 1, 2))
+    shown = shown_joints(marks.skeleton)
+    points, count = marks.points[shown], len(shown)
+    lengths = _axis_lengths(marks)[shown]
+    axes = unit(np.swapaxes(marks.matrices[shown, :3, :3], 1, 2))
     starts = np.repeat(points[:, None], 3, axis=1)
     ends = starts + lengths[:, None, None] * axes
     colors = np.ones((count, 3, 4))
@@ -143,11 +150,10 @@ def axis_segments(marks: JointMarks, scale: float) -> Segments:
     return Segments(starts.reshape(-1, 3), ends.reshape(-1, 3), colors.reshape(-1, 4), widths)
 
 
-def _axis_lengths(points: Floats, skeleton: Skeleton) -> Floats:
+def _axis_lengths(marks: JointMarks) -> Floats:
     """Return the length of each joint's axes: (J,), scene units."""
+    points, (children, above) = marks.points, marks.bones
     size = box_size(bounding_box(points)) or 1.0
-    children = np.flatnonzero(skeleton.parents >= 0)
-    above = skeleton.parents[children]
     apart = np.linalg.norm(points[children] - points[above], axis=1)
     apart[apart < 1e-6 * size] = np.inf  # coincident joints are ignored
     nearest = np.full(len(points), np.inf)
@@ -183,14 +189,14 @@ def joint_at(
     size : (int, int)
         Width and height of the image, pixels.
     pixel : (float, float)
-        From the image's left and upper edge.
+        Position from the image's left and upper edges.
     with_bones : bool
         Whether bones are drawn; a bone belongs to the joint that rotates it.
 
     Returns
     -------
     (actor, joint, point) or None
-        Indices, and its position: (3,), scene space.
+        Indices, and the position (3,) in scene space.
     """
     best: tuple[float, float, int, int, Floats] | None = None
     for one in marks:
@@ -210,10 +216,12 @@ def _away(
     pixel: tuple[float, float],
     with_bones: bool,
 ) -> tuple[Floats, Ints, Floats]:
-    """Return distances from a pixel, 0..1 for dots and 1..2 for bones, their joints and depths."""
+    """Return distances from a pixel (0..1 for dots, 1..2 for bones), with joints and depths."""
     scale, seen = picture_scale(size), project(view, size, marks.points)
     away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
     away[~seen.seen | (away > 1.0)] = np.inf
+    if marks.skeleton.auxiliary is not None:
+        away[marks.skeleton.auxiliary] = np.inf
     joints: Ints = np.arange(len(away), dtype=np.int32)
     if with_bones:
         # Dots are drawn over bones and take precedence.
@@ -228,8 +236,7 @@ def _beside_bones(
     marks: JointMarks, view: View, size: tuple[int, int], pixel: tuple[float, float]
 ) -> tuple[Floats, Ints]:
     """Return the distance of a pixel from each bone, and the joints that rotate them."""
-    children = np.flatnonzero(marks.skeleton.parents >= 0)
-    above = marks.skeleton.parents[children]
+    children, above = marks.bones
     ends, seen = project_segments(view, size, marks.points[above], marks.points[children])
     along = ends[:, 1] - ends[:, 0]
     to_pixel = np.asarray(pixel) - ends[:, 0]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.mesh_pass import set_surface, shading_of
+from viewer.rendering.passes.mesh_pass import has_tints, set_surface, shading_of
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
@@ -85,7 +85,7 @@ def draw_instances(
     instances : InstanceBuffers
         Updated buffers.
     actors : sequence of Actor
-        The actors that the buffers were updated with, in that order.
+        The actors with which the buffers were updated, in that order.
     view : View
         The camera's matrices.
     options : DisplayOptions
@@ -130,6 +130,7 @@ def draw_instance_shapes(
     )
     instances.place(actors, view)
     instances.use(program, view)
+    set_uniforms(program, {"u_has_tint": has_tints(instances.mesh, options)})
     indices = instances.mesh.index_set(options.reduced, options.hidden_parts)
     array, mirrored = instances.array(program, indices), instances.is_mirrored
     draw_shapes(array, indices, options, fragment, prepare, instances.count, mirrored)

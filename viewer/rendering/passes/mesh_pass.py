@@ -14,6 +14,7 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.passes.blended_order import BlendedOrder, SortedTriangles
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -21,14 +22,14 @@ from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 
-__all__ = ["SKIN_COLOR", "MeshPass", "set_surface", "shading_of", "uses_materials"]
+__all__ = ["SKIN_COLOR", "MeshPass", "has_tints", "set_surface", "shading_of", "uses_materials"]
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""
 
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
-_NORMAL_LENGTH = 0.02  # of the figure's size
+_NORMAL_LENGTH = 0.02  # relative to the figure's size
 _COLORMAP_UNIT = 6
 
 
@@ -46,6 +47,7 @@ class MeshPass:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
         self._arrays: Kept[PosedMesh, VertexArrays] = Kept()
+        self._orders: Kept[PosedMesh, BlendedOrder] = Kept()
 
     def draw(
         self,
@@ -94,10 +96,25 @@ class MeshPass:
         if look is not None:
             set_uniforms(program, {"u_colormap": _COLORMAP_UNIT, **look.uniforms})
             mesh.scalars.use(_COLORMAP_UNIT)
-        indices = mesh.index_set(options)
+        indices = self._indices(mesh, placement, view, options, blended)
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
         draw_runs(array, indices, options, blended=blended, is_mirrored=is_mirrored)
+
+    def _indices(
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        blended: bool,
+    ) -> IndexSet | SortedTriangles:
+        """Return the triangles to draw; blended ones are sorted."""
+        indices = mesh.index_set(options)
+        if not (blended and indices.is_blended):
+            return indices
+        order = self._orders.get(mesh, lambda: BlendedOrder(self.context))
+        return order.sorted(mesh, indices, (view.matrix @ placement)[2, :3])
 
     def draw_shape(
         self,
@@ -112,6 +129,7 @@ class MeshPass:
         materials = uses_materials(mesh, options)
         program = self.programs.drawing("mesh", fragment=fragment, materials=materials)
         set_model(program, view, placement, mesh.center)
+        set_uniforms(program, {"u_has_tint": has_tints(mesh.mesh, options)})
         indices = mesh.index_set(options)
         array, is_mirrored = self.array(mesh, program, indices), mesh.is_mirrored_by(placement)
         draw_shapes(array, indices, options, fragment, prepare, is_mirrored=is_mirrored)
@@ -170,7 +188,7 @@ class MeshPass:
         array.render(moderngl.LINES, vertices=2, instances=mesh.mesh.n_vertices)
 
     def array(
-        self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet
+        self, mesh: PosedMesh, program: moderngl.Program, indices: IndexSet | SortedTriangles
     ) -> moderngl.VertexArray:
         """Return the mesh's vertex array for a program, with the attributes that it uses."""
 
@@ -180,7 +198,8 @@ class MeshPass:
                 found = [(mesh.posed, "3f4 3f4", "in_position", "in_normal")]
             for values, layout, name in (
                 (mesh.mesh.uvs, "2f4", "in_uv"),
-                (mesh.mesh.second_uvs, "2f4", "in_second_uv"),
+                (mesh.mesh.other_uvs, "4f4", "in_other_uvs"),
+                (mesh.mesh.tints, "4f4", "in_tint"),
                 (mesh.mesh.colors, "3f4", "in_color"),
                 (mesh.scalars.values, "f4", "in_scalar"),
             ):
@@ -197,16 +216,18 @@ class MeshPass:
     def forget(self, mesh: PosedMesh) -> None:
         """Free the vertex arrays of a mesh that is about to be released."""
         self._arrays.drop(mesh)
+        self._orders.drop(mesh)
 
     def release(self) -> None:
-        """Free all vertex arrays."""
+        """Free all vertex arrays and index buffers."""
         self._arrays.keep_only([])
+        self._orders.keep_only([])
 
 
 def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
     """Return the shading of a mesh, a key of ``SHADING``.
 
-    ``"auto"`` follows the materials, and so does ``"scalar"`` where there are no values.
+    ``"auto"`` follows the materials, as does ``"scalar"`` if there are no values.
     """
     if options.shading not in ("auto", "scalar"):
         return options.shading
@@ -219,6 +240,11 @@ def uses_materials(mesh: PosedMesh, options: DisplayOptions) -> bool:
     return mesh.mesh.has_materials and not has_values
 
 
+def has_tints(mesh: MeshBuffers, options: DisplayOptions) -> bool:
+    """Return whether a mesh is drawn with its vertex colours."""
+    return options.vertex_colors and mesh.tints is not None
+
+
 def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOptions) -> None:
     """Set the uniforms of a figure's surface."""
     values = {
@@ -226,6 +252,7 @@ def set_surface(program: moderngl.Program, mesh: MeshBuffers, options: DisplayOp
         "u_opacity": surface_opacity(options),
         "u_has_uv": mesh.uvs is not None,
         "u_has_colors": options.shading == "parts" and mesh.colors is not None,
+        "u_has_tint": has_tints(mesh, options),
         **SAMPLERS,
         **STUDIO_SAMPLERS,
     }

@@ -1,4 +1,4 @@
-"""Runs of triangles with one material, drawn with their colours or as shapes alone."""
+"""Runs of triangles with one material, drawn with their colours or only as shapes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from viewer.rendering.gpu.index_sets import IndexSet, MeshRun
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.passes.blended_order import SortedTriangles
 
 __all__ = ["Prepare", "draw_runs", "draw_shapes"]
 
@@ -20,13 +21,17 @@ Prepare = Callable[[moderngl.Program, MeshRun], object]
 
 def draw_runs(
     array: moderngl.VertexArray,
-    indices: IndexSet,
+    indices: IndexSet | SortedTriangles,
     options: DisplayOptions,
     instances: int = 1,
     blended: bool = False,
     is_mirrored: bool = False,
 ) -> None:
-    """Draw all opaque or all blended triangles, one material at a time."""
+    """Draw all opaque or all blended triangles, one material at a time.
+
+    Of blended triangles that are not sorted, the back faces are drawn first.
+    """
+    two_passes = blended and not isinstance(indices, SortedTriangles)
     plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
     for run in indices.runs:
         if run.surface.is_blended != blended:
@@ -34,7 +39,7 @@ def draw_runs(
         set_uniforms(array.program, plain)
         run.surface.use(array.program, options.texture)
         is_open = run.surface.double_sided
-        with sides(array.ctx, options.cull, is_open, blended, is_mirrored) as orders:
+        with sides(array.ctx, options.cull, is_open, two_passes, is_mirrored) as orders:
             for order in orders:
                 array.ctx.cull_face = order
                 _render(array, run, instances)

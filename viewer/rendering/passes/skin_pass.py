@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
@@ -57,7 +58,7 @@ class PosedMesh:
     Attributes
     ----------
     posed : moderngl.Buffer
-        A row of position (relative to ``center``) and unit normal for every split vertex.
+        A row for every split vertex: position (relative to ``center``) and unit normal.
     center : (3,)
         Origin of the positions in figure space; part of the model matrix.
     scalars : ScalarBuffer
@@ -101,9 +102,9 @@ class PosedMesh:
         Parameters
         ----------
         pose : Pose or None
-            None leaves the mesh in its bind pose.
+            Pose; None leaves the mesh in its bind pose.
         skinning : Skinning or str
-            Skinning settings, or just a key of ``viewer.rig.skinning.METHODS``.
+            Skinning settings, or a key of ``viewer.rig.skinning.METHODS``.
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
@@ -172,7 +173,7 @@ class PosedMesh:
             write_rigid(self._rigid, *split_palette(palette, centers))
 
     def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
-        # Rigid joints, by far the most common, get a cheaper program without scale and shear.
+        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
         affine = attached and self._is_affine
         program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
         key = (id(skin), attached and id(self._rest.positions))
@@ -186,6 +187,10 @@ class PosedMesh:
         Its triangles are then clockwise seen from their front.
         """
         return self._is_mirrored != bool(np.linalg.det(placement[:3, :3]) < 0.0)
+
+    def posed_positions(self) -> NDArray[np.float32]:
+        """Return the current positions of the split vertices, relative to the centre: (R, 3)."""
+        return np.frombuffer(self.posed.read(), dtype="f4").reshape(-1, 6)[:, :3]
 
     def read(self) -> tuple[Floats, Floats]:
         """Return the current posed positions in figure space and normals, (V, 3) each.

@@ -12,6 +12,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.comparison.pairs import pair_names
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import frame_rate, pose_actor
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import Skeleton, dof_labels
@@ -88,7 +89,7 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
     Parameters
     ----------
     first, second : Actor
-        Not changed.
+        Not modified.
     n_poses : int
         Test poses for figures without motion.
     frames : (int or None, int or None), optional
@@ -134,7 +135,9 @@ def _motion_steps(first: Actor, second: Actor, frames: FrameRange | None) -> Ste
     if abs(rates[0] - rates[1]) > _SAME_TIME * rates[0]:
         values = {"first": rates[0], "second": rates[1]}
         notes.append(Diagnostic("D002.rates", values=values))
-    base = 0 if isinstance(clips[0], Clip) else clips[0].timing.first_frame
+    base = 0
+    if not isinstance(clips[0], Clip | TransformClip):
+        base = clips[0].timing.first_frame
     last = base + int(np.floor(min(lasts) * rates[0] + _SAME_TIME))
     start, end = (None, None) if frames is None else frames
     chosen = np.arange(

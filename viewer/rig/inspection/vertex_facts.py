@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from viewer.rig.inspection.single_vertices import check_vertices, deform_vertice
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
 from viewer.rig.scalars import joint_text
+from viewer.rig.skeleton import shown_joint_of
 from viewer.rig.skin import merged, skin_rows, strongest_first
 from viewer.rig.skinning import Skinning, skin_used
 
@@ -89,7 +90,10 @@ def vertex_facts(
     positions, normals = deform_vertices(figure, pose, skinning, chosen)
     joints, weights = np.zeros(0, dtype=np.int32), np.zeros(0)
     if skin is not None:
-        row = strongest_first(merged(skin_rows(skin_used(skin, skinning), chosen)))
+        row = skin_rows(skin_used(skin, skinning), chosen)
+        if figure.skeleton is not None:
+            row = replace(row, joints=shown_joint_of(figure.skeleton)[row.joints])
+        row = strongest_first(merged(row))
         counts = row.weights != 0.0
         joints, weights = row.joints[counts], row.weights[counts]
     return VertexFacts(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +20,20 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.clip_sampling import sample
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
-from viewer.rig.pose import Pose, dof_rotations
+from viewer.rig.motion.timing import DEFAULT_RATE
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose, dof_rotations, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Motion, figure_pose
 from viewer.rig.shape import joint_directions, moved_rest_translations, rest_joints
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.posing import apply_transforms
+from viewer.rig.transforms.rate import key_rate
+from viewer.rig.transforms.sampling import sample_transforms
 
 __all__ = [
-    "DEFAULT_RATE",
     "Frames",
+    "JointMotion",
     "frame_rate",
     "frames_between",
     "frames_of",
@@ -40,8 +46,8 @@ __all__ = [
     "world_frames",
 ]
 
-DEFAULT_RATE = 30.0
-"""Frames per second of motions without a frame rate of their own."""
+JointMotion: TypeAlias = Clip | TransformClip | SampledClip
+"""A motion that poses a skeleton, and not captured points."""
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
@@ -60,6 +66,8 @@ class Frames:
         Each joint's complete rotation relative to its parent: unit quaternions (x, y, z, w).
     translations : (F, J, 3)
         Offsets from the joints' rest translations, DOFs included.
+    scales : (F, J, 3) or (1, J, 3)
+        Local scale factors of the joints; a single row applies to all frames.
     shape_weights : (F, S) or (1, S)
         Weights of the figure's blend shapes; a single row applies to all frames.
     figure_translations, figure_scales : (F, 3), (F,)
@@ -70,6 +78,7 @@ class Frames:
     present: Bools
     rotations: Floats
     translations: Floats
+    scales: Floats
     shape_weights: Floats
     figure_translations: Floats
     figure_scales: Floats
@@ -93,14 +102,26 @@ def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
 
 
 def frame_rate(motion: Motion | None) -> float:
-    """Return a motion's frames per second; ``DEFAULT_RATE`` for keyed clips, which have none."""
+    """Return a motion's frames per second.
+
+    Keyed transforms have the rate that their keys are at, DOF curves ``DEFAULT_RATE``.
+    """
+    if isinstance(motion, TransformClip):
+        return key_rate(motion)
     return motion.timing.frame_rate if isinstance(motion, SampledClip | PointClip) else DEFAULT_RATE
 
 
 def scene_rate(actors: Iterable[Actor]) -> float:
-    """Return the frame rate of a scene's timeline: that of its longest capture."""
-    clips = [actor.clip for actor in actors if isinstance(actor.clip, SampledClip | PointClip)]
-    return frame_rate(max(clips, key=lambda clip: clip.end - clip.start, default=None))
+    """Return the frames per second of a scene's timeline.
+
+    Those of its longest capture, or else of its longest motion of keyed transforms.
+    """
+    clips = [actor.clip for actor in actors if actor.clip is not None]
+    for kinds in ((SampledClip, PointClip), (TransformClip,)):
+        own = [clip for clip in clips if isinstance(clip, kinds)]
+        if own:
+            return frame_rate(max(own, key=lambda clip: clip.end - clip.start))
+    return DEFAULT_RATE
 
 
 def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
@@ -126,6 +147,8 @@ def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
             _apply(rows, 0, skeleton, actor.pose)
     elif isinstance(clip, Clip) and skeleton is not None and actor.pose is not None:
         sample(clip, skeleton, own, out=actor.pose)
+    elif isinstance(clip, TransformClip) and skeleton is not None and actor.pose is not None:
+        apply_transforms(sample_transforms(clip, np.array([own])), 0, skeleton, actor.pose)
 
 
 def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
@@ -140,6 +163,8 @@ def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
     """Apply a clip's data at one time, except joint rotations, to a pose in place."""
     if rows.translations is not None:
         pose.translations[:] = rows.translations[row]
+    if rows.scales is not None:
+        pose.scales[:] = rows.scales[row]
     if rows.figure_translations is not None:
         pose.figure_translation[:] = rows.figure_translations[row]
     if rows.figure_scales is not None:
@@ -151,7 +176,7 @@ def place_pose(pose: Pose, rows: SampledRows, row: int) -> None:
 
 def frames_of(
     figure: Figure,
-    motion: Clip | SampledClip,
+    motion: JointMotion,
     times: Floats,
     base: Pose | None = None,
     interpolate: bool = False,
@@ -162,7 +187,7 @@ def frames_of(
     ----------
     figure : Figure
         Figure with a skeleton.
-    motion : Clip or SampledClip
+    motion : Clip, TransformClip or SampledClip
         Motion of that skeleton.
     times : (F,)
         Seconds on the motion's own clock.
@@ -183,6 +208,8 @@ def frames_of(
     pose = figure_pose(figure) if base is None else base
     if isinstance(motion, Clip):
         return _keyed_frames(skeleton, motion, times, pose)
+    if isinstance(motion, TransformClip):
+        return _transform_frames(skeleton, motion, times, pose)
     if motion.n_joints != skeleton.n_joints:
         raise RigError(
             f"clip {motion.name} has {motion.n_joints} joints, figure {figure.name} has "
@@ -198,10 +225,16 @@ def frames_of(
         rows.present,
         rows.rotations,
         still if rows.translations is None else rows.translations,
-        weights[:1] if len(weights) > 1 and (weights == weights[0]).all() else weights,
+        _shared(pose.scales[None].copy() if rows.scales is None else rows.scales),
+        _shared(weights),
         place if rows.figure_translations is None else rows.figure_translations,
         scales if rows.figure_scales is None else rows.figure_scales,
     )
+
+
+def _shared(rows: Floats) -> Floats:
+    """Return a single row if all are equal."""
+    return rows[:1] if len(rows) > 1 and (rows == rows[0]).all() else rows
 
 
 def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> Frames:
@@ -220,7 +253,35 @@ def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> 
         np.ones(count, dtype=np.bool_),
         rotations,
         translations,
+        pose.scales[None].copy(),
         pose.shape_weights[None].copy(),
+        np.tile(pose.figure_translation, (count, 1)),
+        np.full(count, pose.figure_scale),
+    )
+
+
+def _transform_frames(skeleton: Skeleton, clip: TransformClip, times: Floats, pose: Pose) -> Frames:
+    count, found = len(times), sample_transforms(clip, times)
+    rotations = np.tile(matrix_to_quaternion(joint_rotations(skeleton, pose)), (count, 1, 1))
+    rotations[:, found.rotated] = found.rotations
+    still = local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations
+    translations = np.tile(still, (count, 1, 1))
+    moved = skeleton.rest_translations[found.translated]
+    translations[:, found.translated] = found.translations - moved
+    scales, weights = pose.scales[None].copy(), pose.shape_weights[None].copy()
+    if len(found.scaled):
+        scales = np.tile(scales, (count, 1, 1))
+        scales[:, found.scaled] = found.scales
+    if len(found.weighted):
+        weights = np.tile(weights, (count, 1))
+        weights[:, found.weighted] = found.weights
+    return Frames(
+        times,
+        np.ones(count, dtype=np.bool_),
+        rotations,
+        translations,
+        _shared(scales),
+        _shared(weights),
         np.tile(pose.figure_translation, (count, 1)),
         np.full(count, pose.figure_scale),
     )
@@ -236,19 +297,21 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
         frames.figure_translations,
         frames.figure_scales,
         np.broadcast_to(frames.shape_weights, (frames.n_frames, frames.shape_weights.shape[1])),
+        np.broadcast_to(frames.scales, frames.translations.shape),
     )
     _apply(row, frame, figure.require_skeleton(), pose)
     return pose
 
 
 def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
-    """Return some of the frames; a shape shared by all frames stays a single row."""
-    weights = frames.shape_weights
+    """Return some of the frames; scales or a shape shared by all frames stay a single row."""
+    weights, scales = frames.shape_weights, frames.scales
     return Frames(
         frames.times[rows],
         frames.present[rows],
         frames.rotations[rows],
         frames.translations[rows],
+        scales if len(scales) == 1 else scales[rows],
         weights if len(weights) == 1 else weights[rows],
         frames.figure_translations[rows],
         frames.figure_scales[rows],
@@ -276,7 +339,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     # at once.
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
-    linear = quaternion_to_matrix(frames.rotations) * skeleton.rest_scales[:, None, :]
+    linear = quaternion_to_matrix(frames.rotations) * frames.scales[:, :, None, :]
     local[..., :3, :3] = np.swapaxes(linear, 0, 1)
     offsets = rest_translations_of(figure, frames.shape_weights) + frames.translations
     local[..., :3, 3] = np.swapaxes(offsets, 0, 1)

@@ -22,12 +22,15 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.evaluation import place_pose, pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, dof_rotations
 from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton, clamp_dofs
+from viewer.rig.transforms.posing import apply_placements, apply_transforms
+from viewer.rig.transforms.sampling import sample_transforms
 
 __all__ = [
     "local_rotations",
@@ -67,6 +70,8 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
             clip = None
         if isinstance(clip, Clip) and skeleton is not None:
             _pose_by_curves(clip, skeleton, poses, times)
+        elif isinstance(clip, TransformClip) and skeleton is not None:
+            _pose_by_transforms(clip, skeleton, poses, times)
         elif isinstance(clip, SampledClip) and skeleton is not None and _is_unrestricted(skeleton):
             _pose_by_frames(group, clip, skeleton, times, interpolate)
         else:
@@ -85,6 +90,27 @@ def _pose_by_curves(clip: Clip, skeleton: Skeleton, poses: list[Pose], times: Fl
     dofs[:, targets] = values
     for pose, row in zip(poses, clamp_dofs(skeleton, dofs), strict=True):
         pose.dofs[:] = row
+
+
+def _pose_by_transforms(
+    clip: TransformClip, skeleton: Skeleton, poses: list[Pose], times: Floats
+) -> None:
+    samples = sample_transforms(clip, times)
+    balls = rotation_rows(skeleton)[samples.rotated]
+    if (balls < 0).any():
+        for row, pose in enumerate(poses):
+            apply_transforms(samples, row, skeleton, pose)
+        return
+    base = quaternion_to_matrix(skeleton.rest_rotations[samples.rotated])
+    within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(samples.rotations)
+    dofs = np.stack([pose.dofs for pose in poses])
+    dofs[:, balls] = matrix_to_euler(within)
+    if len(samples.rotated):
+        dofs = clamp_dofs(skeleton, dofs)
+    for row, pose in enumerate(poses):
+        pose.dofs[:] = dofs[row]
+        pose.rotations[samples.rotated] = skeleton.rest_rotations[samples.rotated]
+        apply_placements(samples, row, skeleton, pose)
 
 
 def _pose_by_frames(

@@ -12,6 +12,7 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Motion
 
@@ -43,7 +44,7 @@ class MotionPath:
 
 def path_times(motion: Motion) -> Floats:
     """Return the sampling times of a path: a capture's frames, or 60 per second on curves."""
-    if isinstance(motion, Clip):
+    if isinstance(motion, Clip | TransformClip):
         length = motion.end - motion.start
         steps = int(min(np.ceil(length * _KEYED_RATE - 1e-6), _MOST - 1))
         return np.linspace(motion.start, motion.end, max(steps, 0) + 1)

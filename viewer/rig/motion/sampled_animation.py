@@ -8,13 +8,12 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (
-    DEFAULT_RATE,
     Frames,
+    JointMotion,
     frame_rate,
     frames_of,
     rest_translations_of,
@@ -43,7 +42,7 @@ class SampledAnimation:
         Number of the first frame.
     frames : Frames
         Poses, in time order; gaps are in ``frames.present``.
-    motion : Clip or SampledClip
+    motion : Clip, TransformClip or SampledClip
         The motion from which the frames were sampled.
     base : Pose or None
         Provides the properties that the motion does not animate.
@@ -57,7 +56,7 @@ class SampledAnimation:
     frame_rate: float
     first_frame: int
     frames: Frames
-    motion: Clip | SampledClip
+    motion: JointMotion
     base: Pose | None = None
     is_rotated: bool = False
 
@@ -75,7 +74,8 @@ def sample_animation(
     actor : Actor
         Actor with a clip.
     rate : float, optional
-        Frames per second; the clip's own if omitted, which reproduces captured frames exactly.
+        Frames per second; that of ``frame_rate`` if omitted, which reproduces captured frames
+        exactly.
     frames : (int, int), optional
         First frame and end frame, exclusive (None: the clip's end), counted from the clip's
         start at that rate; all if omitted.
@@ -88,9 +88,9 @@ def sample_animation(
         If there is no clip, or no frame in the range.
     """
     motion, figure = actor.clip, actor.figure
-    if not isinstance(motion, Clip | SampledClip) or figure.skeleton is None:
+    if not isinstance(motion, JointMotion) or figure.skeleton is None:
         raise RigError(f"{actor.name} has no motion of joints")
-    own = frame_rate(motion) if isinstance(motion, SampledClip) else DEFAULT_RATE
+    own = frame_rate(motion)
     rate = own if rate is None else rate
     first, stop = frame_range(motion, rate, frames)
     times: Floats = motion.start + np.arange(first, stop) / rate
@@ -119,8 +119,8 @@ def frame_range(
     count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
-    if isinstance(motion, SampledClip | PointClip):
-        stop = min(stop, count)  # curves extend beyond their keys, captures do not
+    if not isinstance(motion, Clip):
+        stop = min(stop, count)  # DOF curves extend beyond their keys, other motions do not
     if not 0 <= first < stop:
         found = f"{first} to {'the end' if asked is None else asked}"
         raise RigError(f"frames: expected a range within 0 to {count}, found {found}")

@@ -35,6 +35,9 @@ class SampledClip:
         Scales of the whole figure.
     shape_weights : (N, S) or (1, S) or None
         Blend shape weights; a single row applies to all frames. None keeps those of the pose.
+    scales : (N, J, 3) or (1, J, 3) or None
+        Local scale factors of the joints; a single row applies to all frames. None keeps those of
+        the pose.
     """
 
     name: str
@@ -44,6 +47,7 @@ class SampledClip:
     figure_translations: Floats | None = None
     figure_scales: Floats | None = None
     shape_weights: Floats | None = None
+    scales: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -55,10 +59,11 @@ class SampledClip:
         put("figure_translations", (self.n_rows, 3))
         put("figure_scales", (self.n_rows,))
         put("shape_weights", (None, None))
-        if self.shape_weights is not None and len(self.shape_weights) not in (1, self.n_rows):
-            raise RigError(
-                f"shape_weights: expected {self.n_rows} rows, found {len(self.shape_weights)}"
-            )
+        put("scales", (None, self.n_joints, 3))
+        for name in ("shape_weights", "scales"):
+            rows = getattr(self, name)
+            if rows is not None and len(rows) not in (1, self.n_rows):
+                raise RigError(f"{name}: expected {self.n_rows} rows, found {len(rows)}")
         if self.timing.n_frames and self.timing.rows.max() >= self.n_rows:
             raise RigError(f"rows: expected 0 to {self.n_rows - 1}, found {self.timing.rows.max()}")
 
@@ -93,6 +98,7 @@ class SampledRows:
     figure_translations: Floats | None
     figure_scales: Floats | None
     shape_weights: Floats | None
+    scales: Floats | None
 
 
 def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
@@ -120,7 +126,7 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
     between = np.flatnonzero(fraction > 0.0)
     if clip.n_rows == 0:
         rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), clip.n_joints, 1))
-        return SampledRows(present, rest, None, None, None, None)
+        return SampledRows(present, rest, None, None, None, None, None)
     rotations = clip.rotations[before]
     if len(between):
         ends = clip.rotations[after[between]]
@@ -136,6 +142,7 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
         line(clip.figure_translations),
         line(clip.figure_scales),
         line(clip.shape_weights),
+        line(clip.scales),
     )
 
 
@@ -162,12 +169,12 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
         parts = [getattr(clip, name) for clip in clips]
         if parts[0] is None:
             return None
-        if name == "shape_weights":
+        if name in ("shape_weights", "scales"):
             # A single row that applies to all frames must not be repeated.
             if all(len(part) == 1 and (part == parts[0]).all() for part in parts):
                 return np.asarray(parts[0])
             parts = [
-                np.broadcast_to(part, (clip.n_rows, part.shape[1]))
+                np.broadcast_to(part, (clip.n_rows, *part.shape[1:]))
                 for part, clip in zip(parts, clips, strict=True)
             ]
         return np.concatenate(parts)
@@ -185,4 +192,5 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
         stack("figure_translations"),
         stack("figure_scales"),
         stack("shape_weights"),
+        stack("scales"),
     )

@@ -11,10 +11,10 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.motion.clip import Clip, is_course_rig
 from viewer.rig.motion.clip_edit import clip_from_pose
-from viewer.rig.motion.evaluation import DEFAULT_RATE, Frames
+from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.timing import DEFAULT_RATE, Timing
 from viewer.rig.motion.upright import own_up, upright_actor
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.scene import Actor, Scene
@@ -64,6 +64,7 @@ def single_frame(
             frames.figure_translations,
             frames.figure_scales,
             frames.shape_weights,
+            frames.scales,
         )
     return SampledAnimation(actor.name, figure, rate, number, frames, motion)
 
@@ -119,17 +120,13 @@ def pose_frames(
     """
     skeleton, weights = figure.skeleton, np.zeros((1, figure.n_shapes))
     place, scale = np.zeros((1, 3)), np.ones(1)
-    rotated, moved = np.zeros((1, 0, 4)), np.zeros((1, 0, 3))
+    rotated, moved, scales = np.zeros((1, 0, 4)), np.zeros((1, 0, 3)), np.zeros((1, 0, 3))
     if pose is not None:
         weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing weights count as 0
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
-        if (pose.scales != skeleton.rest_scales).any():
-            # Frames cannot store joint scales, so the scales of the pose become those of the
-            # skeleton.
-            skeleton = replace(skeleton, rest_scales=pose.scales)
-            figure = replace(figure, skeleton=skeleton)
+        scales = pose.scales[None].copy()
         moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]
         rotated = matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
     present, times = np.array([is_present]), np.array([time])
-    return figure, Frames(times, present, rotated, moved, weights, place, scale)
+    return figure, Frames(times, present, rotated, moved, scales, weights, place, scale)

@@ -9,10 +9,13 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
+__all__ = ["DEFAULT_RATE", "FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
 
 SLOWEST, FASTEST = 1e-6, 1e6
 """Limits of the frame rate, outside which the times of long motions lose precision."""
+
+DEFAULT_RATE = 30.0
+"""Frames per second of motions without a frame rate of their own."""
 
 RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames per second"
 """The limits as text, for messages."""

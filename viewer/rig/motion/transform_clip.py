@@ -85,6 +85,9 @@ class TransformChannel:
             raise RigError("shapes: expected for weights, and only there")
         if self.shapes is not None:
             put("shapes", (self.n_components,), np.int32)
+        if self.path == "rotation" and not self.values.any(axis=1).all():
+            key = int(np.argmin(self.values.any(axis=1)))
+            raise RigError(f"values of key {key}: expected a quaternion, found 0 0 0 0")
 
     @property
     def n_components(self) -> int:
@@ -101,7 +104,7 @@ class TransformClip:
     name : str
         Display name.
     channels : tuple of TransformChannel
-        At most one per joint and path. What has no channel keeps its value in the pose.
+        At most one per joint and path; properties without a channel keep their values in the pose.
     start, end : float
         Playback range in seconds.
     """

@@ -24,6 +24,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
@@ -266,16 +267,30 @@ def _source_places(job: _Job, worlds: Floats) -> Floats:
     places = np.tile(skeleton.rest_translations, (len(worlds), 1, 1))
     if clip.translations is not None:
         places += clip.translations
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            parent_rotations = quaternion_to_matrix(worlds[:, parent])
-            places[:, joint] = np.einsum("nab,nb->na", parent_rotations, places[:, joint])
-            places[:, joint] += places[:, parent]
+    scales = skeleton.rest_scales[None] if clip.scales is None else clip.scales
+    if (scales != 1.0).any():
+        places = _scaled_places(job, places, scales)
+    else:
+        for joint, parent in enumerate(skeleton.parents):
+            if parent >= 0:
+                parent_rotations = quaternion_to_matrix(worlds[:, parent])
+                places[:, joint] = np.einsum("nab,nb->na", parent_rotations, places[:, joint])
+                places[:, joint] += places[:, parent]
     if clip.figure_scales is not None:
         places *= clip.figure_scales[:, None, None]
     if clip.figure_translations is not None:
         places += clip.figure_translations[:, None]
     return places
+
+
+def _scaled_places(job: _Job, offsets: Floats, scales: Floats) -> Floats:
+    """Return the positions of joints below scaled ones, from offsets to their parents."""
+    local = np.zeros((job.source.n_joints, len(offsets), 4, 4))
+    linear = quaternion_to_matrix(job.clip.rotations) * scales[:, :, None, :]
+    local[..., :3, :3] = np.swapaxes(linear, 0, 1)
+    local[..., :3, 3] = np.swapaxes(offsets, 0, 1)
+    local[..., 3, 3] = 1.0
+    return np.swapaxes(forward_kinematics(job.source.parents, local)[..., :3, 3], 0, 1).copy()
 
 
 def _transfer_translations(job: _Job, scale: float, shifts: Floats) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
+from viewer.rig.skeleton import shown_joint_of
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
 
@@ -38,8 +39,14 @@ class Asked:
 
     @property
     def skin(self) -> Skin:
-        """The effective influences: as stored, or pruned and normalised as requested."""
-        return skin_used(self.figure.require_skin(), self.skinning)
+        """The effective influences: as stored, or pruned and normalised as requested.
+
+        Those of auxiliary joints are influences of the joints that are shown for them.
+        """
+        skin, skeleton = skin_used(self.figure.require_skin(), self.skinning), self.figure.skeleton
+        if skeleton is None or skeleton.auxiliary is None:
+            return skin
+        return replace(skin, joints=shown_joint_of(skeleton)[skin.joints])
 
 
 def influences_kept(skinning: Skinning) -> int:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rendering.options import Color
 from viewer.rig.arrays import Floats
 
 __all__ = ["decode_color", "decode_srgb", "encode_color", "encode_srgb"]
 
+Color = tuple[float, float, float]
+
 
 def encode_srgb(linear: Floats) -> Floats:
-    """Return linear light as sRGB, clipped to 0..1."""
+    """Return linear light as sRGB, clamped to 0..1."""
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 

@@ -3,8 +3,8 @@
 ::
 
     material_names (M,)   material_textures (M,)   image_0 (H, W, 4) …            base colours
-    material_records (M,): JSON, the other fields of each material that are not at their default
-    picture_0 (H, W, 4) …                          images of the other textures, each once
+    material_records (M,): JSON, other fields of each material that differ from the default
+    picture_0 (H, W, 4) …                          images of the other textures, without duplicates
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from viewer.rig.arrays import Bytes
 from viewer.rig.material import TEXTURES, Material, Texture
 from viewer.rig.mesh import Mesh
 
-__all__ = ["material_arrays", "read_materials"]
+__all__ = ["material_arrays", "read_materials", "texts"]
 
 _PLAIN_MATERIAL, _PLAIN_TEXTURE = Material(), Texture("")
 _NUMBERS = tuple(field.name for field in fields(Material) if field.name not in ("name", *TEXTURES))
-_PLACING = ("channel", "uv_set", "transform", "wrap", "is_smooth")
+_PLACING = ("channel", "uv_set", "transform", "wrap", "is_smooth", "minification")
 _RECORDS = "material_records"
 
 
 def material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    """Return the arrays that hold a mesh's materials; none if it has no material."""
+    """Return the arrays that describe a mesh's materials; none if it has no material."""
     if not mesh.materials:
         return {}
     arrays: dict[str, NDArray[Any]] = {
@@ -50,7 +50,7 @@ def material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
 
 
 def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[str, Any]:
-    """Return the fields that are not at their default, as plain data."""
+    """Return the fields that differ from their defaults, as plain data."""
     record: dict[str, Any] = {}
     for name in _NUMBERS:
         if getattr(material, name) != getattr(_PLAIN_MATERIAL, name):
@@ -81,7 +81,7 @@ def read_materials(archive: Archive) -> tuple[Material, ...]:
     """
     if not archive.has("material_names"):
         return ()
-    names, textures = _texts(archive, "material_names"), _texts(archive, "material_textures")
+    names, textures = texts(archive, "material_names"), texts(archive, "material_textures")
     if len(names) != len(textures):
         raise archive.fault(
             "F002.value", item="material_textures", expected=len(names), found=len(textures)
@@ -93,7 +93,7 @@ def read_materials(archive: Archive) -> tuple[Material, ...]:
         materials.append(Material(name, Texture(texture, image) if has_texture else None))
     if not archive.has(_RECORDS):
         return tuple(materials)
-    records = _texts(archive, _RECORDS)
+    records = texts(archive, _RECORDS)
     if len(records) != len(names):
         raise archive.fault("F002.value", item=_RECORDS, expected=len(names), found=len(records))
     pictures: dict[str, Bytes | None] = {}
@@ -142,5 +142,6 @@ def _picture(archive: Archive, key: str) -> Bytes | None:
     return archive.array(key, (None, None, 4)).values() if archive.has(key) else None
 
 
-def _texts(archive: Archive, key: str) -> tuple[str, ...]:
+def texts(archive: Archive, key: str) -> tuple[str, ...]:
+    """Return an array of texts."""
     return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))

@@ -1,0 +1,164 @@
+"""Choice of the animation that actors play, among those of their file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from viewer.app.core.state import AppState
+from viewer.errors import FormatError
+from viewer.phrases import printable
+from viewer.rig.motion.animation_choice import animation_labels, counterpart, play_animation
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.number_text import number_text
+from viewer.rig.scene import Actor
+
+__all__ = [
+    "NOT_ONE",
+    "Animations",
+    "animation_texts",
+    "choose_animation",
+    "has_animations",
+    "no_animations",
+    "played",
+    "step_animation",
+]
+
+NOT_ONE = -2
+"""Index that stands for a motion that is none of the figure's animations."""
+
+_LONGEST = 48  # characters of a name
+
+
+@dataclass(slots=True)
+class Animations:
+    """Edited keys of animations that are not played now.
+
+    Attributes
+    ----------
+    edited : dict
+        Clips by actor and index of the animation; those without edits are missing.
+    """
+
+    edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
+
+
+def has_animations(state: AppState) -> bool:
+    """Return whether any actor of the scene has animations."""
+    return any(actor.figure.animations for actor in state.scene.actors)
+
+
+def no_animations(state: AppState) -> str:
+    """Return the reason why no animation of the chosen actor can be played."""
+    return "" if state.actor.figure.animations else "this figure has no animations"
+
+
+def played(actor: Actor) -> int:
+    """Return the index of the animation that an actor plays, -1 for none, else ``NOT_ONE``."""
+    if actor.clip is None:
+        return -1
+    return actor.animation if isinstance(actor.clip, TransformClip) else NOT_ONE
+
+
+def animation_texts(actor: Actor) -> dict[int, str]:
+    """Return the entries of a list of an actor's animations, by index."""
+    figure = actor.figure
+    texts = {-1: "none: rest pose"}
+    for index, (label, one) in enumerate(
+        zip(animation_labels(figure), figure.animations, strict=True)
+    ):
+        seconds = number_text(one.end - one.start, ".2f")
+        texts[index] = f"{printable(label, _LONGEST)}   {seconds} s"
+    if played(actor) == NOT_ONE and actor.clip is not None:
+        texts[NOT_ONE] = printable(actor.clip.name, _LONGEST)
+    return texts
+
+
+def choose_animation(state: AppState, index: int) -> None:
+    """Play an animation of the chosen actor from its start, in all figures of its file.
+
+    Edited keys are kept while others play. If the file's keys are invalid, the message is shown and
+    nothing changes.
+
+    Parameters
+    ----------
+    state : AppState
+        Holds the actors.
+    index : int
+        Index among the animations of the chosen actor; -1 for none.
+    """
+    chosen = state.actor
+    if index == played(chosen) or not -1 <= index < len(chosen.figure.animations):
+        return
+    try:
+        clips = _clips(state, chosen, index)
+    except FormatError as problem:
+        state.error = str(problem)
+        return
+    for actor, (number, clip) in clips.items():
+        _put_aside(state, actor)
+        play_animation(actor, number, clip)
+    state.clock.follow(chosen)
+    if state.clock.has_motion:
+        motion = chosen.clip
+        start = state.clock.whole[0] if motion is None else motion.start + chosen.offset
+        state.clock.seek(start)
+    name = "none" if index < 0 else animation_labels(chosen.figure)[index]
+    state.say_status(f"Animation: {printable(name, _LONGEST)}")
+
+
+def _clips(
+    state: AppState, chosen: Actor, index: int
+) -> dict[Actor, tuple[int, TransformClip | None]]:
+    """Return what each actor of the file plays: index and keys. Reads keys, which may fail."""
+    edited = state.of(Animations).edited
+    found: dict[Actor, tuple[int, TransformClip | None]] = {}
+    for actor in _of_one_file(state, chosen):
+        number = -1
+        if index >= 0:
+            number = counterpart(actor.figure, chosen.figure.animations[index])
+        if actor is not chosen and played(actor) == NOT_ONE:
+            continue  # it has a motion from another file
+        clip = None if number < 0 else actor.figure.animations[number].clip()
+        found[actor] = number, edited.get((actor, number), clip)
+    return found
+
+
+def _of_one_file(state: AppState, chosen: Actor) -> list[Actor]:
+    """Return the actors with animations that were read from the chosen actor's file."""
+    if chosen.origin is None:
+        return [chosen]
+    return [
+        actor
+        for actor in state.scene.actors
+        if actor.figure.animations and actor.origin == chosen.origin
+    ]
+
+
+def _put_aside(state: AppState, actor: Actor) -> None:
+    """Keep the keys of the animation that an actor plays now, if they were edited."""
+    index, edited = played(actor), state.of(Animations).edited
+    for key in [key for key in edited if key[0] not in state.scene.actors]:
+        del edited[key]
+    if index < 0 or not isinstance(actor.clip, TransformClip):
+        return
+    edited.pop((actor, index), None)
+    if actor.clip is not actor.figure.animations[index].clip():
+        edited[actor, index] = actor.clip
+
+
+def step_animation(state: AppState, by: int) -> None:
+    """Play the next or a previous animation of the chosen actor; the last is followed by the first.
+
+    Parameters
+    ----------
+    state : AppState
+        Holds the actors.
+    by : int
+        1 or -1.
+    """
+    count = len(state.actor.figure.animations)
+    if not count:
+        state.say_status(no_animations(state))
+        return
+    now = played(state.actor)
+    choose_animation(state, (now + by) % count if now >= 0 else (0 if by > 0 else count - 1))

@@ -1,0 +1,170 @@
+"""References to textures in glTF materials: image, sampler, texture coordinates and transform."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element
+from viewer.formats._gltf.images import DecodedImage
+from viewer.formats._gltf.lenient import bounded, lenient
+from viewer.rig.arrays import Floats
+from viewer.rig.material import MINIFICATIONS, Texture
+
+__all__ = ["Slot", "read_slot"]
+
+_WRAPS = {33071: "clamp", 10497: "repeat", 33648: "mirror"}
+_NEAREST, _LINEAR = 9728, 9729
+_MINIFIED = dict(zip((9728, 9729, 9984, 9985, 9986, 9987), MINIFICATIONS, strict=True))
+_READABLE = "EXT_texture_webp"
+_UNREADABLE = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
+_LARGEST = 1e6  # offsets and scales beyond this cannot resolve a texel in single precision
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slot:
+    """Reference of a material to a texture.
+
+    Attributes
+    ----------
+    image : int
+        Index of the image, -1 if there is none that can be read.
+    placing : dict
+        Set, transform, wrap and filters of ``Texture``.
+    """
+
+    image: int
+    placing: dict[str, Any]
+
+    def texture(self, images: dict[int, DecodedImage], channel: int = 0) -> Texture:
+        """Return the texture, which reads single numbers from a channel."""
+        image = images.get(self.image, DecodedImage(""))
+        pixels, encoded = image.pixels, image.encoded
+        return Texture(image.name, pixels, channel, encoded=encoded, **self.placing)
+
+
+def read_slot(document: Document, parent: Element, name: str) -> Slot | None:
+    """Return the texture to which a member of a material refers; None if there is none.
+
+    Parameters
+    ----------
+    document : Document
+        The opened file, which records warnings about invalid references.
+    parent : Element
+        The material, or a part of it.
+    name : str
+        Name of the member, such as ``"normalTexture"``.
+    """
+    source = document.source
+    info = lenient(source, lambda: parent.part(name), None)
+    if info is None:
+        return None
+    count = len(document.table("textures"))
+    index = lenient(source, lambda: info.index("index", count, "textures"), -1)
+    if index < 0:
+        return None
+    texture = lenient(source, lambda: document.table("textures")[index], None)
+    if texture is None:
+        return None
+    placing = _placed(info) | _sampled(document, texture)
+    return Slot(_image(document, texture), placing)
+
+
+def _image(document: Document, texture: Element) -> int:
+    """Return the index of a texture's image; -1 with a warning if none is readable."""
+    source, count = document.source, document.buffers.n_images
+    found = -1
+    for element in (_extension(texture, _READABLE), texture):
+        if element is not None and found < 0:
+            read = partial(element.index, "source", count, "images")
+            found = lenient(source, read, -1)
+    if found < 0:
+        named = [name for name in _UNREADABLE if _extension(texture, name) is not None]
+        if named:
+            texture.warn("F005.gltf-format", found=named[0])
+        else:
+            texture.warn("F005.gltf-texture")
+    return found
+
+
+def _sampled(document: Document, texture: Element) -> dict[str, Any]:
+    """Return the wrap modes and filters of a texture; by default it repeats smoothly."""
+    source, table = document.source, document.table("samplers")
+    index = lenient(source, lambda: texture.index("sampler", len(table), "samplers"), -1)
+    sampler = lenient(source, lambda: table[index], None) if index >= 0 else None
+    if sampler is None:
+        return {"wrap": ("repeat", "repeat")}
+    wrap = tuple(_constant(sampler, name, _WRAPS, "repeat") for name in ("wrapS", "wrapT"))
+    smoothness = {_NEAREST: "nearest", _LINEAR: "linear"}
+    magnified = _constant(sampler, "magFilter", smoothness, "linear")
+    minified = _constant(sampler, "minFilter", _MINIFIED, "")
+    return {"wrap": wrap, "is_smooth": magnified == "linear", "minification": minified}
+
+
+def _constant(sampler: Element, name: str, meanings: dict[int, str], default: str) -> str:
+    """Return the meaning of an OpenGL constant; the default, with a warning, if unknown."""
+    if not sampler.has(name):
+        return default
+    value = lenient(sampler.source, lambda: sampler.whole(name), -1)
+    if value in meanings:
+        return meanings[value]
+    if value >= 0:
+        used = default or "the default"
+        sampler.warn("F006.gltf-choice", name, choices=[*meanings], found=str(value), used=used)
+    return default
+
+
+def _placed(info: Element) -> dict[str, Any]:
+    """Return the set of texture coordinates, and the transform of KHR_texture_transform."""
+    source = info.source
+    uv_set = lenient(source, lambda: info.whole("texCoord", 0), 0)
+    extension = _extension(info, "KHR_texture_transform")
+    if extension is None:
+        return {"uv_set": uv_set}
+    uv_set = lenient(source, lambda: extension.whole("texCoord", uv_set), uv_set)
+    offset, scale = (_pair(extension, *pair) for pair in (("offset", 0.0), ("scale", 1.0)))
+    angle = bounded(extension, "rotation", 0.0, -_LARGEST, _LARGEST)
+    return {"uv_set": uv_set, "transform": transform_matrix(offset, angle, scale)}
+
+
+def _pair(extension: Element, name: str, default: float) -> Floats:
+    """Return two numbers of a texture transform."""
+    found = lenient(extension.source, lambda: extension.numbers(name, 2), None)
+    return np.full(2, default) if found is None else np.clip(found, -_LARGEST, _LARGEST)
+
+
+def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
+    """Return a texture transform with v = 0 at the bottom: F T(offset) R(-angle) S(scale) F.
+
+    F flips v: glTF puts v = 0 at the first row of the image. The transform is that of
+    KHR_texture_transform, whose rotation is counter-clockwise as seen on the image.
+
+    Parameters
+    ----------
+    offset, scale : (2,)
+        Of texture coordinates from 0 to 1.
+    angle : float
+        Radians.
+
+    Returns
+    -------
+    (2, 3)
+        Maps (u, v, 1) to texture coordinates of the image.
+
+    >>> transform_matrix(np.array([0.5, 0.0]), 0.0, np.array([1.0, 0.5])).tolist()
+    [[1.0, 0.0, 0.5], [0.0, 0.5, 0.5]]
+    """
+    cos, sin = math.cos(angle), math.sin(angle)
+    (a, b), (c, d) = np.array([[cos, sin], [-sin, cos]]) * scale
+    u, v = offset
+    # Adding 0 makes negative zeros positive.
+    return np.array([[a, -b, b + u], [-c, d, 1.0 - d - v]]) + 0.0
+
+
+def _extension(element: Element, name: str) -> Element | None:
+    return lenient(element.source, lambda: element.extension(name), None)

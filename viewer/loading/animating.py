@@ -1,0 +1,64 @@
+"""Starts the animations that figures come with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError, RigError
+from viewer.loading.cast import Cast
+from viewer.rig.motion.animation_choice import chosen_animation, counterpart, play_animation
+from viewer.rig.scene import Actor
+
+__all__ = ["animate"]
+
+
+def animate(cast: Cast, wanted: str) -> None:
+    """Let actors without a motion play an animation of their file.
+
+    Parameters
+    ----------
+    cast : Cast
+        Its actors are posed by their clips later.
+    wanted : str
+        See ``chosen_animation``; files without it stay at rest.
+
+    Raises
+    ------
+    RigError
+        If no file has the requested animation.
+    FormatError
+        If its keys are invalid. If none was requested, this is only a warning.
+    """
+    files = _files(cast)
+    if wanted and not files:
+        raise RigError(Diagnostic("F004.no-animations", values={"name": wanted}))
+    refusals = []
+    for actors in files:
+        try:
+            _start(cast, actors, wanted)
+        except RigError as problem:
+            refusals.append(problem)
+    if files and len(refusals) == len(files):
+        raise refusals[0]
+
+
+def _files(cast: Cast) -> list[list[Actor]]:
+    """Return the actors that can be animated, those of one file together."""
+    files: dict[object, list[Actor]] = {}
+    for actor in cast.actors:
+        if actor.figure.animations and actor.clip is None:
+            files.setdefault(actor if actor.origin is None else actor.origin, []).append(actor)
+    return [*files.values()]
+
+
+def _start(cast: Cast, actors: list[Actor], wanted: str) -> None:
+    chosen = chosen_animation([actor.figure for actor in actors], wanted)
+    for actor in actors:
+        index = -1 if chosen is None else counterpart(actor.figure, chosen)
+        try:
+            play_animation(actor, index)
+        except FormatError as problem:
+            if wanted:
+                raise
+            cast.diagnostics.append(replace(problem.diagnostic, is_refusal=False))

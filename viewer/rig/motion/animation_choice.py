@@ -1,0 +1,140 @@
+"""Choice of one of a figure's animations by name or number, and its start."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
+from viewer.near_names import name_hint
+from viewer.rig.figure import Figure
+from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, figure_pose
+
+__all__ = ["NONE", "animation_labels", "chosen_animation", "counterpart", "play_animation"]
+
+NONE = "none"
+"""Name that stands for no animation."""
+
+
+def animation_labels(figure: Figure) -> tuple[str, ...]:
+    """Return a different label for each animation: its name, or its number if it has none.
+
+    >>> from viewer.rig.mesh import Mesh
+    >>> named = [Animation(name, 0.0, 1.0, lambda: None) for name in ("walk", "", "walk")]
+    >>> figure = Figure("f", Mesh([[0, 0, 0]], [[0, 0, 1]], [[0, 0, 0]]), animations=tuple(named))
+    >>> animation_labels(figure)
+    ('walk', 'animation 2', 'walk (2)')
+    """
+    labels, counts = [], Counter[str]()
+    for number, animation in enumerate(figure.animations, 1):
+        counts[animation.name] += 1
+        count = counts[animation.name]
+        repeated = f"{animation.name} ({count})" if count > 1 else animation.name
+        labels.append(repeated if animation.name else f"animation {number}")
+    return tuple(labels)
+
+
+def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None:
+    """Return the animation that a text names.
+
+    Parameters
+    ----------
+    figures : sequence of Figure
+        Figures with animations; numbers refer to the figure that has the most.
+    wanted : str
+        A name or label, compared exactly and then without case; a number from 1; ``NONE``; or
+        empty for the first animation.
+
+    Returns
+    -------
+    Animation or None
+        None for ``NONE``, and if there are no animations and none is requested.
+
+    Raises
+    ------
+    RigError
+        If there is no such animation.
+    """
+    longest = max(figures, key=lambda figure: len(figure.animations), default=None)
+    every = () if longest is None else longest.animations
+    if not wanted:
+        return every[0] if every else None
+    named = [
+        (label, animation)
+        for figure in figures
+        for label, animation in zip(animation_labels(figure), figure.animations, strict=True)
+    ]
+    for label, animation in named:
+        if wanted in (label, animation.name):
+            return animation
+    for label, animation in named:
+        if wanted.lower() in (label.lower(), animation.name.lower()):
+            return animation
+    if wanted.lower() == NONE:
+        return None
+    if wanted.isdecimal() and 0 < int(wanted) <= len(every):
+        return every[int(wanted) - 1]
+    names = tuple(dict.fromkeys(label for label, _ in named))
+    raise RigError(
+        Diagnostic("F004.animation", values={"name": wanted, "hint": name_hint(wanted, names)})
+    )
+
+
+def counterpart(figure: Figure, animation: Animation) -> int:
+    """Return the index of a figure's own part of an animation of its file, -1 if it has none.
+
+    Figures of one file have animations of the same names; of several with one name, the range
+    decides.
+    """
+    found = [
+        (other.start != animation.start or other.end != animation.end, index)
+        for index, other in enumerate(figure.animations)
+        if other is animation or other.name == animation.name
+    ]
+    exact = [index for index, other in enumerate(figure.animations) if other is animation]
+    return exact[0] if exact else min(found, default=(False, -1))[1]
+
+
+def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) -> None:
+    """Let an actor play one of its figure's animations, or none, in place.
+
+    What the animation does not move returns to the file's pose. The placement of the figure and
+    shapes that neither animation moves are kept.
+
+    Parameters
+    ----------
+    actor : Actor
+        With a pose if it has animations.
+    index : int
+        Index of the animation; -1 for none.
+    clip : TransformClip, optional
+        Edited keys of the animation; those of the file if omitted.
+
+    Raises
+    ------
+    FormatError
+        If the keys are invalid; nothing changes then.
+    """
+    chosen: TransformClip | None = None
+    if index >= 0:
+        chosen = clip or actor.figure.animations[index].clip()
+    if actor.pose is not None:
+        actor.pose = _returned(actor, actor.pose)
+    actor.clip, actor.animation = chosen, index
+
+
+def _returned(actor: Actor, pose: Pose) -> Pose:
+    """Return the file's pose with the present placement and shape."""
+    own = figure_pose(actor.figure)
+    own.figure_scale, own.figure_translation = pose.figure_scale, pose.figure_translation
+    weights = pose.shape_weights.copy()
+    if isinstance(actor.clip, TransformClip):
+        for channel in actor.clip.channels:
+            if channel.shapes is not None:
+                weights[channel.shapes] = own.shape_weights[channel.shapes]
+    own.shape_weights = weights
+    return own

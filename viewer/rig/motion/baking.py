@@ -1,0 +1,50 @@
+"""Keyed transforms baked to frames, for operations on local rotations at a fixed rate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.figure import Figure
+from viewer.rig.motion.evaluation import frame_rate, frames_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
+
+__all__ = ["baked"]
+
+_ON_FRAME = 1e-6  # fraction of a frame
+
+
+def baked(
+    figure: Figure, clip: TransformClip, rate: float | None = None, base: Pose | None = None
+) -> SampledClip:
+    """Return a clip's poses at a fixed rate, from its start to its last whole frame.
+
+    Parameters
+    ----------
+    figure : Figure
+        With the skeleton that the clip moves.
+    clip : TransformClip
+        The motion.
+    rate : float, optional
+        Frames per second; that of the keys if omitted.
+    base : Pose, optional
+        Provides what the clip does not animate; the figure's own pose if omitted.
+
+    Raises
+    ------
+    RigError
+        If the figure has no skeleton.
+    """
+    rate = frame_rate(clip) if rate is None else rate
+    count = int(np.floor((clip.end - clip.start) * rate + _ON_FRAME)) + 1
+    frames = frames_of(figure, clip, clip.start + np.arange(count) / rate, base)
+    return SampledClip(
+        clip.name,
+        Timing(rate, np.arange(count, dtype=np.int32), start=clip.start),
+        frames.rotations,
+        frames.translations,
+        shape_weights=frames.shape_weights if figure.n_shapes else None,
+        scales=frames.scales,
+    )

@@ -1,0 +1,236 @@
+"""Arrays of all keys of a transform clip, laid out for evaluation without loops over channels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformChannel, TransformPath
+
+__all__ = ["Arcs", "Curves", "Targets", "Timelines", "TransformTable", "transform_table"]
+
+_SMALLEST = 1e-9  # radians; a smaller angle gives the same weights as a line
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Timelines:
+    """U different lists of key times; most channels of a file share one.
+
+    Attributes
+    ----------
+    times : (K,)
+        Seconds of all keys, one timeline after the other.
+    first, last : (U,)
+        Index of each timeline's first and last key.
+    durations : (K,)
+        Seconds until the next key of the timeline, inf after its last.
+    union : (M,)
+        All different times, increasing.
+    ranks : (K,) int64
+        u (M + 1) + the number of times of ``union`` up to the key, for a key of timeline u:
+        increasing, so that one search finds the spans of all timelines.
+    """
+
+    times: Floats
+    first: Ints
+    last: Ints
+    durations: Floats
+    union: Floats
+    ranks: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arcs:
+    """R rotations that follow arcs between their keys, or hold the earlier one.
+
+    Attributes
+    ----------
+    timelines : (R,)
+        Timeline of each.
+    bases : (R,)
+        Row of its first key.
+    slopes : (R,)
+        1; 0 for steps, which stay at the earlier key.
+    keys : (N, 4)
+        Unit quaternions with signs such that neighbours are less than 180 degrees apart. The last
+        key of each channel is repeated, so that every key has a successor.
+    angles, sines : (N,)
+        Angle of the arc to the next key, and its sine.
+    """
+
+    timelines: Ints
+    bases: Ints
+    slopes: Floats
+    keys: Floats
+    angles: Floats
+    sines: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curves:
+    """C components of channels, each a scalar curve of lines, steps or cubic splines.
+
+    Attributes
+    ----------
+    timelines : (C,)
+        Timeline of each.
+    bases, strides : (C,)
+        Index of its first value, and the distance to its next.
+    slopes : (C,)
+        1; 0 for steps. Empty for cubic curves.
+    values : (N,)
+        All values; the last key of each channel is repeated.
+    incoming, outgoing : (N,)
+        Slopes per second at the same indices; empty for lines and steps.
+    """
+
+    timelines: Ints
+    bases: Ints
+    strides: Ints
+    slopes: Floats
+    values: Floats
+    incoming: Floats
+    outgoing: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """Joints or shapes that one path animates, in the order of the samples.
+
+    Attributes
+    ----------
+    indices : (N,) int32
+        Joints, or blend shapes.
+    lines, cubics : slice
+        Components among the lines and steps, and among the cubic curves; lines come first.
+    """
+
+    indices: Ints
+    lines: slice
+    cubics: slice
+
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
+class TransformTable:
+    """All keys of a clip, and the targets of each path."""
+
+    timelines: Timelines
+    arcs: Arcs
+    lines: Curves
+    cubics: Curves
+    targets: dict[TransformPath, Targets]
+
+
+def transform_table(channels: Sequence[TransformChannel]) -> TransformTable:
+    """Lay out the keys of channels: arcs of rotations, then lines and splines by path."""
+    timelines, of_channel = _timelines([channel.times for channel in channels])
+    numbered = list(zip(channels, of_channel, strict=True))
+
+    def chosen(wanted: Callable[[TransformChannel], bool]) -> list[tuple[TransformChannel, int]]:
+        # The order of paths makes the components of each path adjacent.
+        found = [one for one in numbered if wanted(one[0])]
+        return sorted(found, key=lambda one: TRANSFORM_PATHS.index(one[0].path))
+
+    arcs = chosen(lambda one: one.path == "rotation" and one.interpolation != "cubic")
+    lines = chosen(lambda one: one.path != "rotation" and one.interpolation != "cubic")
+    cubics = chosen(lambda one: one.interpolation == "cubic")
+    targets = {
+        path: _targets(path, [one for one, _ in arcs], [one for one, _ in lines],
+                       [one for one, _ in cubics])
+        for path in TRANSFORM_PATHS
+    }  # fmt: skip
+    return TransformTable(timelines, _arcs(arcs), _curves(lines), _curves(cubics), targets)
+
+
+def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
+    """Return the different lists of times, and the index of the list of each channel."""
+    known: dict[bytes, int] = {}
+    of_channel = [known.setdefault(times.tobytes(), len(known)) for times in every]
+    parts = [np.frombuffer(raw, dtype=np.float64) for raw in known]
+    counts = np.array([len(part) for part in parts], dtype=np.int64)
+    last = np.cumsum(counts) - 1
+    first = last + 1 - counts
+    times = np.concatenate([np.zeros(0), *parts])
+    durations = np.append(np.diff(times), np.inf)[: len(times)]
+    durations[last] = np.inf
+    union = np.unique(times)
+    owners = np.repeat(np.arange(len(parts), dtype=np.int64), counts)
+    ranks = owners * (len(union) + 1) + np.searchsorted(union, times, side="right")
+    as_ints = first.astype(np.int32), last.astype(np.int32)
+    return Timelines(times, *as_ints, durations, union, ranks), of_channel
+
+
+def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
+    keys, angles, bases, row = [np.zeros((0, 4))], [np.zeros(0)], [], 0
+    for channel, _ in channels:
+        unit = channel.values / np.linalg.norm(channel.values, axis=1, keepdims=True)
+        unit = np.concatenate([unit, unit[-1:]])
+        # A quaternion and its negative are one rotation: the nearer one gives the shorter arc.
+        far = np.einsum("na,na->n", unit[1:], unit[:-1]) < 0.0
+        unit[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
+        chords = np.linalg.norm(np.diff(unit, axis=0, append=unit[-1:]), axis=1)
+        keys.append(unit)
+        # The chord is accurate at small angles, where the arc cosine loses half the digits.
+        angles.append(np.maximum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0)), _SMALLEST))
+        bases.append(row)
+        row += len(unit)
+    every = np.concatenate(angles)
+    return Arcs(
+        np.array([timeline for _, timeline in channels], dtype=np.int32),
+        np.array(bases, dtype=np.int32),
+        np.array([float(one.interpolation != "step") for one, _ in channels]),
+        np.concatenate(keys),
+        every,
+        np.sin(every),
+    )
+
+
+def _curves(channels: list[tuple[TransformChannel, int]]) -> Curves:
+    of_component: list[tuple[int, int, int, float]] = []
+    values, incoming, outgoing = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
+    start = 0
+    for channel, timeline in channels:
+        width, slope = channel.n_components, float(channel.interpolation != "step")
+        of_component += [(timeline, start + part, width, slope) for part in range(width)]
+        values.append(np.concatenate([channel.values, channel.values[-1:]]).ravel())
+        if channel.tangents is not None:
+            tangents = np.concatenate([channel.tangents, channel.tangents[-1:]])
+            incoming.append(tangents[:, 0].ravel())
+            outgoing.append(tangents[:, 1].ravel())
+        start += values[-1].size
+    table = np.array(of_component, dtype=np.float64).reshape(-1, 4)
+    timelines, bases, strides = table[:, :3].astype(np.int64).T
+    parts = (np.concatenate(part) for part in (values, incoming, outgoing))
+    return Curves(timelines, bases, strides, table[:, 3].copy(), *parts)
+
+
+def _targets(
+    path: str,
+    arcs: list[TransformChannel],
+    lines: list[TransformChannel],
+    cubics: list[TransformChannel],
+) -> Targets:
+    """Return the targets of a path, those of arcs or lines first."""
+    plain = arcs if path == "rotation" else lines
+    indices = [np.zeros(0, dtype=np.int32)]
+    for channel in (*plain, *cubics):
+        if channel.path == path:
+            own = np.array([channel.joint]) if channel.shapes is None else channel.shapes
+            indices.append(own.astype(np.int32))
+    return Targets(
+        np.concatenate(indices),
+        slice(0, 0) if path == "rotation" else _components(path, lines),
+        _components(path, cubics),
+    )
+
+
+def _components(path: str, channels: list[TransformChannel]) -> slice:
+    """Return where the components of a path lie among those of ordered channels."""
+    widths = [(channel.path, channel.n_components) for channel in channels]
+    place = TRANSFORM_PATHS.index
+    start = sum(width for other, width in widths if place(other) < place(path))
+    return slice(start, start + sum(width for other, width in widths if other == path))
