@@ -53,7 +53,7 @@ def unknown_bone() -> File:
 
 
 PLANTED = {
-    "G001": (without_asset, "/"),
+    "G001": (without_asset, ""),
     "G002": (misaligned, "/accessors/0"),
     "G003": (not_unit, "/nodes/1/rotation"),
     "G004": (joint_twice, "/skins/0/joints"),

@@ -33,6 +33,7 @@ MESSAGES = {
     "G001.length": "expected {expected:#byte} as declared by the header, found {found}",
     "G001.constants": "{n:#number} invalid in JSON (first: {found})",
     "G001.repeated": "{n:#repeated key} (first: {found:quoted}): only the last value is used",
+    "G001.nulls": "{n:#member} that {n:?is|are} null: ignored",
     "G001.text": "invalid UTF-8 at byte {at} of the JSON: replaced",
     # Values
     "F002.gltf-missing": "expected {wanted} as {member:quoted}, found none",
