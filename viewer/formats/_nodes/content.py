@@ -96,6 +96,8 @@ class Primitive:
         Offsets of the positions for each morph target of the mesh.
     normal_targets : (S, V, 3) or None
         Offsets of the normals; None if the file has none.
+    pointer : str
+        JSON pointer to it; empty in other files.
     """
 
     positions: Floats
@@ -108,6 +110,7 @@ class Primitive:
     material: int = -1
     targets: Floats | None = None
     normal_targets: Floats | None = None
+    pointer: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,6 +202,8 @@ class NodeAnimation:
         Nodes that it moves.
     read : callable
         Returns the channels; called at most once, may raise a ``FormatError``.
+    pointer : str
+        JSON pointer to it; empty in other files.
     """
 
     name: str
@@ -206,6 +211,7 @@ class NodeAnimation:
     end: float
     nodes: frozenset[int]
     read: Callable[[], tuple[NodeChannel, ...]]
+    pointer: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -285,6 +291,8 @@ class NodeFile:
         Facial expressions.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
+    has_pointers : bool
+        Whether elements have JSON pointers, ``/nodes/3`` for instance.
     """
 
     name: str
@@ -303,3 +311,4 @@ class NodeFile:
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
+    has_pointers: bool = False
