@@ -15,10 +15,10 @@ from typing import Any
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.glossiness import Glossiness, from_glossiness, read_glossiness
-from viewer.formats._gltf.images import DecodedImage, decoded_images
-from viewer.formats._gltf.lenient import bounded, bounded_rows, chosen, lenient
-from viewer.formats._gltf.textures import Slot, read_slot
+from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
+from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
+from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
+from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.rig.material import ALPHA_MODES, Material
 
 __all__ = ["DEFAULT_MATERIAL", "DRAWN_EXTENSIONS", "read_materials"]
