@@ -17,6 +17,7 @@ NAMES = [
     "structure",
     "motion",
     "read",
+    "gltf",
     "captures",
     "observing",
     "losses",

@@ -15,6 +15,10 @@ Errors name the element by its JSON pointer. Specification: Khronos Group, glTF 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from viewer.formats._gltf.animations import read_animations
 from viewer.formats._gltf.bindings import checked_bindings
 from viewer.formats._gltf.cameras import read_cameras
@@ -25,7 +29,8 @@ from viewer.formats._gltf.nodes import read_tree
 from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._gltf.targets import node_weights
+from viewer.formats._nodes.content import NodeFile, NodeSkin, NodeTree
 from viewer.formats._source import Source
 from viewer.rig.material import Material
 
@@ -49,9 +54,10 @@ def read_nodes(source: Source) -> NodeFile:
     document = open_document(source)
     _check_version(document)
     check_extensions(document)
-    tree = read_tree(document)
     skins = read_skins(document)
+    tree = _without_empty_skins(read_tree(document), skins)
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
+    tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
     root = document.root
     return NodeFile(
         name=source.path.stem,
@@ -66,6 +72,13 @@ def read_nodes(source: Source) -> NodeFile:
         extras=root.values.get("extras"),
         asset=_object(document, "asset"),
     )
+
+
+def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTree:
+    """Return the nodes without their references to skins that have no joints."""
+    empty = [index for index, skin in enumerate(skins) if not len(skin.joints)]
+    used = np.where(np.isin(tree.skins, empty), -1, tree.skins).astype(np.int32)
+    return replace(tree, skins=used) if empty else tree
 
 
 def _names(document: Document, name: str) -> list[str]:

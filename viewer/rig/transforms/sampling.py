@@ -135,7 +135,7 @@ def _cubics(curves: Curves, timelines: Timelines, spans: Ints, fractions: Floats
     u, start = fractions.take(curves.timelines, axis=1), curves.values.take(rows)
     rise = curves.values.take(following) - start
     leaving, arriving = curves.outgoing.take(rows), curves.incoming.take(following)
-    # The basis functions of both keys add up to 1, so p0 is exact at u = 0.
+    # The basis functions of both keys sum to 1, so p0 is exact at u = 0.
     bend = (u - 1.0) * (u - 1.0) * leaving + u * (u - 1.0) * arriving
     return start + u * u * (3.0 - 2.0 * u) * rise + durations * u * bend
 

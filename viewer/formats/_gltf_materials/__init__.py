@@ -1,0 +1,1 @@
+"""Materials of glTF documents: their textures, images, and older models."""
