@@ -5,8 +5,8 @@ in vec3 in_corner;      // x and z across in half widths, y from the joint (0) t
 in vec3 in_normal;      // in the same frame; 0 for one normal per triangle
 in float in_tint;       // 0: the joint's colour, 1: that of the axis in_link.z
 in ivec3 in_link;       // joint; its child, -1 for an end, -2 for a ball; axis that marks the roll
-in vec4 in_end;         // of an end without child: direction in joint space, length in figure units
-in vec3 in_width;       // share of the length, smallest and largest half width, figure units
+in vec4 in_end;         // end without a child: direction in joint space, length in figure units
+in vec3 in_width;       // fraction of the length; smallest and largest half width, figure units
 in vec3 in_color;       // linear
 
 uniform mat4 u_model_view;     // figure space, minus the skeleton's centre, to camera space
@@ -55,7 +55,8 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
     return size > 1e-12 ? v / size : otherwise;
 }
 
-// Unit vector across a unit direction: an axis of the joint, or any if that is along it.
+// Unit vector perpendicular to a unit direction: an axis of the joint, or any vector if that is
+// parallel.
 vec3 across(vec3 way, vec3 wanted) {
     vec3 side = unit_or(wanted, vec3(0.0));
     side -= way * dot(way, side);

@@ -1,6 +1,6 @@
 #version 330
-// A camera's image without its lens distortion: each ideal pixel is looked up where the lens drew it
-// (the model of OpenCV, as in viewer/rendering/pinhole.py).
+// A camera's image without its lens distortion: each ideal pixel is looked up where the lens
+// projected it (the model of OpenCV, as in viewer/rendering/pinhole.py).
 
 in vec2 v_pixel;                // ideal pixel; 0, 0 is the centre of the first one
 

@@ -6,7 +6,7 @@ uniform vec4 u_right;       // from there to the upper right corner
 uniform vec4 u_down;        // and to the lower left one
 uniform vec4 u_pixels;      // ideal pixels at the upper left and the lower right corner
 
-out vec2 v_pixel;           // of a camera without distortion; 0, 0 is the centre of the first one
+out vec2 v_pixel;           // undistorted pixel; 0, 0 is the centre of the first pixel
 
 void main() {
     vec2 place = vec2(gl_VertexID & 1, gl_VertexID >> 1);

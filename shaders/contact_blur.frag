@@ -12,9 +12,9 @@ uniform float u_near;       // height at which contact ends
 uniform vec2 u_narrow;      // standard deviations of the blurs, widths of the field
 uniform vec2 u_wide;
 
-out vec2 f_darkness;        // by contact, and by occluders farther above
+out vec2 f_darkness;        // darkness by contact, and by occluders farther above
 
-const int REACH = 8;        // samples to either side, over two and a half deviations
+const int REACH = 8;        // samples on either side, over two and a half deviations
 
 vec2 darkness(vec2 place) {
     vec2 found = texture(u_field, place).rg;

@@ -2,7 +2,7 @@
 // Contact shadows on the ground: black with an opacity, so that they also show on a transparent
 // background.
 
-in vec2 v_place;            // of the field
+in vec2 v_place;            // in the field
 
 uniform sampler2D u_field;  // darkness by contact, and by occluders farther above
 uniform vec2 u_opacity;     // of both

@@ -22,7 +22,7 @@ flat out float v_opacity;
 flat out int v_instance;
 
 #ifdef MATERIALS
-in vec4 in_other_uvs;   // second and third set that is used
+in vec4 in_other_uvs;   // second and third set of texture coordinates in use
 in vec4 in_tint;        // linear, with opacity
 out vec4 v_other_uvs;
 out vec4 v_tint;

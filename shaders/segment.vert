@@ -20,8 +20,8 @@ noperspective out vec2 v_place;     // pixels along and across the segment
 flat out float v_length;            // pixels
 flat out float v_radius;            // pixels
 
-// Moves a point towards the eye without changing its pixel, so that it is not hidden by the
-// surface that it lies on.
+// Moves a point towards the eye without changing its pixel, so that it is not hidden by the surface
+// on which it lies.
 vec4 lifted(vec3 place) {
     vec3 seen = (u_model_view * vec4(place, 1.0)).xyz;
     seen = u_orthographic ? seen + vec3(0.0, 0.0, u_height) : seen * (1.0 - u_lift);

@@ -67,7 +67,9 @@ ALLOWED_IN_APP = {
     "weights": {"core", "shown_panels", "files", "posing", "weights"},
     "view": {"core", "features", "posing", "weights", "view"},
     "manual": {"core", "manual"},
-    "palette": {"core", "features", "shown_panels", "posing", "view", "weights", "palette"},
+    "palette": {
+        *("core", "features", "shown_panels", "playback", "posing", "view", "weights", "palette"),
+    },
     "context": {
         *("core", "features", "actors", "posing", "weights", "view", "palette", "context"),
     },

@@ -59,7 +59,7 @@ def test_bvh_with_a_body_is_scaled_to_metres(bvh):
     assert skeleton.figure.mesh is None
     assert_allclose(places(skeleton), PERSON_TURNED, rtol=0, atol=1e-12)
     facts = dict(skeleton.figure.facts)
-    assert facts["unit"] == "cm, taken from the skeleton's size of 170; scaled to metres"
+    assert facts["unit"] == "cm, estimated from the skeleton's size of 170; scaled to metres"
     # Common units: the box is as high as the people, who stand next to each other.
     width, height, _ = np.ptp(scene_box(scene), axis=0)
     assert 1.7 < height < 2.5 and width < 4.0

@@ -19,6 +19,7 @@ from driven_window import PATIENCE, ROOT, Window, _ask_to_close, _wait_for
 from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
 from PIL import Image
+from x11_clipboard import offer_clipboard, read_clipboard
 
 import viewer
 from viewer.app.view.picks import vertex_at
@@ -191,6 +192,31 @@ def test_files_and_folders_dragged_onto_the_window_open(window, tmp_path):
     app.wait_until_quiet()
     app.key("ctrl+q")
     app.finish()
+
+
+def test_text_is_typed_copied_and_pasted_as_in_other_programs(window, places):
+    app = window()
+    x0, y0, x1, y1 = places[0]["Filter"]
+    subprocess.run(["setxkbmap", "de"], env=app.environment, check=True)
+    app.drag(((x0 + x1) / 2, (y0 + y1) / 2), ((x0 + x1) / 2, (y0 + y1) / 2))
+
+    def copied():
+        app.key("ctrl+a")
+        app.key("ctrl+c")
+        return read_clipboard(app.environment)
+
+    for key in ("udiaeresis", "ssharp", "dead_acute", "e"):
+        app.key(key)
+    _wait_for(lambda: copied() == "\xfc\xdf\xe9", "letters that are not in ASCII")
+    other = offer_clipboard(app.environment, "two\nlines")
+    try:
+        app.key("ctrl+a")
+        app.key("ctrl+v")
+        _wait_for(lambda: copied() == "two lines", "the text of another program in one line")
+    finally:
+        other.kill()
+        other.communicate()
+    app.key("ctrl+q")
 
 
 def test_window_closes_as_window_managers_ask(window):

@@ -10,7 +10,7 @@ Importing this package is cheap: each name loads its own module on first use.
 """
 
 # Not imported from ``typing``: no signal handler is installed yet, so imports here must be quick.
-# Type checkers know the name.
+# Type checkers recognise the name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any

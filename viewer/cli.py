@@ -36,7 +36,8 @@ _DOWNWARD = ("-y", "-z")  # values of --up and --front; they are not options
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
-    Signals end the command as they would end the program; the caller's handlers are restored.
+    Signals end the command as they would end the program; afterwards, the caller's handlers are
+    restored.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def run(arguments: Sequence[str]) -> int:
     Returns
     -------
     int
-        Exit code: 0, that of the ``ViewerError``, or 128 plus the signal's number.
+        Exit code: 0, that of the ``ViewerError``, or 128 plus the signal number.
     """
     try:
         with watched():
@@ -106,7 +107,7 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def _protect_numbers(arguments: list[str]) -> list[str]:
-    """Join ``--option -1`` to ``--option=-1``: argparse takes ``-1,2`` and ``-z`` as options."""
+    """Join ``--option -1`` to ``--option=-1``: argparse treats ``-1,2`` and ``-z`` as options."""
     joined: list[str] = []
     for argument in arguments:
         is_number = len(argument) > 1 and argument[0] == "-" and argument[1] in "0123456789."

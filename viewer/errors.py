@@ -48,12 +48,13 @@ class ViewerError(Exception):
 
     def __init__(self, problem: str | Diagnostic = "") -> None:
         self.diagnostic = problem if isinstance(problem, Diagnostic) else None
-        # Names of joints, figures and files come from files and may contain any character.
+        # Names of joints and figures come from files and may contain any character, as may file
+        # names.
         super().__init__(self._line(problem))
 
     @property
     def cause(self) -> str | Diagnostic:
-        """The diagnostic as data if there is one, else the line: a value for another diagnostic."""
+        """The diagnostic if there is one, otherwise the line: a value for another diagnostic."""
         return self.diagnostic or str(self)
 
     def _line(self, problem: str | Diagnostic) -> str:
@@ -93,7 +94,7 @@ class UnsupportedFormatError(ViewerError):
 
 
 class RigError(ViewerError):
-    """Parts of a figure are incompatible, or it has no part with a given name."""
+    """Parts of a figure are incompatible, or there is no part with a given name."""
 
     def _line(self, problem: str | Diagnostic) -> str:
         return printable(problem, _LONGEST)

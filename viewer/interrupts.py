@@ -2,8 +2,8 @@
 
 A handler that raises may do so anywhere in Python code: inside a callback of a C library that does
 not expect it (``moderngl.Context.program`` then dereferences NULL), during an import, or during
-clean-up. So the handler records the signal, and raises ``Interrupted`` immediately only while pure
-Python or numpy code runs::
+clean-up. Therefore the handler records the signal, and raises ``Interrupted`` immediately only
+while pure Python or numpy code runs::
 
     with watched():            # the command: reading files, arrays; signals raise within it
         with deferred():       # OpenGL: recorded, raised at the end of the block
@@ -42,8 +42,8 @@ _MESSAGES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung u
 _SIGNALS = {
     getattr(signal, name): word for name, word in _MESSAGES.items() if hasattr(signal, name)
 }
-_SAME = 1.0  # seconds during which further signals count as the same request
-_PAUSE = 0.02  # seconds before raising is tried again
+_SAME = 1.0  # seconds during which other signals count as the same request
+_PAUSE = 0.02  # seconds before raising is attempted again
 
 
 class Interrupted(BaseException):
@@ -66,10 +66,10 @@ class Interrupted(BaseException):
 
 
 class _Watch:
-    """The signals of one run, from ``start`` to ``stop``, both in the main thread."""
+    """The signals received between ``start`` and ``stop``, both called in the main thread."""
 
     def __init__(self, is_held: bool, owns_process: bool = False) -> None:
-        self.number = 0  # of the signal received; 0 if none
+        self.number = 0  # number of the received signal; 0 if none
         self.is_held = is_held
         self._owns_process = owns_process
         self._since = 0.0
@@ -121,7 +121,7 @@ class _Watch:
             raise Interrupted(self.number)
 
     def _force(self, number: int) -> None:
-        """End a program that does not respond; used as a library, leave that to the caller."""
+        """End a program that does not respond; if used as a library, leave that to the caller."""
         if self._owns_process:
             os.write(2, f"viewer: {_SIGNALS[number]}\n".encode())
             os._exit(128 + number)
@@ -129,7 +129,7 @@ class _Watch:
         signal.raise_signal(number)
 
     def _on_unraisable(self, problem: UnraisableHookArgs, /) -> None:
-        """Raise again an interrupt raised where Python drops exceptions, as in ``__del__``."""
+        """Raise an interrupt again that Python dropped, as it does in ``__del__``."""
         if isinstance(problem.exc_value, Interrupted):
             self._ring_again()
         else:
@@ -147,12 +147,12 @@ class _Watch:
                 _thread.interrupt_main(signal.Signals(self.number))
 
 
-# A single one, because signals belong to the process.
+# There is only one, because signals belong to the process.
 _current: _Watch | None = None
 
 
 def _mine() -> _Watch | None:
-    """Return the watch in the main thread, which is the only one that handles signals."""
+    """Return the watch if called in the main thread, the only one that handles signals."""
     is_main = threading.current_thread() is threading.main_thread()
     return _current if is_main else None
 
@@ -161,13 +161,13 @@ def _mine() -> _Watch | None:
 def watched() -> Iterator[None]:
     """Raise signals within the block, except where they are deferred or held.
 
-    The previous handlers are restored afterwards. Outside the main thread this does nothing,
-    because Python handles signals in the main thread only.
+    The previous handlers are restored afterwards. Outside the main thread, this does nothing,
+    because Python handles signals only in the main thread.
 
     Raises
     ------
     Interrupted
-        In the block, or at its beginning if ``watch_program`` has noted a signal.
+        In the block, or at its beginning if ``watch_program`` has recorded a signal.
     """
     global _current
     outer = _mine()
@@ -180,7 +180,7 @@ def watched() -> Iterator[None]:
         watch.start()
         yield
     finally:
-        watch.is_held = True  # before anything is called: handlers may run at every call
+        watch.is_held = True  # before anything is called: handlers may run at any call
         watch.stop()
         _current = None
 
@@ -255,13 +255,13 @@ def poll(in_any_thread: bool = False) -> None:
     Parameters
     ----------
     in_any_thread : bool
-        Raise outside the main thread too: for the last step of work that the main thread waits
-        for.
+        Whether to raise outside the main thread too, for the last step of work for which the main
+        thread waits.
 
     Raises
     ------
     Interrupted
-        If there was one.
+        If there was a signal.
     """
     watch = _current if in_any_thread else _mine()
     if watch is not None:

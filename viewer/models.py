@@ -25,7 +25,7 @@ _DEEPEST = 4  # levels of subfolders that are searched
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl")
 _SEX = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
-# Published file names, and the "kind:variant" that names each on the command line.
+# Published file names, and the "kind:variant" of each on the command line.
 _PUBLISHED = (
     (r"smpl_(?P<sex>neutral|male|female)", "smpl"),
     (r"basicmodel_(?P<sex>neutral|m|f)_lbs_10_207_0_v\d\.\d\.\d", "smpl"),
@@ -45,7 +45,7 @@ def _settings_file() -> Path:
 
 
 def load_model_folder() -> Path | None:
-    """Return the remembered folder, None if there is none or the setting cannot be read."""
+    """Return the remembered folder; None if there is none or the setting cannot be read."""
     try:
         folder = json.loads(_settings_file().read_text("utf-8"))["folder"]
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
@@ -59,7 +59,7 @@ def save_model_folder(folder: str | Path) -> Path:
     Raises
     ------
     ViewerError
-        If it is not a folder.
+        If the path is not a folder.
     OutputError
         If the setting cannot be saved.
     """
@@ -79,7 +79,7 @@ def save_model_folder(folder: str | Path) -> Path:
 
 
 def known_models(folder: Path) -> dict[str, Path]:
-    """Return the models in a folder and its subfolders, by the name that selects each.
+    """Return the models in a folder and its subfolders, by the names that select them.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _is_npz(path: Path) -> bool:
 
 
 def _name_of(path: Path) -> str | None:
-    """Return ``kind:variant`` of a published file name, None for others."""
+    """Return ``kind:variant`` of a published file name; None for others."""
     stem, above = path.stem.lower(), path.parent.name.lower()
     if stem == "model" and above in _SEX and path.parent.parent.name.lower() == "smplh":
         return f"smplh:{_SEX[above]}"  # the folder layout given in AMASS's instructions
@@ -138,7 +138,7 @@ def find_model(name: str, folder: Path | None) -> Path | None:
     Parameters
     ----------
     name : str
-        Case-insensitive; a kind alone means its neutral or only model.
+        Case-insensitive name; a kind alone refers to its neutral or only model.
     folder : Path or None
         Model folder.
     """

@@ -11,7 +11,7 @@ __all__ = ["did_you_mean", "name_hint", "near_names", "question"]
 _MOST_NEAR = 5
 _MOST_LISTED = 20  # lists up to this length are shown whole
 _BEGINNING = 6  # names of a longer list
-_MARGIN = 0.15  # of the similarity ratio below the best; names with a lower ratio are unlikely
+_MARGIN = 0.15  # maximum difference from the best similarity ratio; other names are unlikely
 _LONGEST = 80  # characters of a name
 
 
@@ -23,9 +23,9 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
     text : str
         Text that was typed, compared case-insensitively.
     names : iterable of str
-        Existing names. Empty names are skipped, repeated ones count once.
+        Existing names. Empty names are skipped, repeated names count once.
     alike : float
-        Smallest similarity ratio, as difflib measures it: 1 for equal names. Names that contain
+        Smallest similarity ratio, as measured by difflib: 1 for equal names. Names that contain
         the text count as having exactly this ratio, unless the text is a single letter.
 
     >>> near_names("left_kne", ["right_knee", "left_knee", "head"])
@@ -50,7 +50,7 @@ def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]
 
 
 def did_you_mean(text: str, names: Iterable[str], alike: float = 0.6) -> str:
-    """Return a question that offers the nearest names, "" if none is near; see ``near_names``.
+    """Return a question that offers the nearest names, empty if none is near; see ``near_names``.
 
     >>> did_you_mean("rendr", ["render", "rig"])
     'did you mean render?'
@@ -59,7 +59,7 @@ def did_you_mean(text: str, names: Iterable[str], alike: float = 0.6) -> str:
 
 
 def question(names: Sequence[str]) -> str:
-    """Return the question "did you mean …?" about some names, "" if there are none.
+    """Return the question "did you mean …?" about some names; empty if there are none.
 
     >>> question(["--size", "--speed", "--scale"])
     'did you mean --size, --speed or --scale?'
@@ -75,7 +75,7 @@ def name_hint(text: str, names: Iterable[str]) -> str:
     Returns
     -------
     str
-        The nearest names; if none is near, all of a short list or the beginning of a long one.
+        The nearest names; if none is near, all of a short list or the beginning of a long list.
 
     >>> name_hint("tail", ["hip", "knee"])
     'there are 2: hip, knee'

@@ -40,9 +40,9 @@ def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None
     Parameters
     ----------
     count : int
-        Number of things.
+        Number of items.
     noun : str
-        Singular noun, whose last word is made plural: ``"negative weight"``.
+        Singular noun, whose last word is changed to the plural: ``"negative weight"``.
     one, many : str
         Verb for one and for several: ``"is"``, ``"are"``; no verb if omitted.
     of : int, optional

@@ -22,8 +22,8 @@ _MOST_LINKS = 40  # limit of the Linux kernel
 def is_stdout(path: str | Path) -> bool:
     """Return whether a path names standard output, or is a link to such a name.
 
-    The file that the stream is redirected to does not count. It must never be replaced, because
-    the caller may append to it.
+    A file to which the stream is redirected does not count. It must never be replaced, because the
+    caller may append to it.
     """
     text = str(path)
     for _ in range(_MOST_LINKS):
@@ -42,7 +42,7 @@ def require_stdout(path: str | Path) -> None:
     Raises
     ------
     OutputError
-        If it is closed; the message gives the name.
+        If standard output is closed; the message gives the name.
     """
     if is_stdout(path) and getattr(sys.stdout, "buffer", None) is None:
         raise OutputError(f"{printable(path, 300)}: standard output is closed")
@@ -63,7 +63,7 @@ def write_stdout(path: str | Path, data: bytes) -> None:
     OutputError
         If the stream is closed or not writable, or its disk is full.
     BrokenPipeError
-        If its reader has closed it.
+        If the reader has closed the stream.
     """
     require_stdout(path)
     try:
@@ -86,8 +86,8 @@ def summary_stream(output: str | Path) -> TextIO:
 def standard_streams() -> Iterator[None]:
     """Ignore errors of messages in the block, and reserve the standard descriptors.
 
-    A message that cannot be written changes neither result nor exit code. Where the error stream
-    is closed, messages are dropped; ``print`` would write them into the output.
+    A message that cannot be written changes neither result nor exit code. If the error stream is
+    closed, messages are dropped; ``print`` would write them into the output.
     """
     before = sys.stderr
     with contextlib.ExitStack() as stack:
@@ -102,7 +102,7 @@ def standard_streams() -> Iterator[None]:
 
 
 def _reserve(stack: contextlib.ExitStack) -> None:
-    """Open closed descriptors below 3, so that output of a library cannot end up in a result."""
+    """Open closed descriptors below 3, so that a library's output cannot end up in a result."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
         stack.callback(os.close, descriptor)
     os.close(descriptor)

@@ -12,7 +12,7 @@ Triple = tuple[float, float, float]
 class Bulge:
     """Displacement of the skin around a point when a joint bends, in metres, at a 90 degree bend.
 
-    It grows with 1 - cos of the angle, and only if the bend about ``about`` is positive.
+    It grows with 1 - cos of the angle, but only if the bend about ``about`` is positive.
     """
 
     place: Triple

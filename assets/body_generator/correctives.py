@@ -1,6 +1,6 @@
 """Pose correctives: columns linear in R - I, fitted to improved bends.
 
-For samples of one joint's rotation the skinned surface is improved: the skin keeps its distance
+For samples of one joint's rotation, the skinned surface is improved: the skin keeps its distance
 from the bones, flesh on the two sides of a bend meets at the plane between them instead of
 interpenetrating, and muscles bulge. The displacements are mapped back to the rest pose and fitted
 by ridge regression; values below a threshold are dropped, so that the columns are sparse.
@@ -17,7 +17,7 @@ from .anatomy import Bend, Bulge, bend_of, samples
 from .joints import CENTRES, NAMES, PARENTS, PARTNERS, index
 from .pose import rotation, skin, world
 
-SAMPLES = 24  # random rotations per joint, besides those about single axes
+SAMPLES = 24  # random rotations per joint, in addition to those about single axes
 RIDGE = 0.05
 ROUNDS = 3  # rounds of correction and smoothing
 SMOOTHING = 3  # smoothing iterations per round
@@ -57,7 +57,7 @@ def _chain(bend: Bend, name: str) -> list[int]:
 
 
 def _subtree(j: int) -> np.ndarray:
-    """Return a mask of the joints below a joint, itself included."""
+    """Return a mask of a joint and all joints below it."""
     below = np.zeros(len(NAMES), dtype=bool)
     below[j] = True
     for k, parent in enumerate(PARENTS):

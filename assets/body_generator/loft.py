@@ -1,4 +1,4 @@
-"""Shapes defined by cross-sections, and the parts that a figure is blended from."""
+"""Shapes defined by cross-sections, and the parts from which a figure is blended."""
 
 from dataclasses import dataclass
 
@@ -87,7 +87,7 @@ Shape = Tube | Ellipsoid | Loft | Placed
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A shape, the width of its blend with the parts before it, and whether it is subtracted."""
+    """A shape, the width of its blend with the previous parts, and whether it is subtracted."""
 
     shape: Shape
     blend: float

@@ -53,14 +53,14 @@ STEPS = {
 }
 BESIDE_NECK = Step((0.100, 0, 0), (-1, 0, 0), 0.045)
 BESIDE_SPINE = Step((0.075, 0, 0), (1, 0, 0), 0.060)
-CROTCH = 0.805  # metres above the floor; the inner thighs below follow the legs only
+CROTCH = 0.805  # metres above the floor; the inner thighs below follow only the legs
 BETWEEN = Step((0.033, 0, 0), (1, 0, 0), 0.040)
 BELOW_WAIST = Step((0, 1.12, 0), (0, -1, 0), 0.050)
 NAPE = 1.44  # metres above the floor; above it the neck's step is not limited sideways
 
 
 def _gate(name: str, points: Floats) -> Floats:
-    """Return a further factor (N,) of a joint's step."""
+    """Return an additional factor (N,) of a joint's step."""
     x, y, _ = points.T
     if name == "hip":
         moved = points.copy()
@@ -94,7 +94,7 @@ def _totals(vertices: Floats) -> Floats:
 
 
 def _limited(weights: Floats) -> Floats:
-    """Keep the `MOST` largest of each row, fading out the others without a jump."""
+    """Keep the `MOST` largest weights of each row, fading out the others without a jump."""
     next_largest = np.sort(weights, axis=1)[:, -MOST - 1]
     weights = np.maximum(weights - next_largest[:, None], 0)
     return weights / weights.sum(axis=1, keepdims=True)
@@ -122,5 +122,5 @@ def skin_weights(vertices: Floats, triangles: np.ndarray, partner: np.ndarray) -
     weights = 0.5 * (weights + weights[partner][:, PARTNERS])
     weights = _limited(weights / weights.sum(axis=1, keepdims=True))
     weights = _rounded(weights)
-    # Rounding resolves ties on the midline in favour of one side: average both.
+    # Rounding resolves ties on the midline in favour of one side, so both sides are averaged.
     return 0.5 * (weights + weights[partner][:, PARTNERS])

@@ -22,10 +22,10 @@ def unwrap(vertices: Floats, triangles: np.ndarray, size: int) -> tuple[np.ndarr
     Returns
     -------
     source : (N,)
-        The input vertex that each vertex copies; more than one copy at a seam.
+        The input vertex of which each vertex is a copy; seams have more than one copy.
     triangles : (T, 3)
     texcoords : (N, 2)
-        In 0..1, v upwards.
+        Texture coordinates in 0..1, v upwards.
     """
     atlas = xatlas.Atlas()
     swollen = _magnify_head(vertices).astype(np.float32)

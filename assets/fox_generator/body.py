@@ -1,4 +1,4 @@
-"""Shapes that are blended in order to a fox; metres, +Y up, facing +Z, left is +X."""
+"""Shapes that are blended, in order, to a fox; metres, +Y up, facing +Z, left is +X."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ NOSE = np.array([0.0, 0.4720, 0.3720])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A shape, the region whose joints may move it, its blend width, and if it is subtracted."""
+    """A shape, the region whose joints may move it, its blend width, and whether to cut it out."""
 
     region: str
     shape: Tube | Ellipsoid
@@ -169,7 +169,7 @@ def _tail() -> list[Part]:
 
 
 def _toes(region: str, x: float, z: float) -> list[Part]:
-    """Return a paw: a flat pad with four toes, its middle at (x, z)."""
+    """Return a paw: a flat pad with four toes, centred at (x, z)."""
     parts = [Part(region, Ellipsoid((x, 0.0155, z - 0.004), (0.0210, 0.0175, 0.0240)), 0.014)]
     for shift, ahead in ((-0.0177, 0.014), (-0.0062, 0.023), (0.0062, 0.023), (0.0177, 0.014)):
         root = (x + 0.7 * shift, 0.0150, z, 0.0090)

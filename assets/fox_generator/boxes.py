@@ -6,7 +6,8 @@ from generator_tools.shapes import Floats
 from .skeleton import Joint
 
 TRIM = 6.0  # percentage of the vertices outside the box on each side
-# A skull box and a muzzle box read as a fox; one box around the whole head would not.
+# A skull box and a muzzle box are recognisable as a fox; one box around the whole head would not
+# be.
 FIXED = {
     "head": ((-0.060, 0.452, 0.205), (0.060, 0.548, 0.308)),
     "jaw": ((-0.024, 0.438, 0.300), (0.024, 0.484, 0.382)),

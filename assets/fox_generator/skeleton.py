@@ -211,7 +211,7 @@ def _mirrored(joint: Joint) -> Joint:
 
 
 def joints() -> list[Joint]:
-    """Return all joints depth-first, as .skel files number them."""
+    """Return all joints depth-first, as numbered in .skel files."""
     everything = [*MIDDLE, *_tail(), *LEFT, *map(_mirrored, LEFT)]
     ordered = [everything[0]]
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from .body import distance
 from .colours import paint
 
-MARGIN = 14  # texels that the edge colours spread beyond the charts
+MARGIN = 14  # number of texels by which edge colours are spread beyond the charts
 COLOURS = 256  # palette size
 
 

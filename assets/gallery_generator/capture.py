@@ -23,7 +23,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["Person", "camera_at", "write_cameras", "write_frames"]
 
-_NOISE = 0.008  # of keypoints, metres
+_NOISE = 0.008  # noise of keypoints, metres
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Person:
 
 
 def write_frames(folder: Path, body: Figure, people: Sequence[Person], with_points: bool) -> None:
-    """Write ``smpl/`` and, if wanted, ``keypoints3d/``, with small errors as of a detector."""
+    """Write ``smpl/`` and, if requested, ``keypoints3d/``, with small detection errors."""
     rng = np.random.default_rng(7)
     points = [_joints(body, person) for person in people] if with_points else []
     for frame in range(len(people[0].walk.poses)):

@@ -18,14 +18,14 @@ from viewer.rig.scene import Scene
 
 __all__ = ["write_images"]
 
-_MARGIN = 1.3  # of the rendered image, from which the distorted one is sampled
+_MARGIN = 1.3  # scale of the rendered image, from which the distorted image is sampled
 _ITERATIONS = 30
 
 
 def write_images(folder: Path, scene: Scene, frames: range, rate: float, numbers: range) -> None:
     """Write an image of the scene by each of its cameras for some frames.
 
-    ``frames`` is all frames of the capture, ``numbers`` those to write.
+    ``frames`` are all frames of the capture, ``numbers`` the frames to write.
     """
     options = DisplayOptions(background="#d3d5d0", grid=True, quality="normal")
     for number in numbers:
@@ -41,7 +41,7 @@ def write_images(folder: Path, scene: Scene, frames: range, rate: float, numbers
 
 
 def _widened(view: CameraView) -> CameraView:
-    """Return an ideal camera at the same place that also sees a margin."""
+    """Return an ideal camera at the same position that also sees a margin."""
     assert view.size is not None  # synthetic cameras have one
     size = round(_MARGIN * view.size[0]), round(_MARGIN * view.size[1])
     intrinsic = view.intrinsic.copy()
@@ -50,7 +50,7 @@ def _widened(view: CameraView) -> CameraView:
 
 
 def _bent(pixels: Bytes, wide: CameraView, view: CameraView) -> Bytes:
-    """Return the distorted image: each pixel is looked up where the ideal camera has it."""
+    """Return the distorted image: each pixel is looked up at its position in the ideal image."""
     assert view.size is not None  # synthetic cameras have one
     rows, columns = np.mgrid[: view.size[1], : view.size[0]]
     places = np.stack([columns, rows, np.ones_like(rows)]).reshape(3, -1)

@@ -20,7 +20,7 @@ __all__ = ["body_figure", "make_inputs", "spread", "without_weights"]
 
 RATE = 30.0
 N_FRAMES = 61
-IMAGE = 20  # frame of the capture that has images
+IMAGE = 20  # frame of the capture with images
 _SIZE, _FOCAL = (480, 270), 330.0
 _RADIUS = 2.5  # distance of the cameras from the middle, metres
 _LENS = (-0.22, 0.03)
@@ -85,7 +85,7 @@ def without_weights(body: Figure, joint: str, count: int) -> Figure:
 
 
 def spread(body: Figure, most: int, rounds: int) -> Figure:
-    """Return a figure with smoothed weights: about ``most`` influences a vertex, as PIG's has."""
+    """Return a figure with smoothed weights: about ``most`` influences per vertex, as in PIG."""
     mesh, weights = body.require_mesh(), _table(body)
     pairs = mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     degree = np.bincount(pairs[:, 0], minlength=len(weights))[:, None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 
 from gallery_generator.pictures import COMMON, PICTURES
@@ -22,7 +23,7 @@ _WIDTH = 96
 
 
 def file_name(name: str) -> str:
-    """Return the file name of a picture; the window's is also used by the README."""
+    """Return the file name of a picture; that of the window is also used by the README."""
     return "window.png" if name == "window" else f"gallery_{name}.png"
 
 
@@ -34,8 +35,21 @@ def page() -> str:
         parts.append(f"\n## {picture.title}\n\n{text}\n")
         parts.append(f"\n![{picture.title}](../../assets/pictures/{file_name(name)})\n")
         if picture.commands:
-            lines = "\n".join([*picture.commands[:-1], f"{picture.commands[-1]} -o {name}.png"])
+            commands = [*picture.commands[:-1], f"{picture.commands[-1]} -o {name}.png"]
+            lines = "\n".join(map(_wrapped, commands))
             parts.append(f"\n```sh\n{lines}\n```\n")
         else:
             parts.append("\nDrawn with Python: `assets/gallery_generator/pictures.py`.\n")
     return "".join(parts)
+
+
+def _wrapped(command: str) -> str:
+    """Return a command in lines that end with a backslash, but the last one, broken at options."""
+    lines = [""]
+    for part in re.split(r" (?=-)", command):
+        longer = f"{lines[-1]} {part}".lstrip()
+        if len(longer) <= _WIDTH - 2:
+            lines[-1] = longer
+        else:
+            lines.append(part)
+    return " \\\n  ".join(lines)

@@ -1,4 +1,4 @@
-"""Pictures of the gallery: those that a command draws, and those that need Python."""
+"""Pictures of the gallery: some are drawn by a command, others need Python."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Picture:
         Commands that draw it, the last one without output, size and ``COMMON`` options; empty if
         Python draws it.
     draw : callable or None
-        Draws it otherwise.
+        Draws the picture if there is no command.
     size : (int, int)
         Width and height, pixels.
     has_data : bool
@@ -76,7 +76,7 @@ def _options(**changes: object) -> viewer.DisplayOptions:
 
 
 def _draw_finding() -> Bytes:
-    """Draw a walking figure whose forearm has vertices without weights, with lint's marks."""
+    """Draw a walking figure whose forearm has vertices without weights, marked by lint."""
     figure = without_weights(body_figure(), "left_elbow", 24)
     actor = Actor(figure)
     _lower_arms(actor)

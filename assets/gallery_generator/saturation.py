@@ -11,7 +11,7 @@ __all__ = ["MOST", "saturated_fraction"]
 MOST = 1e-3
 """Largest permitted fraction of saturated pixels."""
 
-_BLACK = 2  # of 255
+_BLACK = 2  # out of 255
 
 
 def saturated_fraction(
@@ -27,7 +27,7 @@ def saturated_fraction(
         Exact colour of pixels that do not count.
     has_data : bool
         Whether colours show numbers: the last colour of the colour map has one full channel, so
-        only two count.
+        only two channels count.
     """
     white = (pixels[..., :3] == 255).all(axis=2)
     # Gutters of contact sheets are white from side to side.

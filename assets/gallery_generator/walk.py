@@ -50,7 +50,7 @@ class Gait:
 class Walk:
     """Rotation vectors of the joints, radians, and translations of the body, metres.
 
-    ``poses`` is (F, 24, 3), the pelvis first, about which the body turns: V = X(poses) +
+    ``poses`` is (F, 24, 3); the pelvis is first, and the body rotates about it: V = X(poses) +
     translations, as in AMASS.
     """
 
@@ -70,7 +70,7 @@ def walk(body: Figure, n_frames: int, rate: float, gait: Gait) -> Walk:
     rate : float
         Frames per second.
     gait : Gait
-        Where and how.
+        Parameters of the walk.
     """
     heading = _about(1, gait.heading)
     angles = 2.0 * np.pi * (gait.phase + np.arange(n_frames) / rate / gait.period)
@@ -82,11 +82,11 @@ def walk(body: Figure, n_frames: int, rate: float, gait: Gait) -> Walk:
         heights[frame] = -deform(body, pose)[0][:, 1].min()
         feet = world_matrices(body.require_skeleton(), pose)[list(_TOES), :3, 3]
         if before is not None:
-            # The lower foot stays where it is.
+            # The lower foot does not move.
             lower = int(np.argmin(feet[:, 1]))
             steps[frame] = before[lower, 2] - feet[lower, 2]
         before = feet
-    # An even speed looks better than the small errors of the angles.
+    # A constant speed looks better than the small errors of the angles.
     steps[1:] = 0.5 * steps[1:] + 0.5 * steps[1:].mean()
     travelled = np.cumsum(steps)[:, None] * heading[:, 2]
     translations = travelled + np.array([gait.start[0], 0.0, gait.start[1]])

@@ -1,4 +1,4 @@
-"""Heat diffusion over a triangle mesh, and the distances that it starts from."""
+"""Heat diffusion over a triangle mesh, and the distances from which it starts."""
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags

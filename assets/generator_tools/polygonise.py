@@ -52,7 +52,7 @@ def polygonise(distance: Distance, axes: list[Floats]) -> tuple[Floats, np.ndarr
     """Return vertices (V, 3) and triangles (T, 3) of the half x >= 0, open along x = 0.
 
     The first axis starts at 0 and the boundary vertices have x exactly 0, so that the mirrored
-    half closes the surface. Of several pieces only the largest is kept.
+    half closes the surface. Of several pieces, only the largest is kept.
     """
     grid = _sample(distance, axes)
     pieces, _ = label(grid < 0)

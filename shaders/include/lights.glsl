@@ -4,20 +4,21 @@ uniform vec3 u_light_directions[2];  // key and rim: towards each light, unit le
 uniform vec3 u_light_colors[2];      // linear, times strength
 uniform vec3 u_up;                   // the scene's up axis, unit length, camera space
 uniform vec3 u_ambient;              // ambient light on an upright surface, linear
-uniform vec3 u_ambient_growth;       // added where surfaces face up, subtracted where down
+uniform vec3 u_ambient_growth;       // added to surfaces that face up, subtracted if they face down
 
-// Hemisphere lighting: what a surface receives from a sky above and a ground below it.
+// Hemisphere lighting: light that a surface receives from a sky above and a ground below it.
 vec3 ambient_light(vec3 normal) {
     return u_ambient + u_ambient_growth * dot(normal, u_up);
 }
 
 #ifdef SHADOWS
 uniform mat4 u_shadow_matrix;    // camera space to the shadow map, 0 to 1 on all axes
-uniform float u_shadow_offset;   // along the normal of a surface that the light grazes
+uniform float u_shadow_offset;   // offset along the normal of a surface at grazing incidence
 uniform float u_shadow_strength;
 #endif
 
-// Fraction of a light, key or rim, that reaches a surface; the cosine is that of its incidence.
+// Fraction of a light, key or rim, that reaches a surface; the cosine is that of the incidence
+// angle.
 float visibility(int light, vec3 position, vec3 normal, float cosine) {
 #ifdef SHADOWS
     if (light != 0)
@@ -39,7 +40,7 @@ uniform float u_occlusion_strength;
 // Fraction of the ambient light that reaches a surface at this depth in camera space.
 float ambient_visibility(float depth) {
 #ifdef OCCLUSION
-    // Bilateral upsampling: neighbours are weighted by how close they are in depth.
+    // Bilateral upsampling: neighbours are weighted by their similarity in depth.
     vec2 place = 0.5 * gl_FragCoord.xy - 0.5;
     ivec2 corner = ivec2(floor(place)), last = textureSize(u_occlusion, 0) - 1;
     vec2 part = place - vec2(corner);

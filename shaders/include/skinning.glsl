@@ -10,7 +10,7 @@ in uvec4 in_bindings;    // first pair, number of pairs, index of the vertex in 
 uniform sampler2D u_palette;    // skinning matrices, three rows each, for each instance in turn
 uniform sampler2D u_pairs;      // joint and weight, strongest first for each vertex
 uniform int u_n_joints;         // matrices of one instance
-uniform int u_n_summed;         // 1 if u_offsets holds one summed row per instance, else 0
+uniform int u_n_summed;         // 1 if u_offsets contains one summed row per instance, else 0
 uniform int u_n_offsets;        // entries of u_offset_list per instance; 0 for none
 uniform int u_n_sources;        // vertices in each row of u_offsets
 uniform sampler2D u_offset_list;  // row of u_offsets and weight, for each instance in turn

@@ -1,5 +1,5 @@
-// The surface of the material that is drawn: its colour, opacity and normal. Files without more
-// than an image per material are drawn without MATERIALS, which costs them nothing.
+// The surface of the material that is drawn: its colour, opacity and normal. Files with at most one
+// image per material are drawn without MATERIALS, at no extra cost.
 
 in vec2 v_uv;
 in vec3 v_color;                // linear
@@ -20,7 +20,7 @@ in vec4 v_other_uvs;            // second and third set of texture coordinates t
 in vec4 v_tint;                 // vertex colour, linear, and opacity
 
 uniform vec4 u_base_factor;     // linear
-uniform bool u_has_base_factor; // else untextured surfaces have v_color
+uniform bool u_has_base_factor; // otherwise untextured surfaces have v_color
 uniform bool u_has_tint;        // v_tint multiplies the base colour, and replaces v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
@@ -56,13 +56,13 @@ float surface_alpha() {
 
 const float FAINTEST = 0.05;    // largest alpha of blended surfaces that counts as invisible
 
-// Discards masked fragments, and blended ones whose alpha is not larger than this.
+// Discards masked fragments, and blended fragments up to this alpha.
 void cut_out(float alpha) {
     if (surface_alpha() <= alpha)
         discard;
 }
 
-// A normal perturbed by the normal map. The tangents are those of the screen's derivatives
+// A normal perturbed by the normal map. Tangents are computed from screen-space derivatives
 // (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none, and mirrored
 // texture coordinates need no sign. On the back of a surface, side -1, bumps are dents.
 vec3 mapped_normal(vec3 position, vec3 normal, float side) {

@@ -1,12 +1,12 @@
-// From scene-linear light to a screen: one tone curve, then the sRGB encoding.
+// Conversion of scene-linear light for display: one tone curve, then the sRGB encoding.
 
 // Khronos PBR Neutral (github.com/KhronosGroup/ToneMapping): colours up to 0.8 stay as they are,
-// brighter ones approach 1 and fade towards white, so that nothing saturates and no hue shifts. The
-// curve's toe is omitted: it removes the 4 % that glossy surfaces reflect in a white room, and
+// brighter colours approach 1 and fade towards white, so that nothing saturates and no hue shifts.
+// The curve's toe is omitted: it removes the 4 % that glossy surfaces reflect in a white room, and
 // would blacken surfaces without that reflection.
 vec3 toned(vec3 color) {
     const float start = 0.8, desaturation = 0.15;
-    // At the start of the curve all of this is exactly the colour itself.
+    // At the start of the curve, the result is exactly the original colour.
     float peak = max(max(color.r, color.g), max(color.b, start));
     float lowered = 1.0 - (1.0 - start) * (1.0 - start) / (peak + 1.0 - 2.0 * start);
     float kept = 1.0 / (desaturation * (peak - lowered) + 1.0);

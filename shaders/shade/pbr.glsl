@@ -1,7 +1,7 @@
 // Metallic-roughness surfaces as glTF 2.0 defines them (appendix B), lit by the studio and, more
 // faintly, by the two lights. The lobe is GGX (Walter et al. 2007) with the height-correlated Smith
-// term (Heitz 2014) and Schlick's Fresnel term; the studio's light comes as a split sum (Karis
-// 2013) with multiple-scattering compensation (Fdez-Aguera 2019).
+// term (Heitz 2014) and Schlick's Fresnel term; the studio's light is evaluated as a split sum
+// (Karis 2013) with multiple-scattering compensation (Fdez-Aguera 2019).
 #pragma include studio
 uniform float u_metallic;
 uniform float u_roughness;
@@ -22,7 +22,7 @@ uniform vec3 u_emissive;        // linear
 
 const float PI = 3.14159265358979;
 const float LIGHTS = 0.30;      // strength of the two lights relative to the studio's
-const float BOX = 0.5;          // share of the studio's light on a surface that faces its key light
+const float BOX = 0.5;          // fraction of the studio's light on a surface facing its key light
 const float SMOOTHEST = 0.045;  // lowest roughness with visible highlights of point lights
 
 struct Surface {
@@ -101,7 +101,7 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
         // Only the key light has a shadow map; occlusion approximates the rim light's shadow.
         seen *= i == 1 ? mix(1.0, ambient, 0.7) : 1.0;
         color += seen * LIGHTS * u_light_colors[i] * direct(s, normal, to_eye, u_light_directions[i]);
-        // The studio's key softbox is about where the key light is, so the same objects block it.
+        // The studio's key softbox is near the key light, so the same objects block it.
         if (i == 0)
             occlusion *= 1.0 - BOX * cosine * (1.0 - seen);
     }

@@ -16,7 +16,7 @@ void skin(inout vec3 position, inout vec3 normal) {
     vec4 real = vec4(0.0), dual = vec4(0.0), first = vec4(0.0);
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
     uint end = in_bindings.x + in_bindings.y;
-    float sum = 0.0;  // the blended stretch is divided by it
+    float sum = 0.0;  // divisor of the blended stretch
     for (uint index = in_bindings.x; index < end; ++index) {
         vec2 pair = influence(index);
         int joint = int(pair.x);

@@ -50,11 +50,11 @@ def hand(drive, rig):
 def drive_body(drive, tmp_path):
     """Open apps that show a made-up body model: "box" or a kind of the SMPL family."""
 
-    def open_body(kind="box", size=(1000, 1000), **columns):
+    def open_body(kind="box", size=(1000, 1000), pixels_per_point=0.5, **columns):
         arrays = box_body.arrays() if kind == "box" else model(kind, **columns)
         path = tmp_path / f"{kind}.npz"
         np.savez(path, **arrays)
-        return drive(path, size=size, samples=1)
+        return drive(path, size=size, samples=1, pixels_per_point=pixels_per_point)
 
     return open_body
 
@@ -63,7 +63,7 @@ def drive_body(drive, tmp_path):
 def curves(drive, rig, tmp_path):
     """A test driver on the Curves panel of the tiny rig; the arm's curves are shown."""
     (tmp_path / "wave.anim").write_text(clip_text())
-    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
+    hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1, pixels_per_point=1.0)
     hand.show_panel("Curves")
     hand.state.selected_joint = 1
     hand.step(3)

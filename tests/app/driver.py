@@ -41,8 +41,10 @@ class Driver:
     ----------
     paths : str or Path
         What to open; the bundled figure if none.
-    size, scale, pixels_per_point
+    size, scale
         As for ``HeadlessApp``.
+    pixels_per_point : float
+        As for ``HeadlessApp``; pictures are drawn with a quarter of the pixels unless they matter.
     samples : int
         Samples per pixel; 4, as in the window, takes ten times as long without a graphics card.
     scene : Scene, optional
@@ -56,7 +58,7 @@ class Driver:
         *paths,
         size=(1000, 640),
         scale=1.0,
-        pixels_per_point=1.0,
+        pixels_per_point=0.5,
         samples=1,
         scene=None,
         layout="",

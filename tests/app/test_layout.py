@@ -104,7 +104,7 @@ def test_reset_layout_keeps_pose_and_camera(hand):
 
 @pytest.mark.parametrize("size", [(900, 640), (640, 480), (320, 240), (50, 40), (8, 8), (1, 1)])
 def test_small_windows_draw_without_errors(drive, rig, size):
-    hand = drive(*rig, size=size)
+    hand = drive(*rig, size=size, pixels_per_point=1.0)
     hand.key("s")
     hand.key("f")
     hand.wheel(2, (size[0] / 2, size[1] / 2))

@@ -147,14 +147,14 @@ def _shown(hand, prepare):
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", STATES)
 def test_interface_matches_golden_images(drive, rig, name):
-    _compare(_shown(drive(*rig, size=SIZE, samples=4), STATES[name]), name)
+    _compare(_shown(drive(*rig, size=SIZE, samples=4, pixels_per_point=1.0), STATES[name]), name)
 
 
 @pytest.mark.golden("app_{name}")
 @pytest.mark.parametrize("name", BODIES)
 def test_body_panels_match_golden_images(drive_body, name):
     kind, prepare = BODIES[name]
-    hand = drive_body(kind, size=BODY_SIZE)
+    hand = drive_body(kind, size=BODY_SIZE, pixels_per_point=1.0)
     hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
@@ -171,7 +171,7 @@ def _compare(pixels, name):
 
 
 def test_comparison_distinguishes_states(drive, rig):
-    hand = drive(*rig, size=SIZE, samples=4)
+    hand = drive(*rig, size=SIZE, samples=4, pixels_per_point=1.0)
     start = _shown(hand, _nothing)
     hand.state.panels_visible = False
     without_panel = hand.screen()

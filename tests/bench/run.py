@@ -18,6 +18,7 @@ NAMES = [
     "structure",
     "motion",
     "read",
+    "gltf",
     "captures",
     "observing",
     "losses",

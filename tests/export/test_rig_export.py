@@ -359,7 +359,7 @@ def test_names_that_would_not_round_trip_are_refused(tmp_path, name):
 
 def test_refusal_of_the_skin_reverts_the_skeleton(tmp_path):
     mesh = replace(seamed_mesh(), triangles=np.zeros((0, 3), np.int32), uvs=None,
-                   uv_triangles=None, triangle_materials=None)  # fmt: skip
+                   uv_triangles=None, triangle_materials=None, triangle_parts=None)  # fmt: skip
     actor = seamed_actor(mesh=mesh)
     text = refused(actor, tmp_path, UnsupportedFormatError)
     assert text == "figure roof has no triangles to write as .skin"

@@ -54,7 +54,7 @@ def meshed(triangles: Callable[[np.ndarray], np.ndarray]) -> Figure:
     """Return the column with replaced triangles and the same normals."""
     figure = column()
     changed = triangles(figure.mesh.triangles.copy())
-    mesh = replace(figure.mesh, triangles=changed, triangle_materials=None)
+    mesh = replace(figure.mesh, triangles=changed, triangle_materials=None, triangle_parts=None)
     return replace(figure, mesh=mesh)
 
 

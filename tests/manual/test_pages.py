@@ -31,7 +31,8 @@ def blocks(path: Path, language: str) -> list[str]:
 
 
 def commands(path: Path) -> list[str]:
-    lines = [line for block in blocks(path, "sh") for line in block.splitlines()]
+    whole = [block.replace("\\\n", "") for block in blocks(path, "sh")]
+    lines = [line for block in whole for line in block.splitlines()]
     return [line for line in lines if line.startswith("viewer")]
 
 

@@ -233,7 +233,7 @@ def test_a_texture_above_the_limit_is_shrunk_with_a_note(ctx):
     texture = picture_texture(ctx, pixels, notes)
     assert texture.size == (limit // 2 + 1, 1)
     assert notes == [
-        f"a texture of {limit + 2} x 1 pixels is above this driver's limit of {limit} "
+        f"a texture of {limit + 2} x 1 pixels exceeds this driver's limit of {limit} "
         "and was reduced by 2"
     ]
     assert texture.read()[:4] == bytes([200, 0, 0, 0])
@@ -247,7 +247,7 @@ def test_a_note_about_a_texture_reaches_the_renderer(monkeypatch):
         monkeypatch.setitem(offscreen.context.info, "GL_MAX_TEXTURE_SIZE", 1024)
         offscreen.render(scene, (32, 32), Camera(), DisplayOptions(samples=1), scene_box(scene))
         assert offscreen.renderer.notes == [
-            "a texture of 1032 x 1032 pixels is above this driver's limit of 1024 "
+            "a texture of 1032 x 1032 pixels exceeds this driver's limit of 1024 "
             "and was reduced by 2"
         ]
 

@@ -35,7 +35,7 @@ _COLORS = {
 _USES = {
     "panel": ("window_bg", "tab_selected", "tab_dimmed_selected"),
     "popup": ("popup_bg",),
-    "title": ("title_bg", "title_bg_active", "menu_bar_bg"),
+    "title": ("title_bg", "title_bg_active", "menu_bar_bg", "table_header_bg"),
     "tab": ("tab", "tab_dimmed"),
     "frame": ("frame_bg",),
     "button": ("button", "header"),

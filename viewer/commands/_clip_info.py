@@ -14,9 +14,9 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.transform_rate import key_rate
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Motion
+from viewer.rig.transforms.rate import key_rate
 
 _SHOWN_GAPS = 6
 

@@ -12,7 +12,7 @@ _MOST = 100  # warnings kept per file, as nobody reads more
 class Collector:
     """Collects the diagnostics of readers and operations.
 
-    Repeated warnings are dropped, and so are those after the first hundred; all errors are kept.
+    Repeated warnings are dropped, as are warnings after the first hundred; all errors are kept.
 
     Parameters
     ----------

@@ -96,17 +96,17 @@ class Format:
     title : str
         Name in menus and the manual.
     suffixes : tuple of str
-        Suffixes with their dots; files are written with the first.
+        Suffixes with their dots; files are written with the first suffix.
     signature : bytes
         Regular expression that the head of every such text file contains; empty for none.
     keys : tuple of str
-        Keys that identify an archive (``.pkl``, ``.npz``) of this format: any of them is enough.
+        Keys that identify an archive (``.pkl``, ``.npz``) of this format: any one is sufficient.
     files : tuple of str
-        Files that identify a folder of this format: any of them is enough.
+        Files that identify a folder of this format: any one is sufficient.
     writes : bool
         Whether there is a writer.
     is_bare_mesh : bool
-        Whether files of this format hold only a mesh, without skeleton and skin.
+        Whether files of this format contain only a mesh, without skeleton and skin.
     """
 
     title: str
@@ -126,7 +126,8 @@ FORMATS = {
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
     "anim": Format("clip (CSE169)", (".anim",), rb"(?:^|\s)animation\s*\{"),
-    # After the skin, whose sections have the same names: a .morph is known by its suffix.
+    # This row follows the skin, whose sections have the same names: a .morph is identified by its
+    # suffix.
     "morph": Format(
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
     ),
@@ -203,7 +204,7 @@ def detect(source: Source) -> str:
     Raises
     ------
     FormatError
-        If no format matches; the message says what the file looks like.
+        If no format matches; the message gives the apparent type of the file.
     """
     if source.is_folder:
         return _detect_folder(source)
@@ -213,7 +214,7 @@ def detect(source: Source) -> str:
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
     if _is_archive(source):
-        # A broken archive with a text format's suffix: the suffix is wrong.
+        # For a broken archive with the suffix of a text format, the suffix is wrong.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
             return _detect_archive(source)
     head = source.head(_HEAD)
@@ -227,7 +228,7 @@ def detect(source: Source) -> str:
                 source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
             return key
     if suffix in _ARCHIVES:
-        # Opening it again raises an error that names the kind of archive.
+        # Opening it again raises an error that gives the kind of archive.
         return _detect_archive(source)
     looks = source.looks_like()
     if by_suffix and looks is None:
@@ -271,7 +272,7 @@ def _detect_folder(source: Source) -> str:
 def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
     if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
-        return False  # returns early for most text files, without importing the module for archives
+        return False  # most text files return here, without importing the module for archives
     from viewer.formats._archive.opening import is_archive
 
     return is_archive(head)

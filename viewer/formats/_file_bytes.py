@@ -14,7 +14,7 @@ from viewer.near_names import did_you_mean
 __all__ = ["FOLDER", "MAX_SIZE", "kind_of", "no_file", "read_bytes", "read_head", "unreadable"]
 
 MAX_SIZE = 2 << 30
-"""Largest file that is read, in bytes, unless the caller says otherwise."""
+"""Default size limit for files, bytes."""
 
 FOLDER = "a folder"
 """Name of a folder in the result of ``kind_of``."""
@@ -52,7 +52,7 @@ def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
 
 
 def kind_of(path: Path, max_size: int) -> str | None:
-    """Return what a path is, None for a regular file; opening a pipe to find out would block."""
+    """Return the kind of file at a path, None for a regular file; opening a pipe would block."""
     try:
         status = path.stat()
     except (OSError, ValueError) as problem:
@@ -91,11 +91,11 @@ def no_file(path: Path, kind: str) -> FormatError:
 
 
 def _near_files(path: Path) -> str:
-    """Return a question that suggests files with similar names, "" if there are none."""
+    """Return a question that suggests files with similar names; empty if there are none."""
     try:
         with os.scandir(path.parent) as entries:
             names = [entry.name for entry in islice(entries, _MOST_FILES)]
-    except OSError:  # the folder is missing as well, or cannot be listed
+    except OSError:  # the folder is also missing, or cannot be listed
         return ""
     # A dangling link has exactly this name.
     return did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)

@@ -1,6 +1,7 @@
 """Conversion of the half floats in archives to doubles, before anything is computed with them.
 
-A half overflows at 65504: comparing it with a larger Python number, or adding two, already warns.
+A half overflows at 65504: comparing it with a larger Python number, or adding two halves, already
+causes a warning.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Offsets of values in a JSON text, searched for only when an error needs one.
 
-Python's parser is fast, but it keeps no offsets. The text is scanned a second time, token by token,
-once an error in it is known. By then it is known to be valid JSON apart from its nesting, except
-that NaN and infinities may occur as numbers.
+Python's parser is fast, but it keeps no offsets. If there is an error, the text is scanned a second
+time, token by token. By then, it is known to be valid JSON, except that it may be nested too deeply
+and contain NaN and infinities.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ __all__ = [
 ]
 
 MOST_DIGITS = 4300
-"""Largest number of digits of a whole number that Python converts."""
+"""Largest number of digits of an integer that Python converts."""
 
 Keys = tuple[str | int, ...]
-"""Keys and indices that lead from the outermost value to a nested one."""
+"""Keys and indices that lead from the outermost value to a nested value."""
 
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{},:]|[^\s\[\]{},:"]+')
 _CONSTANTS = ("NaN", "Infinity", "-Infinity")
@@ -59,7 +59,7 @@ def value_place(text: str, path: Sequence[str | int]) -> int | None:
 def nearest_place(text: str, path: Sequence[str | int]) -> int | None:
     r"""Return the offset of a key or list item; if it is missing, that of its container.
 
-    None if the outermost container is missing too.
+    None if the outermost container is also missing.
 
     >>> nearest_place('[{"id": 0, "poses": []}]', (0, "poses"))
     11
@@ -93,7 +93,7 @@ def constant_place(text: str) -> tuple[str, int] | None:
 
 
 def nesting_place(text: str, depth: int) -> int:
-    """Return the offset of the first bracket at a given depth; the end of the text if none.
+    """Return the offset of the first bracket at a given depth, or the end of the text.
 
     The text need not be valid JSON.
     """

@@ -1,4 +1,4 @@
-"""Errors found where the file is not known, and notes derived from errors."""
+"""Errors in code that does not know the file, and notes derived from errors."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
     Parameters
     ----------
     positions : (V, 3)
-        NaN where a position is invalid.
+        Positions; NaN if invalid.
     triangles : (T, 3)
         Triangles, whose edges connect neighbours. A vertex without valid neighbours is moved to
         the mean of all valid vertices.
@@ -41,15 +41,15 @@ def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
 
 
 def held_rows(rows: Floats, bad: Bools) -> Floats:
-    """Return rows with each invalid one replaced by the last valid row before it.
+    """Return rows with each invalid row replaced by the last valid row before it.
 
     Parameters
     ----------
     rows : (N, ...)
         Rows of a motion, in time order.
     bad : (N,)
-        True for invalid rows. Those before the first valid row become a copy of it; if all are
-        invalid, all become 0.
+        True for invalid rows. Invalid rows before the first valid row become copies of it; if all
+        are invalid, all become 0.
     """
     if not bad.any():
         return rows
@@ -60,14 +60,15 @@ def held_rows(rows: Floats, bad: Bools) -> Floats:
 
 
 def neutral_corners(corners: NDArray[np.integer], fits: Bools) -> Ints:
-    """Return triangles with each invalid corner replaced by a valid one, which gives it zero area.
+    """Return triangles with invalid corners replaced by valid ones, which gives them zero area.
 
     Parameters
     ----------
     corners : (T, 3)
         Vertex indices.
     fits : (T, 3)
-        True for indices of existing vertices. If a triangle has none, its corners become vertex 0.
+        True for indices of existing vertices. If a triangle has no valid corner, its corners become
+        vertex 0.
     """
     first = corners[np.arange(len(corners)), fits.argmax(axis=1)]
     usable = np.where(fits.any(axis=1), first, 0)

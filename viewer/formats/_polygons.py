@@ -1,4 +1,4 @@
-"""Triangulation of polygons: fans where they are convex, ear clipping where they are not."""
+"""Triangulation of polygons: fans if they are convex, otherwise ear clipping."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _CHUNK = 4_000_000  # (corner, corner) pairs that are tested at once
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
     """Triangulate polygons, keeping their order and winding.
 
-    A quad is split along the diagonal that leaves both halves facing like the whole; a larger
-    polygon becomes a fan if its first corner sees all others, otherwise its ears are clipped one
-    by one (Meisters 1975), in the plane of its area vector (Newell).
+    A quad is split along the diagonal for which both halves face the same way as the whole; a
+    larger polygon becomes a fan if all corners are visible from the first, otherwise its ears are
+    clipped one by one (Meisters 1975), in the plane of its area vector (Newell).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _area_vectors(points: Floats) -> Floats:
 
 
 def _is_covered(points: Floats, triangles: Picks, normals: Floats) -> Bools:
-    """Return a mask of polygons whose triangles all face like the polygon: (F,)."""
+    """Return a mask of polygons whose triangles all face the same way as the polygon: (F,)."""
     a, b, c = (points[:, triangles[:, corner]] for corner in range(3))
     facing = np.einsum("fta,fa->ft", np.cross(b - a, c - a), normals)
     return (facing > 0.0).all(axis=1)
@@ -118,7 +118,8 @@ def _ears(points: Floats) -> Picks:
         corners = [points[rows[:, None], index] for index in (before, left, after)]
         areas = _cross(corners[1] - corners[0], corners[2] - corners[0])
         is_ear = (areas > 0.0) & ~_has_inside(corners, corners[1])
-        # A self-intersecting polygon may have no ear left; the largest corner is clipped instead.
+        # A self-intersecting polygon may have no ear left; the largest corner is then clipped
+        # instead.
         chosen = np.where(is_ear.any(axis=1), is_ear.argmax(axis=1), areas.argmax(axis=1))
         found.append(np.stack([part[rows, chosen] for part in (before, left, after)], axis=1))
         keeps = np.ones(left.shape, dtype=np.bool_)
@@ -145,7 +146,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def triangles_of(counts: Picks, faces: Picks) -> Picks:
-    """Return the triangles that ``triangulate`` makes of some polygons.
+    """Return the triangles that ``triangulate`` creates from some polygons.
 
     Parameters
     ----------
@@ -167,7 +168,7 @@ def triangles_of(counts: Picks, faces: Picks) -> Picks:
 
 
 def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
-    """Return corners with each negative one replaced by the first valid one of its polygon, or 0.
+    """Return corners with negative ones replaced by the first valid corner of the polygon, or 0.
 
     Parameters
     ----------
@@ -180,6 +181,6 @@ def first_known(corners: Picks, counts: Picks, owners: Picks) -> Picks:
     """
     known = np.flatnonzero(corners >= 0)
     first = np.zeros(len(counts), dtype=np.int64)
-    # Assigned in reverse order, so that the first valid corner remains.
+    # Values are assigned in reverse order, so that the first valid corner remains.
     first[owners[known[::-1]]] = corners[known[::-1]]
     return np.where(corners < 0, first[owners], corners)

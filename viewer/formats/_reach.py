@@ -1,7 +1,7 @@
 """Limits of the translations that a motion may contain.
 
-Single precision has 24 bits: at 1e9 units any body is drawn as a single point, and beyond 1e19 the
-squares in lengths overflow. Recordings stay within kilometres, which are 1e6 millimetres; a larger
+Single precision has 24 bits: at 1e9 units, any body is drawn as a single point, and beyond 1e19,
+the squares in lengths overflow. Recordings stay within a kilometre, 1e6 millimetres; a much larger
 translation is an error in the file. The same limit applies to calibrated cameras and to the
 translation of a pose. It does not limit the size of a mesh or skeleton.
 """

@@ -1,12 +1,13 @@
 """Rule for the location of files that are referenced by other files.
 
 A file may reference only files below its own folder, with links resolved: opening or converting a
-downloaded model must not show or copy images from elsewhere on the disk. A refusal is reported:
-the figure is drawn without the texture, and a ``.rig`` that references such a file is refused.
+downloaded model must not show or copy images from elsewhere on the disk. Refused references are
+reported: the figure is drawn without the texture, and a ``.rig`` that references such a file is
+rejected.
 
-The folder is that of the path as it was opened. If the path is a link, names are looked up next to
-the link, as other programs do, not next to its target. Files that the user names on the command
-line or in a dialog may lie anywhere, and so may the files of a folder that the user opens.
+The folder is that of the path that was opened. If the path is a link, names are looked up next to
+the link, as other programs do, not next to its target. Files that the user specifies on the command
+line or in a dialog may be anywhere, as may the files of a folder that the user opens.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _DRIVE = re.compile(r"[A-Za-z]:")
 
 
 def referenced_path(folder: Path, name: str) -> Path | None:
-    """Return the path of a referenced file, None if it leads out of the folder.
+    """Return the path of a referenced file; None if it leads out of the folder.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     try:
         # Unlike Path.resolve(), this does not raise for circular links; reading reports them.
         inside, base = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
-    except ValueError:  # a NUL in the name, which is invalid in any path
+    except ValueError:  # a NUL character, which is invalid in any path
         return path
     return path if inside != base and inside.is_relative_to(base) else None
 

@@ -96,11 +96,11 @@ class Source:
         return self._data
 
     def peek(self, size: int) -> bytes:
-        """Return the first bytes, without reading the rest unless that has been done already."""
+        """Return the first bytes; the rest is not read unless it has already been read."""
         return read_head(self.path, size) if self._data is None else self._data[:size]
 
     def once(self, opened: Callable[[Source], Content]) -> Content:
-        """Return the result of a function of this file, which is called on first use only."""
+        """Return the result of a function of this file, which is called only on first use."""
         if opened not in self._opened:
             self._opened[opened] = opened(self)
         return cast("Content", self._opened[opened])
@@ -143,7 +143,7 @@ class Source:
     def line(self, offset: int) -> int:
         """Return the line of an offset, counted from 1; slow, for errors only.
 
-        CR CR LF, which occurs in real files, is one line ending, and so is a single CR.
+        CR CR LF, which occurs in real files, is one line ending, as is a single CR.
         """
         start, line = self._counted
         if offset < start:
@@ -158,7 +158,7 @@ class Source:
 
     @property
     def end(self) -> int:
-        """Offset after the last word, where anything missing is reported."""
+        """Offset after the last word, at which missing items are reported."""
         return len(self.data.rstrip())
 
     def fault(self, key: str, offset: int | str | None = None, **values: Any) -> FormatError:
@@ -171,7 +171,7 @@ class Source:
         offset : int, optional
             Position in the file, or a JSON pointer, if known.
         **values : object
-            Values in the message. They are keywords so that calls read like the templates.
+            Values in the message, passed as keywords so that calls read like the templates.
         """
         return FormatError(self._diagnostic(key, offset, values))
 
@@ -184,7 +184,7 @@ class Source:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record an error that makes the file invalid, but lets the reader continue.
+        """Record an error that makes the file invalid but after which the reader can continue.
 
         Parameters
         ----------

@@ -15,21 +15,21 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
-_SHORTEST = 1e-15  # length of a normal; the square of a shorter one is 0 in float32
+_SHORTEST = 1e-15  # length of a normal; the square of a shorter length is 0 in float32
 _SIZES = {3: "triangle", 4: "quad"}
 
 
 def filled_normals(
     source: Source, normals: Floats | None, positions: Floats, triangles: Ints
 ) -> Floats:
-    """Return a normal for every vertex: the file's, or one computed where it has none.
+    """Return a normal for every vertex: that of the file, or a computed one.
 
     Parameters
     ----------
     source : Source
         The file, which records warnings about zero-length normals.
     normals : (V, 3) or None
-        Normals of the file; NaN where it has none.
+        Normals of the file; NaN where there is none.
     positions, triangles : (V, 3), (T, 3)
         The mesh.
     """
@@ -58,7 +58,7 @@ def polygon_text(counts: NDArray[np.int64], n_triangles: int) -> str:
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:
-    """Return the up axis stated by a comment, as this program writes it; y by default."""
+    """Return the up axis stated by a comment in this program's notation; y by default."""
     return "z" if re.search(r"\bz up\b", comment) else "y"
 
 

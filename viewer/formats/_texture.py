@@ -46,6 +46,6 @@ def read_picture(source: Source) -> Bytes:
     Raises
     ------
     FormatError
-        If it is not a readable image.
+        If the file is not a readable image.
     """
     return decode_picture(source.path, source.data)

@@ -54,7 +54,7 @@ _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
     (("right_hand_pose",), {45: _SMPLX[40:]}),
 )
 _HANDS = {"left_hand_pose": "left", "right_hand_pose": "right"}
-# Most principal components of a hand; fewer than its angles.
+# Maximum number of principal components of a hand, less than the number of its angles.
 _MOST_COMPONENTS = 44
 _FLAGS = ("flat_hand_mean", "use_pca")
 _OWN = ("present", "up")
@@ -75,7 +75,7 @@ _SAME = 1e-5  # radians or metres: precision of float32 for numbers below 100
 
 
 def has_frames(archive: Archive) -> bool:
-    """Return whether an archive is a motion rather than one pose, which may be J x 3 numbers.
+    """Return whether an archive is a motion rather than a single pose, which may be J x 3 numbers.
 
     A motion has several frames, or none, or one frame in an array with a frame rate.
     """
@@ -333,7 +333,7 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
 
 
 def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
-    """Return the row of every frame, -1 where the file marks the person as absent."""
+    """Return the row of every frame; -1 if the file marks the person as absent."""
     rows: Ints = np.arange(count, dtype=np.int32)
     if archive.has("present"):
         present = _rows(archive, "present").ravel()
@@ -355,7 +355,7 @@ def _up(archive: Archive, is_aist: bool) -> str:
         return said
     if is_aist:
         return "y"
-    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE is y up without stating it
+    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE is y up, but unstated
     return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
 
 

@@ -60,12 +60,12 @@ def read(source: Source) -> Clip:
     Returns
     -------
     Clip
-        Channel i moves DOF i.
+        Clip whose channel i moves DOF i.
 
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     return _Parser(source).clip()
 
@@ -138,7 +138,7 @@ class _Parser:
         self.channel = index
         self.starts.append(self.word.start() if self.word else 0)
         self._advance()
-        # Some files label channels with numbers; only their order matters.
+        # Some files label channels with numbers, but only the order matters.
         while self.word is not None and self.word.group() not in (b"{", b"}", b"extrapolate"):
             self._advance()
         self._expect(b"{")
@@ -199,7 +199,7 @@ class _Parser:
             time, value = self._number("time", of_key=True), self._number("value", of_key=True)
             row = time, value, self._tangent(), self._tangent(), start
             if math.isnan(time + value):
-                lost += 1  # already recorded; the curve passes through the other keys
+                lost += 1  # already recorded; the curve is defined by the other keys
             else:
                 rows.append(row)
         self.key = None
@@ -221,7 +221,7 @@ class _Parser:
         return Phrase("anim-key", channel=self.channel, index=self.key)
 
     def _begins(self) -> Phrase | None:
-        """Return the location of the last channel if the file ends inside it, else None."""
+        """Return the location of the last channel if the file ends inside it, or None."""
         if self.word is not None:
             return None
         if self.channel is None:
@@ -314,7 +314,7 @@ def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     Returns
     -------
     list of Diagnostic
-        Empty: the format holds all of a clip.
+        Empty: the format stores all of a clip.
 
     Raises
     ------

@@ -10,9 +10,9 @@ r"""Reader of ``.bvh``: a skeleton and its motion (BioVision; the format has no 
     name      = word*
 
 Words are separated by any white space, including line ends, and keywords are case-insensitive. A
-frame has one number per channel, joints in the order of the file. Angles are degrees; a joint's
-rotation channels multiply from left to right, ``Zrotation Yrotation Xrotation`` is R = Rz Ry Rx.
-Position channels replace the joint's OFFSET. Unit and up axis are not in the file: both are
+frame has one number per channel, with joints in the order of the file. Angles are degrees; a
+joint's rotation channels multiply from left to right: ``Zrotation Yrotation Xrotation`` is R = Rz
+Ry Rx. Position channels replace the joint's OFFSET. Unit and up axis are not in the file: both are
 estimated, unless the user specifies them, and the motion records how.
 """
 
@@ -63,7 +63,7 @@ def read(source: Source) -> SkeletonMotion:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     hierarchy = read_hierarchy(source)
     table = _table(source, hierarchy.joints)
@@ -90,7 +90,7 @@ def read(source: Source) -> SkeletonMotion:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """Joints without End Sites, and the columns of a frame that move them."""
+    """Joints, without End Sites, and the columns of a frame that move them."""
 
     names: tuple[str, ...]
     parents: list[int]
@@ -173,7 +173,7 @@ def _rest_points(table: _Table, skeleton: Skeleton) -> Floats:
 def _boxes(table: _Table, parents: Ints) -> Floats:
     """Return a box for each joint from itself to its children or End Sites: (J, 2, 3).
 
-    Invariant for the exporter: twice the centre of the box is the End Site of a joint with one.
+    Invariant for the exporter: if a joint has an End Site, it is at twice the centre of the box.
     """
     inner = np.flatnonzero(parents >= 0)
     owners = np.concatenate([parents[inner], [joint for joint, _ in table.ends]]).astype(np.int32)
@@ -183,7 +183,7 @@ def _boxes(table: _Table, parents: Ints) -> Floats:
     lengths = np.linalg.norm(tips, axis=1)
     size = float(np.median(lengths[lengths > 0.0])) if lengths.any() else 1.0
     half = np.clip(_THICKNESS * lengths, _THINNEST * size, _THICKEST * size)[:, None]
-    # Along its main axis a box is as long as the bone; the other sides get a limited thickness.
+    # Along its main axis, a box is as long as the bone; the other sides have a limited thickness.
     along = np.abs(tips) >= np.abs(tips).max(axis=1, keepdims=True)
     reach = np.where(along, np.abs(0.5 * tips), np.minimum(np.abs(0.5 * tips), 2.0 * half))
     reach = np.where(reach < half, reach + half, reach)
@@ -196,7 +196,7 @@ def _boxes(table: _Table, parents: Ints) -> Floats:
 
 
 def _rotations(table: _Table, values: Floats) -> Floats:
-    """Multiply every joint's rotation channels, joints with the same axes at once: (N, J, 4)."""
+    """Multiply each joint's rotation channels, all joints with the same axes at once: (N, J, 4)."""
     rotations = np.empty((len(values), len(table.names), 4))
     groups: dict[tuple[int, ...], list[int]] = {}
     turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]
@@ -218,7 +218,7 @@ def _rotations(table: _Table, values: Floats) -> Floats:
 
 
 def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> None:
-    """Multiply quaternions (x, y, z, w) on the right by one about a coordinate axis; in place."""
+    """Multiply quaternions (x, y, z, w) on the right by rotations about an axis, in place."""
     other, third = (axis + 1) % 3, (axis + 2) % 3
     a, b, c, w = parts[axis], parts[other], parts[third], parts[3]
     parts[axis], parts[3] = a * cosine + w * sine, w * cosine - a * sine
@@ -226,7 +226,7 @@ def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> Non
 
 
 def _keep_signs(rotations: Floats) -> None:
-    """Replace q by -q, the same rotation, where that is nearer to the previous frame; in place."""
+    """Replace q by -q, the same rotation, if that is nearer to the previous frame; in place."""
     products = np.einsum("nja,nja->nj", rotations[1:], rotations[:-1])
     turned = np.logical_xor.accumulate(products < 0.0, axis=0)
     if turned.any():

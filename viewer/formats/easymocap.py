@@ -33,7 +33,7 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_capture", "read"]
 
-_LEVELS = 3  # folders that may contain the cameras, from that of the frames upwards
+_LEVELS = 3  # folders that may contain the cameras, from the folder of the frames upwards
 
 
 def read(source: Source) -> Capture:
@@ -52,7 +52,7 @@ def read(source: Source) -> Capture:
     Raises
     ------
     FormatError
-        If there are no frames, or no person in any of them.
+        If there are no frames, or no person in any frame.
     """
     return open_capture(source)
 
@@ -75,8 +75,8 @@ def open_capture(
     frame_rate : float
         Frames per second.
     flat_hands : bool, optional
-        Whether hand components exclude the mean hand; by default they do for SMPL-X and MANO, and
-        do not for SMPL+H.
+        Whether hand components exclude the mean hand; by default, they do for SMPL-X and MANO, but
+        not for SMPL+H.
     up : "y", "z", "-y", "-z" or ""
         Up axis of the world; empty to estimate it from the people.
     legacy_expression : bool
@@ -97,7 +97,7 @@ def open_capture(
     Raises
     ------
     FormatError
-        If there are no frames, no person in any of them, or no camera in the given folder.
+        If there are no frames, no person in any frame, or no camera in the given folder.
     """
     files = find_frames(source)
     options = Options(
@@ -127,7 +127,7 @@ def open_capture(
 
 
 def _name(source: Source) -> str:
-    """Return a recording's name: not that of its ``smpl`` folder, which every recording has."""
+    """Return a recording's name, but not that of its ``smpl`` folder, which is always the same."""
     return folder_name(source.path) if source.is_folder else source.path.stem
 
 

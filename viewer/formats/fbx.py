@@ -1,10 +1,10 @@
 """Reader of ``.fbx``: meshes, skins, blend shapes, materials and animation stacks of a node tree.
 
-The format is Autodesk's and not published. ufbx (github.com/ufbx/ufbx) reads versions 3.0 to 7.7,
-ASCII and binary, in a child process, because its Python binding can crash. Transforms with pivots
-are folded into translation, rotation and scale, which is exact. Animations are baked at the file's
-frame rate and at their keys. Axes that are right-handed with y or z up, and units of m, cm, mm or
-inches, stay those of the file; others are converted to y up and metres.
+The format belongs to Autodesk and is not published. ufbx (github.com/ufbx/ufbx) reads versions 3.0
+to 7.7, ASCII and binary, in a child process, because its Python binding can crash. Transforms with
+pivots are folded into translation, rotation and scale, which is exact. Animations are baked at the
+file's frame rate and at their keys. Right-handed axes with y or z up, and units of m, cm, mm or
+inches, are kept; others are converted to y up and metres.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def read(source: Source) -> FigureGroup:
     Parameters
     ----------
     source : Source
-        The file; what has no equivalent is added to its warnings.
+        The file; elements without equivalent are added to its warnings.
 
     Returns
     -------

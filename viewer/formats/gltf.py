@@ -8,6 +8,7 @@ from __future__ import annotations
 from viewer.formats._gltf.node_file import read_nodes
 from viewer.formats._nodes.figures import figure_group
 from viewer.formats._source import Source
+from viewer.formats._vrm.reading import with_vrm
 from viewer.rig.figure_group import FigureGroup
 
 __all__ = ["read"]
@@ -31,4 +32,4 @@ def read(source: Source) -> FigureGroup:
     FormatError
         If the file is invalid, requires an unsupported extension, or has nothing to show.
     """
-    return figure_group(read_nodes(source), source)
+    return figure_group(with_vrm(read_nodes(source), source), source)

@@ -54,7 +54,8 @@ def read(source: Source) -> MorphTarget:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar, or the sections list different vertices.
+        If the text violates the grammar, or the sections list different vertices; the error has the
+        file and line.
     """
     sections: dict[bytes, _Section] = {}
     position = 0

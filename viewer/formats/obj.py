@@ -9,7 +9,7 @@ r"""Reader of Wavefront ``.obj`` meshes, which have no rig.
     corner = v | v/vt | v//vn | v/vt/vn              from 1, or from -1 for the last one so far
 
 Vertices keep their indices, including those without a face. Polygons are triangulated. A vertex
-with several normals gets their mean, because a mesh here has one normal per vertex.
+with several normals gets their mean, because a ``Mesh`` has one normal per vertex.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from viewer.rig.mesh import Mesh
 
 __all__ = ["read"]
 
-_HEAD = 4096  # bytes within which files written by this program state the up axis
+_HEAD = 4096  # number of bytes within which files written by this program state the up axis
 _SHORTEST = 1e-9  # length of a mean of unit normals that cancel each other
 
 
@@ -53,7 +53,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     parts = read_parts(source)
     if len(parts.positions) == 0:
@@ -122,7 +122,7 @@ def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None,
 
 
 def _normals(source: Source, parts: ObjParts) -> Floats | None:
-    """Return a normal for every vertex, NaN where no corner has one."""
+    """Return a normal for every vertex; NaN if no corner has one."""
     listed, n_vertices = parts.normals, len(parts.positions)
     if len(listed) == 0:
         return None
@@ -167,7 +167,7 @@ def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -
 def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], Ints]:
     """Return the materials, and the material index of each face.
 
-    Without any ``usemtl``, several groups or objects become materials, to preserve their names.
+    If there is no ``usemtl``, several groups or objects become materials, to preserve their names.
     """
     used = parts.runs[b"usemtl"]
     by_name = bool(used)

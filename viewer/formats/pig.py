@@ -11,8 +11,8 @@
     body_parts.txt V x 1, body_part_defs.txt, sym.txt V x 1                 optional
     reduced_ids.txt R x 1, reduced_faces.txt N x 3                          optional
 
-A pose has 190 values: translation (3), 62 x 3 rotations, scale. The root's rotation is angles
-about z, y and x, all others are rotation vectors. Scale and translation come last, about the
+A pose has 190 values: translation (3), 62 x 3 rotations, scale. The root's rotation consists of
+angles about z, y and x, all others are rotation vectors. Scale and translation come last, about the
 origin.
 """
 
@@ -63,7 +63,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        If the model is invalid; gives the file, and the line in a text.
+        If the model is invalid; the error has the file, and the line in text files.
     """
     files = open_parts(source)
     parts = files.parts
@@ -120,7 +120,7 @@ def _layout(n_joints: int) -> PoseLayout:
 
 
 def _neutral_mesh(parts: dict[str, Part]) -> Floats:
-    """Return the vertices, with those of invalid rows moved between their neighbours."""
+    """Return the vertices; those of invalid rows are moved between their neighbours."""
     positions, faces = parts["vertices"].values, parts["faces_vert"].values
     if not np.isnan(positions).any():
         return positions
@@ -241,13 +241,13 @@ def _skin(source: Source, parts: dict[str, Part], joints: Floats, n_vertices: in
 
 
 def _row_of(rows: Indices, vertices: Ints, vertex: int) -> int:
-    """Return the first row with a weight of a vertex; row 0 if it has none."""
+    """Return the first row with a weight of a vertex; row 0 if there is none."""
     found = np.flatnonzero(vertices == vertex)
     return int(rows[found[0]]) if len(found) else 0
 
 
 def _check_weights(source: Source, name: str, skin: Skin, known: Bools) -> None:
-    """Report wrong weight sums of vertices whose rows are all valid."""
+    """Report incorrect weight sums of vertices whose rows are all valid."""
     moved = has_influence(skin)
     bare = np.flatnonzero(~moved & known)
     if len(bare):
@@ -350,7 +350,7 @@ def _reduced(parts: dict[str, Part], n_vertices: int) -> ReducedMesh | None:
 
 
 def _keypoints(n_vertices: int, n_joints: int) -> Keypoints | None:
-    """Return the authors' keypoints, which are defined for the published mesh only."""
+    """Return the authors' keypoints, which are only defined for the published mesh."""
     if n_joints != len(JOINTS) or n_vertices <= max(i for _, kind, i in KEYPOINTS if kind == "v"):
         return None
     count = len(KEYPOINTS)
@@ -371,7 +371,7 @@ def _facts(
     # Vertices without influence stay at rest.
     sums = np.where(has_influence(skin), weight_sums(skin), 1.0)
     facts = [("weights", f"raw; their sums are {sums.min():.3f} to {sums.max():.3f}")]
-    # At rest, normalised weights reproduce the mesh; raw ones scale each vertex by its sum.
+    # At rest, normalised weights reproduce the mesh; raw weights scale each vertex by its sum.
     moved = np.linalg.norm(mesh.positions * (sums - 1.0)[:, None], axis=1)
     facts.append(
         ("normalising", f"would move rest vertices by up to {1000.0 * moved.max():.2f} mm")

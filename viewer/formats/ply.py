@@ -62,7 +62,8 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, or the number of the vertex or face, if the file is invalid.
+        If the file is invalid; the error has the file and line, or the number of the vertex or
+        face.
     """
     header = read_header(source)
     tables = read_tables(source, header)
@@ -185,7 +186,7 @@ def _faces(
 def _corners(
     source: Source, faces: Table, counts: Indices, values: NDArray[Any], n_vertices: int
 ) -> Indices:
-    """Return the vertices of all faces, invalid ones replaced by another of the same face."""
+    """Return the vertices of all faces; invalid ones are replaced by others of the same face."""
     corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
     is_wrong = (corners != values) | (corners < 0) | (corners >= n_vertices)
     if not is_wrong.any():
@@ -237,7 +238,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
 def _uvs(
     source: Source, vertices: Table, wedges: Floats | None, picks: Indices
 ) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates: the distinct ones of corners, or those of vertices."""
+    """Return texture coordinates: the distinct coordinates of corners, or those of vertices."""
     if wedges is not None and len(wedges):
         # Each pair is viewed as one complex number, so that sorting finds equal pairs.
         pairs = np.ascontiguousarray(wedges + 0.0).view(np.complex128).ravel()
@@ -268,7 +269,7 @@ def _colors(source: Source, vertices: Table) -> Floats | None:
 
 
 def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material, ...]:
-    """Return a material with the image that a comment names, for all faces."""
+    """Return a material, for all faces, with the image that a comment specifies."""
     named = [
         (text.split(None, 1)[1].strip(), offset)
         for text, offset in header.comments

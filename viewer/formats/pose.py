@@ -7,7 +7,7 @@
             "own_numbers": […], "joint_names": […], "joint_turns": [[x, y, z, w], …],
             "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …], "up": "y",
             "dof_layout": word}
-    .npz   the same arrays, dof_names and dofs apart
+    .npz   the same arrays, with separate dof_names and dofs
     .txt   the model's own pose vector, separated by white space: 190 values for PIG, 72 for SMPL …
 
 ``joint_turns`` are rotations as quaternions in the figure's axes, for figures whose DOFs differ
@@ -135,7 +135,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
             expected=_VERSION,
             found=describe(version),
         )
-    # The key that each part of the pose is read from.
+    # Key from which each part of the pose is read.
     keys = {part: _first(named, names) for part, names in _NAMES.items()}
     vector = _first(named, _VECTORS)
     translation = _numbers(named, keys["translation"])
@@ -172,7 +172,7 @@ def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str]
 
 
 def _check_keys(named: NamedValues, record: PoseRecord) -> None:
-    """Refuse a file without a pose; warn of unknown keys."""
+    """Refuse a file without a pose; warn about unknown keys."""
     arrays = (record.vector, record.shape, record.expression, record.translation)
     is_empty = not record.dofs and not record.parts and record.scale is None
     if is_empty and all(array is None for array in arrays):
@@ -294,7 +294,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     content : PoseRecord
         Pose to write; other content is refused.
     path : str or Path
-        ``.json``, ``.npz``, or ``.txt`` for the model's own pose vector alone.
+        ``.json``, ``.npz``, or ``.txt`` for only the model's own pose vector.
 
     Returns
     -------

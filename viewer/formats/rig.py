@@ -5,7 +5,7 @@ r"""Reader of ``.rig`` files (UCSD course CSE169): the names of files that belon
     rig   = "rig" name? "{" item* "}"
     item  = "skeleton" file | "skin" file | "morphs" n "{" file*n "}"
 
-Files are relative to the folder of the ``.rig``, and must lie below it. A name in double quotes may
+Files are relative to the folder of the ``.rig``, and must be below it. A name in double quotes may
 contain spaces.
 """
 
@@ -53,7 +53,8 @@ def read(source: Source) -> NamedFiles:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar or does not name a file.
+        If the text violates the grammar or does not specify a file; the error has the file and
+        line.
     """
     words = list(_WORD.finditer(source.data))
     words.reverse()
@@ -118,5 +119,5 @@ def _expect(source: Source, words: Words, text: bytes) -> None:
 
 
 def _next(source: Source, words: Words) -> tuple[int, bytes | None]:
-    """Return the next word and its offset, None at the end of the file."""
+    """Return the next word and its offset; None at the end of the file."""
     return (words[-1].start(), words[-1].group()) if words else (source.end, None)

@@ -64,7 +64,7 @@ def read(source: Source) -> Figure:
     Returns
     -------
     Figure
-        Figure with mesh, skeleton and skin; correctives are read when first used.
+        Figure with mesh, skeleton and skin; correctives are read on first use.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def _skeleton(archive: Archive) -> Skeleton:
 
 
 def _parents(archive: Archive, count: int) -> NDArray[Any]:
-    """Return the parents; refuse those that do not precede their joints, which become roots."""
+    """Return the parents; refuse parents that do not precede their joints, which become roots."""
     parents = _numbers(archive, "parents", (count,))
     late = np.flatnonzero((parents >= np.arange(count)) | (parents < -1))
     if len(late) == 0:
@@ -151,7 +151,7 @@ def _parents(archive: Archive, count: int) -> NDArray[Any]:
 
 
 def _limits(archive: Archive, n_dofs: int) -> Floats:
-    """Return the limits; refuse contradictory ones, which are removed."""
+    """Return the limits; refuse contradictory limits, which are removed."""
     limits = _numbers(archive, "dof_limits", (n_dofs, 2)).astype(np.float64)
     wrong = ~(limits[:, 0] <= limits[:, 1])
     if not wrong.any():
@@ -173,7 +173,7 @@ def _skin(archive: Archive, n_joints: int) -> Skin:
     starts = _numbers(archive, "skin_starts", (None,))
     joints = _numbers(archive, "skin_joints", (None,))
     listed = _numbers(archive, "skin_weights", (None,))
-    # Whether the starts ascend is checked by the skin.
+    # The skin checks whether the starts are in ascending order.
     owners = np.searchsorted(np.sort(starts), np.arange(len(listed)), side="right") - 1
     weights = finite(archive, "skin_weights", listed, "weights", np.maximum(owners, 0))
     inverse_bind = _finite(archive, "inverse_bind", (None, 4, 4), "bindings")
@@ -261,7 +261,7 @@ def save(figure: Figure, path: str | Path, more: Mapping[str, NDArray[Any]] | No
     figure : Figure
         Figure with mesh, skeleton and skin.
     path : str or Path
-        Replaced in one step.
+        Target file, replaced atomically.
     more : mapping of str to array, optional
         Additional arrays, for other programs.
 

@@ -8,9 +8,9 @@ r"""Reader and writer of ``.skel`` skeletons (UCSD course CSE169).
           | "rotxlimit" min max | "rotylimit" min max | "rotzlimit" min max | joint | unknown
     name  = word*
 
-Words are separated by any white space; braces are words even without it. Lengths have no
-unit, angles are radians, y is up. Joints are numbered in the order of the file. Each has three
-rotation DOFs; the first also has three translations, which ``.anim`` calls the root's.
+Words are separated by any white space; braces are words even without white space. Lengths have no
+unit, angles are radians, y is up. Joints are numbered in the order of the file. Each joint has
+three rotation DOFs; the first also has three translations, the root's translations in ``.anim``.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Word = re.Match[bytes]
 
 @dataclass(slots=True)
 class _Joint:
-    """A joint being read; items come in any order, and the last of each kind is used."""
+    """A joint being read; items may be in any order, and the last of each kind is used."""
 
     name: str
     parent: int
@@ -51,7 +51,7 @@ class _Joint:
     boxmin: Sequence[float] = (-0.1, -0.1, -0.1)
     boxmax: Sequence[float] = (0.1, 0.1, 0.1)
     pose: Sequence[float] = (0.0, 0.0, 0.0)
-    # By axis: the limits and their offset.
+    # Limits and their offset, by axis.
     limits: dict[int, tuple[list[float], int]] = field(default_factory=dict)
 
 
@@ -71,7 +71,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     joints = _Parser(source).joints()
     if not joints:
@@ -131,7 +131,7 @@ class _Parser:
         self.word = next(self.words, None)
 
     def _open_joint(self) -> None:
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         start = self.word.start()
         name: list[str] = []
         self._advance()
@@ -156,7 +156,7 @@ class _Parser:
         self._advance()
 
     def _limit(self, axis: int) -> None:
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         start = self.word.start()
         values = self._numbers(2)
         if values:
@@ -165,9 +165,9 @@ class _Parser:
     def _numbers(self, count: int) -> list[float]:
         """Read the numbers of an item; the current word is its keyword.
 
-        Empty if an error was recorded; the item is then ignored.
+        The result is empty if an error was recorded; the item is then ignored.
         """
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         keyword = self.word
         values: list[float] = []
         self._advance()
@@ -220,7 +220,7 @@ class _Parser:
 
     def _skip_unknown(self) -> None:
         """Skip an unknown word with its line and numbers, or with its whole balanced block."""
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         keyword = self.word
         self.source.warn("F006.unknown", keyword.start(), found=keyword.group())
         if keyword.group() != b"{":

@@ -51,7 +51,7 @@ from viewer.rig.skin import Skin, skin_rows
 
 __all__ = ["lost_parts", "read", "write"]
 
-_SHORTEST = 1e-15  # length of a normal; the square of a shorter one is 0 in float32
+_SHORTEST = 1e-15  # length of a normal; the square of a shorter length is 0 in float32
 
 
 def read(source: Source) -> Figure:
@@ -70,7 +70,8 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar or its sections do not match.
+        If the text violates the grammar or its sections do not match; the error has the file and
+        line.
     """
     sections = read_sections(source)
     mesh = _mesh(source, sections)
@@ -119,7 +120,7 @@ def _normals(source: Source, sections: Sections, positions: Floats, triangles: I
         if "normals" not in sections.offsets:
             source.warn("F007.skin-normals")
         return vertex_normals(positions, triangles)
-    # Column by column, because numpy reduces rows of three slowly.
+    # Columns are reduced one by one, because numpy is slow at reducing rows of three.
     x, y, z = np.abs(normals.T)
     longest = np.maximum(np.maximum(x, y), z)
     zero: Bools = longest < _SHORTEST
@@ -252,7 +253,7 @@ def _weights_text(skin: Skin) -> str:
 
 
 def _triangle_runs(mesh: Mesh) -> list[str]:
-    """Return the triangles sections, each after its material, as the reader assigns them."""
+    """Return the triangles sections, each after its material, as assigned by the reader."""
     indices = mesh.material_indices
     edges = np.flatnonzero(np.diff(indices)) + 1
     parts: list[str] = []
@@ -281,7 +282,7 @@ def _material_text(material: Material) -> str:
 
 
 def _as_rest_of_line(texture: str | None) -> str | None:
-    """Return a texture's name as it is read back."""
+    """Return a texture's name as it would be read back."""
     try:
         text = (texture or "").encode("utf-8", "surrogateescape").strip()
     except UnicodeEncodeError:  # a lone surrogate, which decoding never yields

@@ -48,7 +48,7 @@ KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Required keys, which identify such a model."""
 
 _ODD_SUM = 0.05  # deviation of a joint regressor's sum from 1, which would displace the joint
-_ROUNDED = 1e-3  # largest deviation from 1 of weight sums that are normalised
+_ROUNDED = 1e-3  # largest deviation of weight sums from 1 that is corrected by normalising
 _ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and as uint32 converted to float32
 
 
@@ -63,7 +63,7 @@ def read(source: Source) -> Figure:
     Returns
     -------
     Figure
-        Figure with mesh, skeleton and skin; blend shapes and correctives are read when first used.
+        Figure with mesh, skeleton and skin; blend shapes and correctives are read on first use.
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.retargeting.joint_names import canonical_names
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, owners
@@ -98,7 +98,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
     skeleton = figure.skeleton
     if skeleton is None:
         return None
-    names = canonical_names(skeleton.names, skeleton.parents)
+    names = joint_meanings(skeleton)
     feet = []
     for side in ("left", "right"):
         found = [names.index(name) for name in (f"{side}_foot", f"{side}_ankle") if name in names]

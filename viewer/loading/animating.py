@@ -1,4 +1,4 @@
-"""Start of the animations that figures bring along."""
+"""Starts the animations that figures come with."""
 
 from __future__ import annotations
 

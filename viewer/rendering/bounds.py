@@ -19,7 +19,7 @@ from viewer.rig.skin import Skin, bind_positions, owners
 
 __all__ = ["Bounds", "stretch"]
 
-_MARGIN = 1.03  # for pose correctives and skinning methods that do not blend linearly
+_MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
 _BONE = 0.05  # largest half-width of a bone, relative to the skeleton's size
 
 

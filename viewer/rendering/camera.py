@@ -42,7 +42,7 @@ VIEWS = {
 _USUAL_AZIMUTH = 35.0  # initial angle from the front
 
 _MARGIN = 1.08  # margin around a framed figure
-_SMALLEST = 1e-9  # minimum distance; framing a single point gives less
+_SMALLEST = 1e-9  # minimum distance; framing a single point would give less
 
 
 @dataclass(slots=True)
@@ -54,19 +54,19 @@ class Camera:
     target : (3,)
         Point that the camera orbits, scene space.
     distance : float
-        From eye to target, scene units.
+        Distance from eye to target, scene units.
     azimuth, inclination : float
-        Degrees about the up axis, and above the horizon. At 0, 0 the camera looks along -z if y
-        is up, along +y if z is up.
+        Degrees about the up axis, and above the horizon. At 0, 0, the camera looks along -z if y is
+        up, along +y if z is up.
     fov : float
         Vertical field of view, degrees.
     orthographic : bool
-        Parallel projection with the same height at the target.
+        Whether the projection is parallel, with the same height at the target.
     up : "y" or "z"
         The scene's up axis.
     fixed : CameraView or None
-        A calibrated camera to look through. It provides the matrices; the other fields take
-        effect again when this is reset to None.
+        A calibrated camera to look through. It provides the matrices; the other fields take effect
+        again when this field is None.
     front : float
         Azimuth of the front view; named views are relative to it.
     """
@@ -97,7 +97,7 @@ class Camera:
 
     @property
     def is_parallel(self) -> bool:
-        """Whether the projection is parallel; that of a calibrated camera never is."""
+        """Whether the projection is parallel, which it never is for a calibrated camera."""
         return self.orthographic and self.fixed is None
 
     def rotation(self) -> Floats:
@@ -111,7 +111,7 @@ class Camera:
         if self.fixed is not None:
             return pinhole_view(self.fixed)
         _, up, _ = camera_axes(self)
-        # pyrr's matrices suit row vectors.
+        # pyrr's matrices are for row vectors.
         return np.array(matrix44.create_look_at(eye(self), self.target, up, dtype="f8")).T
 
     def projection_matrix(self, aspect: float, box: Floats) -> Floats:
@@ -132,7 +132,7 @@ class Camera:
         if self.fixed is not None:
             return pinhole_projection(self.fixed, aspect, box)
         reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
-        reach = reach or self.distance  # an empty scene needs a depth range too
+        reach = reach or self.distance  # even an empty scene needs a depth range
         far = self.distance + 20.0 * reach
         if self.orthographic:
             half = self.half_height
@@ -183,7 +183,7 @@ def front_azimuth(front: str, up: Literal["y", "z"]) -> float:
 
 
 def facing_camera(front: str, up: Literal["y", "z"], orthographic: bool = False) -> Camera:
-    """Return a camera that views a front from slightly left and above, not framed yet."""
+    """Return a camera that views a front from slightly left and above, without framing anything."""
     ahead = front_azimuth(front, up)
     azimuth = _wrapped(ahead + _USUAL_AZIMUTH)
     return Camera(azimuth=azimuth, orthographic=orthographic, up=up, front=ahead)
@@ -210,13 +210,13 @@ def camera_from_view(
 ) -> Camera:
     """Return a camera that looks through a calibrated one.
 
-    With ``fixed`` reset to None it is an upright orbit camera at the same position, with the same
+    If ``fixed`` is reset to None, it is an upright orbit camera at the same position, with the same
     viewing direction and about the same field of view; its principal point is the image's centre.
 
     Parameters
     ----------
     view : CameraView
-        In scene space.
+        Calibrated camera in scene space.
     size : (int, int)
         Width and height of the drawn image, pixels.
     up : "y" or "z"
@@ -257,7 +257,7 @@ def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0)
     Parameters
     ----------
     camera : Camera
-        Changed in place: target and distance.
+        Camera whose target and distance are modified in place.
     points : (N, 3)
         Points to frame, scene space.
     aspect : float
@@ -294,13 +294,13 @@ def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
     Parameters
     ----------
     camera : Camera
-        Changed in place: target and distance.
+        Camera whose target and distance are modified in place.
     factor : float
         New distance over old distance.
     x, y : float
         Offset of the pointer from the image's centre, right and up, in image heights.
     """
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
-    factor = distance / camera.distance  # 1, hence no panning, at the ends of the range
+    factor = distance / camera.distance  # 1, so without panning, at the ends of the range
     pan(camera, x * (1.0 - factor), y * (1.0 - factor))
     camera.distance = distance

@@ -38,7 +38,7 @@ def image_notes(scene: Scene, camera: CameraView) -> list[str]:
 
 
 def lens_notes(scene: Scene, camera: CameraView) -> list[str]:
-    """Return a message about visible lens distortion: removed from images, else neglected.
+    """Return a message about visible lens distortion, which is removed from images or neglected.
 
     Raises
     ------

@@ -32,7 +32,7 @@ _TOLERANCE = 0.01  # relative difference of aspect ratios: one pixel of a small 
 def drawn_cameras(
     scene: Scene, view_through: CameraView | None, options: DisplayOptions
 ) -> list[CameraView]:
-    """Return the cameras whose frusta are drawn: all but the one that the scene is seen through."""
+    """Return the cameras whose frusta are drawn: all except the one in use."""
     if not options.cameras:
         return []
     return [camera for camera in scene.views if camera is not view_through]
@@ -83,7 +83,7 @@ def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Float
 def draw_image_behind(
     late: LatePasses, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
 ) -> None:
-    """Draw the image of the camera that the scene is seen through, if there is one."""
+    """Draw the image of the camera through which the scene is seen, if there is one."""
     camera = view.camera.fixed
     if camera is None or options.image_brightness <= 0.0 or scene.images is None:
         return

@@ -1,4 +1,4 @@
-"""Shadows and ambient occlusion as the lit shaders use them."""
+"""Shadows and ambient occlusion as used by the lit shaders."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ class Shadow:
     texture : moderngl.Texture
         Depths as seen from the light.
     matrix : (4, 4)
-        From scene space to coordinates in the map, 0 to 1 on all axes.
+        Maps scene space to coordinates in the map, 0 to 1 on all axes.
     texel : float
         Side of a texel, scene units.
     strength : float
-        0 to 1: fraction of the light that a shadow removes.
+        Fraction of the light that a shadow removes, 0 to 1.
     angle : float
         Rotation of the filter's pattern, radians.
     blur : float
-        Radius of the filter on the ground, scene units; never less than that on surfaces.
+        Radius of the filter on the ground, scene units; never less than the radius on surfaces.
     """
 
     texture: moderngl.Texture
@@ -90,7 +90,8 @@ class Effects:
                 "u_shadow_map": SHADOW_UNIT,
                 "u_shadow_matrix": as_uniform(shadow.matrix @ np.linalg.inv(view)),
                 "u_shadow_filter": shadow.filter(),
-                # As far as the filter reaches; otherwise surfaces would shadow themselves.
+                # The offset equals the reach of the filter; otherwise surfaces would shadow
+                # themselves.
                 "u_shadow_offset": (FILTER_RADIUS + 1.0) * shadow.texel,
                 "u_shadow_strength": shadow.strength,
             }
@@ -105,4 +106,4 @@ class Effects:
 
 
 NO_EFFECTS = Effects()
-"""No effects: lighting depends on the lights alone."""
+"""No effects: lighting depends only on the lights."""

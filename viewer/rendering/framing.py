@@ -29,7 +29,7 @@ __all__ = [
     "seen_aspect",
 ]
 
-_MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # used for fitting
+_MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # limits for fitting
 _N_DIRECTIONS = 1000
 _BLOCK = 5_000  # points at a time: the matrix of dot products stays below 40 MB
 _N_VIEWS = 24  # views of a rotating camera to fit, 15 degrees apart in a full rotation
@@ -41,7 +41,7 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     Parameters
     ----------
     recording : Recording
-        Its camera and box are not used.
+        Recording, whose camera and box are not used.
 
     Returns
     -------
@@ -72,14 +72,14 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
 
 
 def level_shifts(recording: Recording) -> Floats:
-    """Return how far the actors have moved over the ground in each frame, scene units: (F, 3).
+    """Return the movement of the actors over the ground up to each frame, scene units: (F, 3).
 
     A camera with these shifts shows all frames at one scale and with one ground line.
 
     Parameters
     ----------
     recording : Recording
-        Its camera, box and shifts are not used.
+        Recording, whose camera, box and shifts are not used.
     """
     scene = copied(recording.scene)
     shifts = np.zeros((recording.n_frames, 3))
@@ -97,12 +97,12 @@ def level_shifts(recording: Recording) -> Floats:
 
 
 def seen_aspect(camera: Camera, points: Floats) -> float:
-    """Return the width / height of points as a camera sees them from far away.
+    """Return the width / height of points as seen by a camera from far away.
 
     Parameters
     ----------
     camera : Camera
-        Only its direction is used.
+        Camera of which only the direction is used.
     points : (N, 3)
         Scene space.
     """
@@ -133,20 +133,20 @@ def frames_looked_at(n_frames: int, most: int) -> list[int]:
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
     """Return the extreme points along each of many directions.
 
-    Their bounding box is exact. A camera fitted to them cuts off well below 1 % of the size: 1000
-    directions are 7 degrees apart. The margin of ``fit`` is 8 %.
+    Their bounding box is exact. A camera fitted to them cuts off much less than 1 % of the size:
+    1000 directions are 7 degrees apart. The margin of ``fit`` is 8 %.
 
     Parameters
     ----------
     points : (N, 3)
-        At least one.
+        At least one point.
     n_directions : int
         Number of directions; 100 are 20 degrees apart, with an error below 2 %.
 
     Returns
     -------
     (M, 3)
-        A subset of at most ``n_directions + 6`` points; all if there are no more.
+        A subset of at most ``n_directions + 6`` points; all points if there are no more.
     """
     if len(points) <= n_directions:
         return points
@@ -253,7 +253,7 @@ def _with_joint(scene: Scene, actors: Iterable[int], name: str) -> list[tuple[in
 
 
 def _hint(scene: Scene, name: str) -> str:
-    """Return the names similar to an unknown one, or else all actors."""
+    """Return the names similar to an unknown name, or all actors if there are none."""
     called = _called(scene)
     for place, sign in enumerate(name):
         whose = [i for i, who in enumerate(called) if sign in "/:" and name[:place].lower() in who]
@@ -279,7 +279,7 @@ def _root(actor: Actor) -> int:
 
 
 def _joint(actor: Actor, name: str) -> int:
-    """Return the index of a joint or captured point, -1 if it has none of that name."""
+    """Return the index of a joint or captured point, or -1 if there is none with this name."""
     names = [each.lower() for each in _part_names(actor)]
     return names.index(name) if name in names else -1
 

@@ -25,12 +25,12 @@ from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = ["Lighting"]
 
-_SHADOW_STRENGTH = 0.9  # the rest represents light reflected by other surfaces
+_SHADOW_STRENGTH = 0.9  # the remainder represents light reflected by other surfaces
 _BLUR = 0.011  # filter radius on the ground, relative to a figure's size, where passes are averaged
 
 
 class Lighting:
-    """Draws the maps that the lighting depends on, before each pass of an image.
+    """Draws the maps on which the lighting depends, before each pass of an image.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Lighting:
         self.bounds = Bounds()
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
-        self._size = 0.0  # of the largest figure, scene units
+        self._size = 0.0  # size of the largest figure, scene units
         self._shadow: ShadowPass | None = None
         self._occlusion: OcclusionPass | None = None
         self._made: list[ContactPass | GroundShadowPass] = []
@@ -70,7 +70,7 @@ class Lighting:
         up : str
             The scene's up axis.
         box : (2, 3)
-            Bounds whose lowest point lies on the ground, scene space.
+            Bounds whose lowest point is at ground level, scene space.
         """
         self._spheres, self._contact, self._size = None, None, 0.0
         options = casters.options

@@ -27,7 +27,7 @@ _thread = threading.local()
 class Offscreen:
     """A headless context that draws any number of scenes.
 
-    The context is current only during drawing, so any thread may use it, one at a time. Another
+    The context is current only while drawing, so any thread may use it, one at a time. Another
     context that was current before must be made current again (``with context:``).
 
     Parameters
@@ -55,7 +55,7 @@ class Offscreen:
         self._target: Target | None = None
 
     def target(self, size: tuple[int, int], samples: int) -> Target:
-        """Return a target of this size; reuse the last one if it matches."""
+        """Return a target of this size; the last one is reused if it matches."""
         target = self._target
         if target is None or (target.size, target.asked_samples) != (size, samples):
             # moderngl rebinds the old target after creating the new one, so release it last.
@@ -117,7 +117,7 @@ class _OfThread:
         self.offscreen = Offscreen()
 
     def __del__(self) -> None:
-        # At interpreter exit objects are freed in an undefined order.
+        # At interpreter exit, objects are freed in an undefined order.
         if hasattr(self, "offscreen") and not sys.is_finalizing():
             self.offscreen.release()
 
@@ -157,7 +157,7 @@ def render(
     size : (int, int)
         Width and height in pixels.
     camera : Camera, optional
-        The camera; by default one that frames the scene.
+        Camera; by default, one that frames the scene.
     options : DisplayOptions, optional
         Display options; shadows are drawn (quality normal) if omitted.
 
@@ -182,7 +182,7 @@ def render(
             _thread.kept = _OfThread()
         offscreen: Offscreen = _thread.kept.offscreen
         with offscreen.context:
-            check_size(offscreen.context, size)  # before the camera divides by it
+            check_size(offscreen.context, size)  # checked before the camera divides by the height
     options = options or DisplayOptions(quality="normal")
     camera = camera or default_camera(scene, size, options.show)
     box = scene_box(scene, options.show)

@@ -42,7 +42,7 @@ BONES = {
 """Styles of skeletons, with labels for menus: see ``DisplayOptions.bones``."""
 
 OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
-"""Default opacity of a skeleton over the skin: boxes often enclose it, thin shapes do not."""
+"""Default opacity of a skeleton over the skin: boxes often enclose the skin, thin shapes do not."""
 
 BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Backgrounds by name; a colour is given as ``#rrggbb``."""
@@ -63,7 +63,7 @@ class Light:
     Attributes
     ----------
     azimuth, inclination : float
-        Direction that the light comes from, degrees about the up axis and above the horizon;
+        Direction from which the light comes, degrees about the up axis and above the horizon;
         relative to the camera if the lights follow it, otherwise to the scene.
     color : (r, g, b)
         Linear, 0 to 1.
@@ -130,7 +130,7 @@ class DisplayOptions:
     background : str
         An entry of ``BACKGROUNDS`` or ``"#rrggbb"``.
     bones : str
-        Style of skeletons, a key of ``BONES``: boxes as a file has them, or small cubes; octahedra,
+        Style of skeletons, a key of ``BONES``: boxes as in the file, or small cubes; octahedra,
         sticks, or axes with x red, y green, z blue. ``"auto"`` draws the boxes of files that have
         them, otherwise octahedra.
     skeleton_opacity : float or None
@@ -177,12 +177,12 @@ class DisplayOptions:
         Label the joints, omitting labels that would overlap; draw the axes of the joint spaces
         (x red, y green, z blue).
     cameras : bool
-        Draw the frusta of calibrated cameras, with their images if there are some.
+        Draw the frusta of calibrated cameras, with their images if there are any.
     image_brightness : float
         Brightness of the image behind the scene when looking through a calibrated camera, 0 to 1;
         0 hides it.
     outline : bool
-        Outline the selected joint, or else the selected actor, in images.
+        Outline the selected joint, or otherwise the selected actor, in images.
     """
 
     show: str = "skin"

@@ -13,14 +13,14 @@ __all__ = ["Outlined"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlined:
-    """Something with an outline.
+    """An outlined part of the scene.
 
     Attributes
     ----------
     actor : int
         Index in the scene.
     joint : int
-        Its joint, outlined where the skeleton is drawn; -1 for the whole actor.
+        Joint of the actor, outlined if the skeleton is drawn; -1 for the whole actor.
     points : (N, 3)
         Points in scene space, outlined instead of the actor and joint if there are any.
     is_hovered : bool

@@ -1,4 +1,4 @@
-"""Overlays of a picture: joint marks, ghost, marks and annotations, with all labels on top."""
+"""Overlays of an image: joint marks, ghost, marks and annotations, with all labels on top."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["Overlays", "draw_overlays"]
 
 @dataclass(frozen=True, slots=True)
 class Overlays:
-    """Marks, ghost and annotations that an image shows over the scene."""
+    """Marks, ghost and annotations that are shown over the scene."""
 
     marks: Marks | None
     ghost: Ghost | None

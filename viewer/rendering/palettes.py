@@ -14,8 +14,8 @@ __all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
 NOTHING = (52, 54, 58)
 """Colour of missing weights or numbers, sRGB: a dark grey that no colour map contains."""
 
-# The first seven are from Okabe and Ito (2008). Each further one is the colour of a regular sRGB
-# grid that is farthest in OKLab from all previous ones, for normal vision, protanopia and
+# The first seven are from Okabe and Ito (2008). Each following colour is the colour of a regular
+# sRGB grid that is farthest in OKLab from all previous colours, for normal vision, protanopia and
 # deuteranopia.
 _DISTINCT = np.array(
     [
@@ -48,7 +48,7 @@ _ENOUGH = 0.3  # OKLab distance beyond which colours are equally distinct
 
 
 def joint_palette(parents: Ints) -> Bytes:
-    """Return a colour for every joint; neighbours differ clearly, even with colour blindness.
+    """Return a colour for every joint; neighbours differ clearly, even for colour-blind people.
 
     Neighbours of a joint are its parent, grandparent, siblings and its parent's siblings. Among the
     least-used colours, the one farthest from all neighbours is chosen.
@@ -69,7 +69,7 @@ def joint_palette(parents: Ints) -> Bytes:
     bright = decode_srgb(_DISTINCT / 255.0)
     linear = np.concatenate([brightness * bright for brightness in _ROUNDS])
     distances = _distances(linear)
-    # Prefer bright colours where both are distinct enough.
+    # Prefer bright colours if both are distinct enough.
     reluctance = np.repeat(_RELUCTANCE * np.arange(len(_ROUNDS)), len(bright))
     chosen = np.zeros(len(parents), dtype=np.int32)
     uses = np.zeros(len(linear), dtype=np.int32)
@@ -110,7 +110,7 @@ def _neighbours(parents: Ints, joint: int, parent: int) -> Ints:
 
 
 def _distances(linear: Floats) -> Floats:
-    """Return distances between colours for the type of vision that sees the least: (C, C)."""
+    """Return the smallest distances between colours over all types of vision: (C, C)."""
     seen = oklab(np.clip(np.einsum("eab,cb->eca", _EYES, linear), 0.0, 1.0))
     return np.linalg.norm(seen[:, :, None] - seen[:, None], axis=-1).min(axis=0)
 

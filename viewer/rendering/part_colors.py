@@ -8,7 +8,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["part_colors"]
 
-# Okabe and Ito 2008, "Color Universal Design": distinguishable with colour blindness too. sRGB.
+# Okabe and Ito 2008, "Color Universal Design": distinguishable for colour-blind people; sRGB.
 _DISTINCT = np.array(
     [
         [153, 153, 153],

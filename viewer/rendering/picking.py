@@ -37,9 +37,9 @@ from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Passes", "Pick", "PickPass"]
 
-_REACH = 3  # pixels around the requested one
+_REACH = 3  # pixels around the requested pixel
 _SIDE = 2 * _REACH + 1
-_PREFERENCE = 2.5  # pixels by which a keypoint may be further away than a surface
+_PREFERENCE = 2.5  # pixels by which a keypoint may be farther from the pointer than a surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ class Pick:
     triangle : int
         Index in the figure's mesh, or in its reduced mesh if that is drawn; otherwise -1.
     keypoint : int
-        Captured point or keypoint of the figure, on a limb the nearer one; otherwise -1.
+        Captured point or keypoint of the figure, the nearer one on a limb; otherwise -1.
     point : (3,)
         Hit point on the surface, scene space.
     """
@@ -269,7 +269,7 @@ class PickPass:
 
 
 def _window(size: tuple[int, int], pixel: tuple[float, float]) -> Floats:
-    """Return the matrix that maps a few pixels around one to all of clip space."""
+    """Return the matrix that maps a few pixels around a pixel to all of clip space."""
     x, y = np.floor(pixel[0]) + 0.5, np.floor(pixel[1]) + 0.5
     scale = size[0] / _SIDE, size[1] / _SIDE
     matrix: NDArray[np.float64] = np.diag([*scale, 1.0, 1.0])

@@ -22,7 +22,7 @@ class Projected:
     Attributes
     ----------
     pixels : (N, 2)
-        From the image's left and upper edge; arbitrary where the point is not visible.
+        Position from the image's left and upper edges; arbitrary if the point is not visible.
     depths : (N,)
         Normalised depth, -1 at the near plane to 1 at the far plane.
     seen : (N,) bool
@@ -71,7 +71,7 @@ def project_segments(
     Returns
     -------
     pixels : (N, 2, 2)
-        Both ends, from the image's left and upper edge; they may lie outside the image.
+        Both ends, from the image's left and upper edges; they may lie outside the image.
     seen : (N,) bool
         Whether any part of the segment is beyond the near plane.
     """
@@ -81,7 +81,7 @@ def project_segments(
     behind = away <= 0.0
     span = away - away[:, ::-1]
     fraction = away / np.where(span == 0.0, 1.0, span)
-    # Slightly beyond the plane, where w is not 0.
+    # The position is slightly beyond the plane, where w is not 0.
     clipped = clips + (fraction + 1e-6)[..., None] * (clips[:, ::-1] - clips)
     clips = np.where(behind[..., None], clipped, clips)
     w = clips[..., 3]

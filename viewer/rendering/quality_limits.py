@@ -35,7 +35,7 @@ def limit_passes(
     size : (int, int)
         Width and height in pixels.
     context : moderngl.Context
-        Tells whether rendering is done in software.
+        Context, which tells whether rendering is done in software.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 While the driver draws a frame, this thread poses the next one and the sink's workers encode
 previous ones. This thread releases the global interpreter lock while it waits for the driver, so
-recording takes about as long as the slower of drawing and encoding, unless they compete for the
+recording takes about as long as the slower of drawing and encoding, unless both compete for the
 same CPU cores (``tests/bench/bench_video.py``).
 
 The window and the command line both use it::
@@ -40,7 +40,7 @@ from viewer.rig.scene import Scene, scene_box
 
 __all__ = ["Follow", "Progress", "Recording", "Sink", "copied", "pose_scene", "record"]
 
-_WAITING = 2  # frames that may wait for a worker; bounds the memory
+_WAITING = 2  # number of frames that may wait for a worker, limited to save memory
 _PATIENCE = 0.05  # seconds between steps while the sink finishes
 
 
@@ -66,7 +66,7 @@ class Sink(Protocol):
         """Number of frames to pass to ``look``."""
 
     def look(self, pixels: Bytes) -> None:
-        """Inspect a sample frame before any is written, to choose the palette of a GIF."""
+        """Inspect a sample frame before any frame is written, to choose the palette of a GIF."""
 
     def write(self, frame: int, pixels: Bytes) -> None:
         """Write one frame; called in a worker thread.
@@ -88,14 +88,14 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Follow:
-    """The actor or joint that the camera follows, keeping its distance and angle.
+    """The actor or joint that the camera follows at a constant distance and angle.
 
     Attributes
     ----------
     actor : int
         Index in the scene.
     joint : int
-        Index in its skeleton or points; -1 for their centre.
+        Index of a joint or captured point; -1 for their centre.
     origin : (3,)
         Position of the joint when the camera was framed, scene space.
     """
@@ -128,13 +128,13 @@ class Recording:
     interpolate : bool
         Interpolate across gaps of captures.
     turntable : float
-        Rotation of the camera about its target, degrees, from the first frame to the one after
+        Rotation of the camera about its target, degrees, from the first frame to the frame after
         the last: 360 gives a seamless loop.
     follow : Follow or None
         Actor or joint that the camera follows.
     shifts : (F, 3) or None
-        Displacement of the camera in each frame, scene units; None if it follows an actor or
-        stays.
+        Displacement of the camera in each frame, scene units; None if it follows an actor or does
+        not move.
     selected : (int, int)
         Index of an actor and of its highlighted joint, as in ``Renderer.draw``.
     annotations : callable or None
@@ -209,14 +209,15 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
     recording : Recording
         The recording.
     renderer : Renderer
-        Preferably a renderer of its own: buffers of other scenes are freed and uploaded again.
+        Preferably a separate renderer: buffers of other scenes are freed and must be uploaded
+        again.
     sink : Sink
         Receives the frames; closed after the last one, aborted on any error.
 
     Yields
     ------
     Progress
-        After each frame, and while the sink finishes.
+        Progress after each frame, and while the sink finishes.
 
     Raises
     ------
@@ -349,7 +350,7 @@ class _Cameras:
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._shift = np.zeros(3)  # of the followed actor; unchanged while it is absent
+        self._shift = np.zeros(3)  # shift of the followed actor; unchanged while it is absent
 
     def at(self, frame: int, scene: Scene) -> Camera:
         recording = self._recording

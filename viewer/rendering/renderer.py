@@ -73,7 +73,7 @@ class Renderer:
     notes : list of str
         Messages about limitations of the driver, one line each.
     scalars : ScalarQuantities
-        Range and legend of the scalar quantity drawn last.
+        Range and legend of the last drawn scalar quantity.
     buffers : ActorBuffers
         Uploaded buffers of figures and actors.
     marks : Marks or None
@@ -83,8 +83,8 @@ class Renderer:
     ghost : Ghost or None
         A surface drawn over the scene that is not part of it.
     names_left_out : (int, int)
-        Number of joint names omitted from the last image for lack of room, and number of
-        joints within it.
+        Number of joint names omitted from the last image for lack of room, and number of joints in
+        the image.
     """
 
     def __init__(self, context: moderngl.Context) -> None:
@@ -109,12 +109,12 @@ class Renderer:
 
     @property
     def scalar_range(self) -> tuple[float, float]:
-        """Lowest and highest value of the scalar quantity drawn last, over all figures."""
+        """Lowest and highest value of the last drawn scalar quantity, over all figures."""
         return self.scalars.range
 
     @property
     def legend(self) -> Legend | None:
-        """Legend of the scalar quantity drawn last; None before the first one."""
+        """Legend of the last drawn scalar quantity; None if there was none."""
         return self.scalars.legend
 
     def draw(
@@ -139,16 +139,16 @@ class Renderer:
         options : DisplayOptions
             Display options.
         target : Target
-            The target to draw into; not resolved afterwards.
+            The target to draw to, which is not resolved.
         box : (2, 3)
             Bounds for the ground grid and the depth range, scene space: ``scene_box`` of the pose
             in which the scene was opened.
         selected : (int, int)
-            Index of an actor and of its highlighted joint, which also is the joint of a scalar
-            quantity that needs one and does not name it; -1 for none.
+            Index of an actor and of its highlighted joint, -1 for none. The joint is also used for
+            a scalar quantity that needs one and does not specify it.
         passes : range, optional
-            Passes of final quality to draw now, from 0 in order; all if omitted. The target
-            shows the average of those drawn so far.
+            Passes of final quality to draw now, in order from 0; all if omitted. The target shows
+            the average of the passes drawn so far.
         strength : float
             Strength of shadows and occlusion, 0 to 1.
         """
@@ -260,7 +260,7 @@ class Renderer:
         size : (int, int)
             Width and height of the image, pixels.
         x, y : float
-            Pixels from the image's left and upper edge.
+            Pixels from the image's left and upper edges.
         box : (2, 3)
             Bounds, as in ``draw``.
         """
@@ -276,13 +276,13 @@ class Renderer:
         target: Target,
         box: Floats,
     ) -> None:
-        """Draw outlines alone, with straight alpha; parameters are those of ``draw``."""
+        """Draw only outlines, with straight alpha; see ``draw`` for the parameters."""
         self._prepare(target)
         view = view_of(camera, target.size, box)
         self.late.outline_pass.draw(outlined, scene, view, options, target, is_layer=True)
 
     def prepare(self, scene: Scene) -> None:
-        """Upload a scene's buffers in advance, so that failure leaves the previous scene intact.
+        """Upload a scene's buffers in advance, so that a failure leaves the previous scene intact.
 
         Raises
         ------
@@ -356,7 +356,7 @@ class Renderer:
         context.depth_func = "<"
 
     def _draw_legend(self, size: tuple[int, int]) -> None:
-        assert self.legend is not None  # meshes were drawn with their values
+        assert self.legend is not None  # guaranteed, as meshes were drawn with values
         note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
         if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)

@@ -45,7 +45,7 @@ def n_passes(options: DisplayOptions) -> int:
 
 
 def sample(index: int, count: int) -> Sample:
-    """Return one of ``count`` passes: Halton points within the pixel, a spiral over the light.
+    """Return one of ``count`` passes, with Halton points in the pixel and a spiral over the light.
 
     >>> sample(0, 1)
     Sample(shift=(0.0, 0.0), light=(0.0, 0.0), phase=0.0, threshold=0.5)
@@ -69,7 +69,7 @@ def jittered(view: View, shift: tuple[float, float], size: tuple[int, int]) -> V
 
 
 def tilted(direction: Floats, light: tuple[float, float]) -> Floats:
-    """Return the direction towards a point of a light's disc: unit vector, (3,)."""
+    """Return the unit vector towards a point of a light's disc: (3,)."""
     aside = np.eye(3)[np.argmin(np.abs(direction))]
     right = np.cross(aside, direction)
     right /= np.linalg.norm(right)

@@ -34,13 +34,13 @@ class ScalarLook:
     ends : (float, float)
         Values of the first and the last colour.
     is_whole : bool
-        Whether each colour stands for one integer, from 0.
+        Whether each colour represents one integer, from 0.
     dark_zero : bool
         Whether 0 has a colour of its own, ``NOTHING``.
     isolines : bool
         Whether lines are drawn at every tenth of the range.
     is_typical : bool
-        Whether the range excludes outliers, which have the colours of its ends.
+        Whether the range excludes outliers, which get the colours of its ends.
     """
 
     colors: Bytes
@@ -110,7 +110,7 @@ def shown_ends(
     Returns
     -------
     (float, float)
-        In the unit of the values.
+        Ends in the unit of the values.
     """
     requested = options.scalar_range
     if requested is not None and not is_whole(name):
@@ -130,7 +130,7 @@ def look_of(
     name : str
         Name of the quantity.
     figure : Figure
-        Defines the colours of its joints or parts.
+        Figure, which defines the colours of its joints or parts.
     ends : (float, float)
         Result of ``shown_ends``.
     options : DisplayOptions
@@ -143,7 +143,7 @@ def look_of(
         return ScalarLook(count_palette(max(round(ends[1]), 1)), ends, is_whole=True)
     colors = diverging_map() if quantity.kind == "diverging" else colormap()
     isolines = quantity.isolines if options.isolines is None else options.isolines
-    # No weight at all must be distinguishable from a small one.
+    # A weight of 0 must be distinguishable from a small weight.
     is_typical = quantity.robust and options.scalar_range is None
     return ScalarLook(
         colors, ends, dark_zero=quantity.takes_joint, isolines=isolines, is_typical=is_typical

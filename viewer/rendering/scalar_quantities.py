@@ -21,7 +21,7 @@ class ScalarQuantities:
     Attributes
     ----------
     range : (float, float)
-        Lowest and highest value of the quantity drawn last, over all figures.
+        Lowest and highest value of the last drawn quantity, over all figures.
     ends : (float, float)
         Values at the ends of the colour range.
     legend : Legend or None
@@ -40,7 +40,7 @@ class ScalarQuantities:
         selected: tuple[Actor | None, int],
         figures: Sequence[Figure],
     ) -> None:
-        """Recompute changed values; equal colours mean equal values on all figures.
+        """Recompute changed values; the same colour means the same value on all figures.
 
         Figures without the quantity are drawn with the default shading.
 
@@ -51,14 +51,15 @@ class ScalarQuantities:
         options : DisplayOptions
             Name of the quantity, its range and isolines.
         selected : (Actor or None, int)
-            Actor and joint used for a quantity that needs a joint and names none; -1 for none.
+            Actor and joint used for a quantity that needs a joint and does not specify one; -1 for
+            none.
         figures : sequence of Figure
             All figures of the scene, including those not drawn.
         """
         name = name_for(options.scalar, *selected)
         for actor, mesh in meshes:
             pose = None if options.show == "binding" else actor.pose
-            # On the selected actor the joint is given by index; on other actors by its name.
+            # On the selected actor, the joint is given by its index; on other actors, by its name.
             is_selected = actor is selected[0] and name != options.scalar
             its_name = f"{options.scalar}:#{selected[1]}" if is_selected else name
             mesh.scalars.update(its_name, pose, options.skinning)

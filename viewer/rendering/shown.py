@@ -39,7 +39,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Meshes:
-    """The meshes of an image: those drawn singly, and those drawn as instances."""
+    """The meshes of an image: those drawn individually, and those drawn as instances."""
 
     singles: list[tuple[Actor, PosedMesh]] = field(default_factory=list)
     instanced: list[tuple[list[Actor], InstanceBuffers]] = field(default_factory=list)
@@ -49,7 +49,7 @@ class Meshes:
 
     @property
     def opaque(self) -> list[tuple[Actor, PosedMesh]]:
-        """Opaque meshes that are drawn singly."""
+        """Opaque meshes that are drawn individually."""
         return [single for single in self.singles if single[0].opacity == 1.0]
 
 
@@ -63,7 +63,7 @@ def prepare_meshes(
     buffers : ActorBuffers
         Buffers of the scene; missing ones are added.
     actors : sequence of Actor
-        The actors; those whose figure has no mesh are ignored.
+        Actors; those without a mesh are ignored.
     options : DisplayOptions
         Display options.
 
@@ -183,7 +183,7 @@ def placement_of(actor: Actor, options: DisplayOptions) -> Floats:
 
 
 def far_first(meshes: Meshes, options: DisplayOptions, view: View) -> Meshes:
-    """Return the same meshes, with those drawn singly sorted from farthest to nearest."""
+    """Return the same meshes, with those drawn individually sorted from farthest to nearest."""
 
     def depth(single: tuple[Actor, PosedMesh]) -> float:
         center = placement_of(single[0], options) @ np.append(single[1].center, 1.0)

@@ -16,7 +16,7 @@ def draw_translucent(
 ) -> None:
     """Draw translucent actors over everything opaque.
 
-    Where they overlap, only the nearest surface shows, so the poses of a motion stay legible.
+    Where they overlap, only the nearest surface is visible, so the poses of a motion stay legible.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+from viewer.rig.expressions import ExpressionRules
 
 __all__ = ["BlendShapes", "Correctives", "JointRegressor", "corrective_weights", "regress_joints"]
 
@@ -30,6 +31,8 @@ class BlendShapes:
         the changed surface.
     rest_weights : (S,) or None
         Weights of the file's own pose; None if all are 0.
+    rules : ExpressionRules or None
+        How weights of expressions change each other; None if they do not.
     """
 
     names: tuple[str, ...]
@@ -37,6 +40,7 @@ class BlendShapes:
     groups: tuple[str, ...] = ()
     normal_offsets: Floats | Deferred | None = None
     rest_weights: Floats | None = None
+    rules: ExpressionRules | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
@@ -112,6 +116,7 @@ class BlendShapes:
         """Return the weighted sum of offsets; if all weights are 0, nothing is read."""
         if len(weights) > self.n_shapes:
             raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
+        weights = weights if self.rules is None else self.rules.shown(weights)
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))

@@ -13,7 +13,6 @@ from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexFiel
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
 from viewer.rig.hands import Hand
-from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.animation import Animation
@@ -77,8 +76,6 @@ class Figure:
         Findings of the reader for ``viewer info``, each a heading and a text.
     animations : tuple of Animation
         Motions from the figure's own file, in file order.
-    humanoid : Humanoid or None
-        Joints by the standard name of the human bone that they are, if the file states it.
     """
 
     name: str
@@ -100,7 +97,6 @@ class Figure:
     fields: tuple[VertexField, ...] = ()
     facts: tuple[tuple[str, str | Diagnostic], ...] = ()
     animations: tuple[Animation, ...] = ()
-    humanoid: Humanoid | None = None
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None and self.points is None:

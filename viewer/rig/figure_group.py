@@ -1,4 +1,4 @@
-"""Figures of one file, which keep their places relative to each other."""
+"""Figures of one file, which keep their relative positions."""
 
 from __future__ import annotations
 

@@ -5,12 +5,47 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["Humanoid"]
+__all__ = ["HUMAN_BONES", "SPINE_BONES", "Humanoid"]
+
+SPINE_BONES = ("spine", "chest", "upperChest")
+"""Bones of the spine, from the hips upwards; all but the first may be missing."""
+
+
+def _human_bones() -> dict[str, str]:
+    """Return the name in the SMPL family of every bone but those of the spine."""
+    limbs = {
+        **{"UpperLeg": "hip", "LowerLeg": "knee", "Foot": "ankle", "Toes": "foot"},
+        **{"Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist"},
+        "Eye": "eye",
+    }
+    thumb = {"ThumbMetacarpal": "thumb1", "ThumbProximal": "thumb2", "ThumbDistal": "thumb3"}
+    phalanges = {"Proximal": 1, "Intermediate": 2, "Distal": 3}
+    fingers = {
+        f"{bone}{phalanx}": f"{name}{number}"
+        for bone, name in (
+            *(("Index", "index"), ("Middle", "middle")),
+            *(("Ring", "ring"), ("Little", "pinky")),
+        )
+        for phalanx, number in phalanges.items()
+    }
+    sided = {**limbs, **thumb, **fingers}
+    return {
+        **{"hips": "pelvis", "neck": "neck", "head": "head", "jaw": "jaw"},
+        **{
+            f"{side}{bone}": f"{side}_{name}"
+            for side in ("left", "right")
+            for bone, name in sided.items()
+        },
+    }
+
+
+HUMAN_BONES: dict[str, str] = _human_bones()
+"""Name in the SMPL family of every bone of VRM 1.0 but those of the spine."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Humanoid:
-    """Joints of a figure by the standard name of the human bone that they are.
+    """Joints of a figure by the standard names of human bones.
 
     Attributes
     ----------

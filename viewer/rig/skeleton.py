@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.humanoid import Humanoid
 
 __all__ = [
     "DOF_KINDS",
@@ -69,6 +70,7 @@ class Skeleton:
     dof_limits: Floats
     boxes: Floats | None = None
     auxiliary: Bools | None = None
+    humanoid: Humanoid | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:

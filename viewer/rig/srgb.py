@@ -12,7 +12,7 @@ Color = tuple[float, float, float]
 
 
 def encode_srgb(linear: Floats) -> Floats:
-    """Return linear light as sRGB, clipped to 0..1."""
+    """Return linear light as sRGB, clamped to 0..1."""
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 

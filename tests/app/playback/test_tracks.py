@@ -40,7 +40,7 @@ def test_ruler_labels_stay_within_the_ruler(x, begin):
 
 def test_last_ruler_label_is_not_cut_off(drive, rig):
     scene = people(rig, np.ones(121, dtype=bool))
-    hand = drive(scene=scene, size=(1280, 800), samples=1)
+    hand = drive(scene=scene, size=(1280, 800), samples=1, pixels_per_point=1.0)
     _, y0, x1, _ = hand.state.item_rects["Scrubber"]
     picture = hand.screen()[round(y0) : round(y0) + 14].astype(int).sum(axis=2)
     # Letters are the brightest there: those of the last number are left of the end.
@@ -69,7 +69,7 @@ def test_single_frame_is_visible_and_tracks_have_their_actors_colour(drive, rig)
     scene = people(rig, np.ones(2000, dtype=bool), lone)
     scene.actors[0].color = decode_color((0.2, 0.8, 0.4))
     scene.actors[1].color = decode_color((0.9, 0.1, 0.1))
-    hand = drive(scene=scene, size=(1280, 800), samples=1)
+    hand = drive(scene=scene, size=(1280, 800), samples=1, pixels_per_point=1.0)
     first = _row(hand, 0)
     # The middle of the bar, where neither ruler nor current time are drawn.
     assert np.abs(first - [51, 204, 102]).max(axis=1).min() <= 2

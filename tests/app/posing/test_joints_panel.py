@@ -10,8 +10,8 @@ import pytest
 from app.tiny import FILE_POSE, LABELS, chain, comb
 
 from viewer.app.keys import Keyboard
+from viewer.app.posing.joint_rows import joint_rows
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.posing.joints_panel import rows
 
 SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
 
@@ -245,7 +245,7 @@ def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
 
 def test_rows_list_children_right_below_their_parent(hand):
     skeleton = hand.state.actor.figure.skeleton
-    listed = rows(skeleton, frozenset({0}), "")
+    listed = joint_rows(skeleton, frozenset({0}), "")
     assert [(joint, depth) for joint, dof, depth in listed if dof < 0] == [(0, 0), (1, 1)]
     assert [dof for joint, dof, _ in listed if joint == 0 and dof >= 0] == list(range(6))
     assert not [dof for joint, dof, _ in listed if joint == 1 and dof >= 0]

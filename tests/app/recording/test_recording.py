@@ -21,7 +21,7 @@ from viewer.rig.motion.instances import pose_actors
 @pytest.fixture
 def moving(drive, rig):
     """A test driver on the tiny figure whose root moves right, 0.5 a second, for a second."""
-    hand = drive(*rig, size=(1000, 700), samples=1)
+    hand = drive(*rig, size=(1000, 700), samples=1, pixels_per_point=1.0)
     channel = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
     hand.state.actor.clip = Clip("slide", (channel,), 0.0, 1.0)
     hand.step(3)

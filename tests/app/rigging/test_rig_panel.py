@@ -84,11 +84,12 @@ def test_align_button_describes_what_it_does(rigging, monkeypatch, fits):
     hand = rigging()
     hand.finish_job()
     hand.state.of(Rigging).choices.fits = fits
-    also = "; joints are rotated and limbs resized{} where that fits much better" if fits else ""
+    also = "; joints are rotated and limbs resized{} if that fits much better" if fits else ""
     for label, words in (
         (
             "Align",
-            "find the best placement by closest points" + also.format(", or all of it stretched,"),
+            "find the best placement by closest points"
+            + also.format(", or the whole template is stretched,"),
         ),
         ("Refine", "from its current placement, by closest points" + also.format("")),
     ):

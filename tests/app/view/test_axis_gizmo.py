@@ -16,7 +16,7 @@ ARM = 31.0  # points
 @pytest.fixture
 def seen(drive, rig):
     """A test driver on a window with the camera between the axes."""
-    hand = drive(*rig, size=(1000, 640))
+    hand = drive(*rig, size=(1000, 640), pixels_per_point=1.0)
     hand.state.camera.azimuth, hand.state.camera.inclination = 35.0, 25.0
     hand.step(2)
     return hand

@@ -14,7 +14,7 @@ from viewer.rendering.outlined import Outlined
 @pytest.fixture
 def bones(drive, rig):
     """A test driver on the tiny figure with its skeleton."""
-    hand = drive(*rig)
+    hand = drive(*rig, pixels_per_point=1.0)
     hand.state.options.show = "both"
     hand.step(2)
     return hand

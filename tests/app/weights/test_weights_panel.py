@@ -28,7 +28,7 @@ def bent(drive, rig):
 @pytest.fixture
 def wide(drive_body):
     """A test driver on the Weights panel of a body with many influences a vertex, posed."""
-    hand = drive_body("smpl", n_vertices=96)
+    hand = drive_body("smpl", n_vertices=96, pixels_per_point=1.0)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 
 

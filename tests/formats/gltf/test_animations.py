@@ -154,7 +154,6 @@ def with_two(file: File) -> File:
     ("times", "values", "key"),
     [
         ([1.0, 0.0], [[0, 0, 0]] * 2, "F002.gltf-times"),
-        ([1.0, 1.0], [[0, 0, 0]] * 2, "F002.gltf-times"),
         ([0.0, np.nan], [[0, 0, 0]] * 2, "F003.gltf-keys"),
         ([], np.zeros((0, 3)), "F002.gltf-no-keys"),
         ([0.0, 1.0], [[0, 0, 0]] * 3, "F002.gltf-outputs"),
@@ -173,6 +172,21 @@ def test_animation_with_broken_keys_is_left_out(times: object, values: object, k
     source = Source("a.gltf", file.json(), diagnostics=Collector(keeps_errors=True))
     read_nodes(source)
     assert [found.key for found in source.diagnostics.errors] == [key]
+
+
+def test_last_of_several_keys_at_a_time_counts() -> None:
+    file = animated()
+    times, values = file.times([0.0, 1.0, 1.0]), file.accessor([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    file.root["animations"][0]["samplers"] = [{"input": times, "output": values}]
+    assert only(file).times.tolist() == [0, 1] and only(file).values[:, 0].tolist() == [0, 2]
+    assert warned(file) == [("G005.equal-times", "/animations/0/samplers")]
+
+
+def test_declared_range_is_compared_with_the_keys() -> None:
+    file = animated()
+    file.root["accessors"][0]["max"] = [9]
+    assert read(file).animations[0].end == 9.0
+    assert warned(file) == [("G005.range", "/animations/0/samplers")]
 
 
 def test_rotation_of_zeros_is_refused() -> None:

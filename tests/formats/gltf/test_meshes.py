@@ -183,6 +183,11 @@ def test_wrong_number_of_morph_weights_is_warned_of() -> None:
     targets(file, weights=[1])
     assert read(file).meshes[0].shape_weights.tolist() == [1, 0]
     assert warned(file) == [("G002.weights", "/meshes/0/weights")]
+    del file.root["meshes"][0]["weights"]
+    file.root["nodes"] = [{"mesh": 0, "weights": [1, 2, 3]}, {"weights": [1]}]
+    weights = read(file).tree.shape_weights
+    assert {node: values.tolist() for node, values in weights.items()} == {0: [1, 2]}
+    assert warned(file) == [("G002.weights", "/nodes/0/weights")]
 
 
 def test_primitives_must_have_the_same_morph_targets() -> None:

@@ -48,7 +48,6 @@ def test_invalid_matrices(matrices: list[list[float]], key: str) -> None:
     [
         ({"joints": [1, 3]}, "F002.gltf-index", "/joints/1"),
         ({"joints": [1, "2"]}, "F002.gltf-type", "/joints/1"),
-        ({"joints": []}, "F002.gltf-type", "/joints"),
         ({}, "F002.gltf-missing", ""),
         ({"joints": [1, 2], "inverseBindMatrices": 3}, "F002.gltf-index", "/inverseBindMatrices"),
         ({"joints": [1, 2], "inverseBindMatrices": 0}, "F002.gltf-kind", "/inverseBindMatrices"),
@@ -58,6 +57,13 @@ def test_invalid_skins(skin: dict[str, object], key: str, pointer: str) -> None:
     file = skinned()
     file.root["skins"] = [skin]
     assert refused(file) == (key, f"/skins/0{pointer}")
+
+
+def test_skin_without_joints_is_not_used() -> None:
+    file = skinned()
+    file.root["skins"][0]["joints"] = []
+    assert read(file).tree.skins.tolist() == [-1, -1, -1]
+    assert warned(file) == [("G004.no-joints", "/skins/0/joints")]
 
 
 def test_skeleton_that_is_no_node_is_ignored() -> None:

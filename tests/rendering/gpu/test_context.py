@@ -62,7 +62,7 @@ def test_missing_egl_device_names_the_remedies(tmp_path):
     check_refusal(
         *result,
         code=4,
-        message="EGL found 0 devices: in a container start it with "
+        message="EGL found 0 devices: start containers with "
         "NVIDIA_DRIVER_CAPABILITIES=all, or install Mesa for software rendering " + INSTALL,
     )
 
@@ -220,7 +220,7 @@ def test_drawing_needs_no_display(tmp_path):
 @pytest.mark.parametrize(
     ("text", "start"),
     [
-        ("requested device index 0, but found 0 devices", "EGL found 0 devices: in a container"),
+        ("requested device index 0, but found 0 devices", "EGL found 0 devices: start containers"),
         (
             "requested device index 9, but found 1 devices",
             "there is no graphics device 9: EGL found 1 device, counted from 0",
@@ -233,7 +233,7 @@ def test_drawing_needs_no_display(tmp_path):
         ("eglInitialize failed (0x3002)", "EGL was denied access to the graphics device"),
         ("eglCreateContext failed (0x3003)", "the driver is out of memory"),
         ("eglGetDisplay failed (0x3008)", "EGL does not accept this display"),
-        ("eglCreateContext failed (0x3009)", "OpenGL 3.3 is needed and the driver"),
+        ("eglCreateContext failed (0x3009)", "OpenGL 3.3 is needed, but the driver"),
         ("eglMakeCurrent failed (0x300B)", "EGL refused"),
         ("libEGL.so.1 not loaded", "libEGL was not found"),
         ("libGL.so.1 not loaded", "libGL was not found"),
@@ -301,6 +301,6 @@ def test_inaccessible_graphics_card_is_a_note(monkeypatch):
 
 def test_display_without_opengl_3_reports_the_requirement():
     assert explain("GLX: Failed to create context: GLXBadFBConfig") == (
-        "OpenGL 3.3 is needed and this display's driver does not offer it "
+        "OpenGL 3.3 is needed, but this display's driver does not offer it "
         "[GLX: Failed to create context: GLXBadFBConfig]"
     )

@@ -152,22 +152,16 @@ def test_mano_accepts_a_hand_of_either_side(family):
     assert notes == []
 
 
-@pytest.mark.parametrize(
-    ("scale", "fault"),
-    [
-        (0.0, Phrase("scale-not-positive", found=0.0)),
-        (-2.0, Phrase("scale-not-positive", found=-2.0)),
-        (1e-300, Phrase("scale-out-of-range", low=1e-6, high=1e6, found=1e-300)),
-        (1e300, Phrase("scale-out-of-range", low=1e-6, high=1e6, found=1e300)),
-    ],
-)
-def test_invalid_scale_is_left_out(family, scale, fault):
+@pytest.mark.parametrize("scale", [0.0, -2.0, 1e-300, 1e300])
+def test_invalid_scale_is_left_out(family, scale):
     figure = family("smpl")
     pose = figure_pose(figure)
     pose.figure_scale = 1.5
     notes = apply_record(PoseRecord(scale=scale), figure, pose)
     assert pose.figure_scale == 1.5
-    assert told(notes) == [("F007.scale-kept", {"fault": fault, "scale": 1.5})]
+    ((key, values),) = told(notes)
+    assert (key, values["scale"]) == ("F007.scale-kept", 1.5)
+    assert values["fault"].values["found"] == scale
 
 
 def test_extreme_placement_and_shape_are_left_out_or_refused(family):
@@ -402,6 +396,5 @@ def test_record_holds_labels_and_raw_pose_values(family):
 def test_record_of_a_figure_without_shapes_has_none():
     figure = hinges()
     record = record_of(figure, rest_pose(figure.skeleton))
-    assert record.shape is None
-    assert record.expression is None
+    assert record.shape is None and record.expression is None
     assert record.vector.tolist() == [0.5, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""Parts panel: which parts of the chosen actor's mesh are drawn."""
+"""Parts panel: visibility of the parts of the chosen actor's mesh."""
 
 from __future__ import annotations
 

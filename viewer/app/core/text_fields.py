@@ -101,7 +101,7 @@ def number_field(
     Returns
     -------
     float or None
-        The number that was entered; None while nothing was.
+        The number that was entered, if any.
     """
     unit = unit_of(text)
     wrong = _mistake(hidden, unit)
@@ -142,7 +142,7 @@ def is_typed_in_place(hidden: str) -> bool:
 
 
 def _mistake(hidden: str, unit: str) -> str:
-    """Return what is wrong with the number that is being typed; empty if nothing is."""
+    """Return the error in the number that is being typed; empty if there is none."""
     item = imgui.get_id(hidden)
     editing = imgui.internal.get_input_text_state(item)
     if editing is None or imgui.internal.get_active_id() != item or not editing.edited_before:

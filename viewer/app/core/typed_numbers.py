@@ -20,7 +20,7 @@ _FACTORS = {
     "cm": {"cm": 1.0, "m": 100.0, "mm": 0.1},
     "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0},
 }
-"""Units that may be typed: those shown by a field to the factors of others in that unit."""
+"""Units that may be typed: maps the unit shown by a field to the factors of other units."""
 
 _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,

@@ -43,7 +43,7 @@ Rect = tuple[float, float, float, float]
 
 
 def note_item(state: AppState, label: str) -> None:
-    """Record the rectangle of the last widget under a label that tests can aim at.
+    """Record the rectangle of the last widget under a label, for tests.
 
     In a disabled block, its tooltip is the reason.
     """

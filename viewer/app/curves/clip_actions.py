@@ -5,13 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.app.core.state import AppState
+from viewer.app.curves.keyed import keyed_of
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.saving import save_files
 from viewer.app.files.state import Files
 from viewer.formats import FORMATS, file_stem, write
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.clip_edit import clip_from_pose, key_pose
+from viewer.rig.motion.clip_edit import clip_from_pose
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
+from viewer.rig.scene import Motion
 
 __all__ = ["ask_for_clip", "can_have_keys", "key_present_pose", "new_clip", "save_clip"]
 
@@ -34,14 +37,21 @@ def new_clip(state: AppState) -> None:
 
 def key_present_pose(state: AppState, only_changed: bool = False) -> None:
     """Key the pose at the current time."""
-    actor = state.actor
-    if not isinstance(actor.clip, Clip) or actor.pose is None or actor.figure.skeleton is None:
+    actor, keyed = state.actor, keyed_of(state.actor)
+    if keyed is None or actor.pose is None:
         return
     time = state.clock.time - actor.offset
-    old, skeleton = actor.clip, actor.figure.skeleton
-    actor.clip = key_pose(old, skeleton, actor.pose, time, only_changed)
-    keys = [sum(len(channel.times) for channel in clip.channels) for clip in (old, actor.clip)]
-    state.say_status(f"Pose keyed at {number_text(time, '.3f')} s: {keys[1] - keys[0]} new keys")
+    before = _n_keys(actor.clip)
+    actor.clip = keyed.posed(actor, time, only_changed)
+    added = _n_keys(actor.clip) - before
+    state.say_status(f"Pose keyed at {number_text(time, '.3f')} s: {added} new keys")
+
+
+def _n_keys(clip: Motion | None) -> int:
+    """Return the number of keys of a clip."""
+    if not isinstance(clip, Clip | TransformClip):
+        return 0
+    return sum(len(channel.times) for channel in clip.channels)
 
 
 def ask_for_clip(state: AppState) -> None:

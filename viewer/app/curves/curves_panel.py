@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field
@@ -19,25 +20,32 @@ from viewer.app.core.widgets import (
 from viewer.app.curves.axes import curve_color, factor_of
 from viewer.app.curves.clip_actions import ask_for_clip, can_have_keys, key_present_pose, new_clip
 from viewer.app.curves.data import Curve, channel_of, curves_of
+from viewer.app.curves.dof_keys import DofKeys
 from viewer.app.curves.editing import (
     add_key_at,
+    change_slope,
     change_tangent,
-    clip_of,
     delete_chosen,
     drop_missing,
     extrapolate,
     focused_rows,
+    interpolate,
     place_key,
 )
+from viewer.app.curves.keyed import KeyedMotion, keyed_of
 from viewer.app.curves.plot import draw_plot
 from viewer.app.curves.state import Curves, KeyPlace
-from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, slopes
+from viewer.app.curves.transform_keys import TransformKeys
+from viewer.rig.arrays import Floats
+from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
+from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
 
 __all__ = ["draw"]
 
 _LIST_WIDTH, _SIDE_WIDTH = 10.0, 15.0  # widths, in font sizes
 _MODES: dict[str, str] = {mode: mode.replace("_", " ") for mode in EXTRAPOLATIONS}
 _TANGENTS: dict[str, str] = {rule: rule for rule in TANGENT_RULES} | {"number": "number"}
+_INTERPOLATIONS: dict[str, str] = {mode: mode for mode in INTERPOLATIONS}
 _SIDES = ("In", "Out")
 _FARTHEST = 1e9  # largest number that can be typed
 _HINT = "Double-click adds a key. Drag keys and tangents; Delete removes keys, Shift selects more."
@@ -62,7 +70,7 @@ def draw(state: AppState) -> None:
     # The fields are next to the plot, not above it: widgets that appear must not move a key away
     # from the mouse.
     room, side = imgui.get_content_region_avail().x, 0.0
-    if clip_of(state) is not None:
+    if keyed_of(state.actor) is not None:
         side = min(_SIDE_WIDTH * imgui.get_font_size(), 0.35 * room)
     if imgui.begin_child("##plot", (-side, 0.0)):
         _draw_tools(state)
@@ -89,8 +97,9 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
         if view.joint >= 0 and rows:
             view.choose(rows)
             view.wants_scroll = True
-    if isinstance(clip, Clip):
-        drop_missing(view, clip)
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        drop_missing(view, keyed, len(curves))
 
 
 def _rows_of(curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
@@ -164,9 +173,9 @@ def _draw_entry(state: AppState, curves: tuple[Curve, ...], row: int) -> None:
 
 
 def _key_count(state: AppState, row: int) -> str:
-    clip = clip_of(state)
-    channel = None if clip is None else channel_of(clip, row)
-    return "" if channel is None or not len(channel.times) else f"  {len(channel.times)}"
+    keyed = keyed_of(state.actor)
+    keys = None if keyed is None else keyed.keys(row)
+    return "" if keys is None or not len(keys[0]) else f"  {len(keys[0])}"
 
 
 def _choose(state: AppState, rows: tuple[int, ...]) -> None:
@@ -188,17 +197,19 @@ def _draw_tools(state: AppState) -> None:
     if button(state, "Fit"):
         view.wants_fit = True
     explain("fit the axes to the selected curves")
-    if clip_of(state) is None:
+    if keyed_of(state.actor) is None:
         imgui.same_line()
         imgui.text_disabled("sampled animation without keys: read-only")
         return
     if _button_beside(state, "Add key", "add a key to the shown curves at the current time"):
         add_key_at(state, view.rows, state.clock.time - state.actor.offset)
-    if _button_beside(state, "Key pose", "key every DOF of the pose at the current time"):
+    if _button_beside(state, "Key pose", "key the whole pose at the current time"):
         key_present_pose(state)
-    if _button_beside(state, "Key changes", "key only the DOFs that differ from the clip"):
+    if _button_beside(state, "Key changes", "key only what differs from the clip"):
         key_present_pose(state, only_changed=True)
-    if _button_beside(state, "Save clip…", "save the clip as .anim"):
+    if isinstance(state.actor.clip, Clip) and _button_beside(
+        state, "Save clip…", "save the clip as .anim"
+    ):
         ask_for_clip(state)
 
 
@@ -213,9 +224,11 @@ def _button_beside(state: AppState, text: str, tooltip: str) -> bool:
 
 
 def _draw_modes(state: AppState) -> None:
-    """Draw the choice of extrapolation before and after the keys of the curves in focus."""
-    rows, clip = focused_rows(state.of(Curves)), clip_of(state)
-    channel = channel_of(clip, rows[0]) if rows and clip is not None else None
+    """Draw the choices for whole channels: interpolation of transforms, extrapolation of DOFs."""
+    rows, keyed = focused_rows(state.of(Curves)), keyed_of(state.actor)
+    if rows and isinstance(keyed, TransformKeys):
+        _draw_interpolation(state, keyed.channel(rows[0]))
+    channel = channel_of(keyed.clip, rows[0]) if rows and isinstance(keyed, DofKeys) else None
     if channel is None:
         return
     for side, text in enumerate(("Before", "After")):
@@ -227,12 +240,23 @@ def _draw_modes(state: AppState) -> None:
                 extrapolate(state, side, mode)
 
 
+def _draw_interpolation(state: AppState, channel: TransformChannel | None) -> None:
+    """Draw the choice of interpolation between the keys of the curves in focus."""
+    if channel is None:
+        return
+    new = choice(state, "Interpolation", channel.interpolation, _INTERPOLATIONS)
+    explain("between the keys of the curves with selected keys, otherwise of all shown curves")
+    for mode in INTERPOLATIONS:
+        if new == mode != channel.interpolation:
+            interpolate(state, mode)
+
+
 def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
     """Draw the fields of the selected keys: time, value and tangents."""
-    view, clip = state.of(Curves), clip_of(state)
+    view, keyed = state.of(Curves), keyed_of(state.actor)
     place = min(view.keys, default=None)
-    channel = None if clip is None or place is None else channel_of(clip, place[0])
-    if channel is None or place is None:
+    keys = None if keyed is None or place is None else keyed.keys(place[0])
+    if keyed is None or keys is None or place is None:
         imgui.push_text_wrap_pos(0.0)
         imgui.text_disabled(_HINT)
         imgui.pop_text_wrap_pos()
@@ -245,11 +269,13 @@ def _draw_key_fields(state: AppState, curves: tuple[Curve, ...]) -> None:
     imgui.same_line()
     imgui.text_unformatted(f"{curves[place[0]].label}, key {place[1]}{more}")
     if len(view.keys) == 1:
-        _draw_numbers(state, channel, place, factor)
-    for side, text in enumerate(_SIDES):
-        _draw_rule(state, channel, place, side, text)
+        _draw_numbers(state, keys, place, factor)
+    channel = channel_of(keyed.clip, place[0]) if isinstance(keyed, DofKeys) else None
+    if channel is not None:
+        for side, text in enumerate(_SIDES):
+            _draw_rule(state, channel, place, side, text)
     if len(view.keys) == 1:
-        _draw_slopes(state, channel, place, factor)
+        _draw_slopes(state, keyed, place, factor)
 
 
 def _field(state: AppState, label: str, value: float) -> float | None:
@@ -259,12 +285,14 @@ def _field(state: AppState, label: str, value: float) -> float | None:
     return typed if typed is not None and abs(typed) < _FARTHEST else None
 
 
-def _draw_numbers(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
+def _draw_numbers(
+    state: AppState, keys: tuple[Floats, Floats], place: KeyPlace, factor: float
+) -> None:
     key = place[1]
-    time = _field(state, "Time", float(channel.times[key]))
+    time = _field(state, "Time", float(keys[0][key]))
     if time is not None:
         place_key(state, place, time=time)
-    value = _field(state, "Value", factor * float(channel.values[key]))
+    value = _field(state, "Value", factor * float(keys[1][key]))
     if value is not None:
         place_key(state, place, value=value / factor)
 
@@ -282,11 +310,19 @@ def _draw_rule(state: AppState, channel: Channel, place: KeyPlace, side: int, te
             change_tangent(state, state.of(Curves).keys, side, rule)
 
 
-def _draw_slopes(state: AppState, channel: Channel, place: KeyPlace, factor: float) -> None:
+def _draw_slopes(state: AppState, keyed: KeyedMotion, place: KeyPlace, factor: float) -> None:
     """Draw the slopes of explicit tangents, per second."""
-    pair = channel.tangents[place[1]]
-    given = [(side, slope) for side, slope in enumerate(pair) if not isinstance(slope, str)]
-    for side, slope in given:
+    slopes, rules = keyed.slopes(place[0]), tuple[Tangent, ...]()
+    channel = channel_of(keyed.clip, place[0]) if isinstance(keyed, DofKeys) else None
+    if channel is not None:
+        rules = channel.tangents[place[1]]
+        slopes = np.array([[0.0 if isinstance(rule, str) else rule for rule in rules]])
+    if slopes is None:
+        return
+    own = slopes[0 if rules else place[1]]
+    for side, slope in enumerate(own.tolist()):
+        if rules and isinstance(rules[side], str):
+            continue
         typed = _field(state, f"{_SIDES[side]} slope", factor * slope)
         if typed is not None:
-            change_tangent(state, [place], side, typed / factor)
+            change_slope(state, [place], side, typed / factor)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.memo import Memo
@@ -17,11 +19,14 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints
+from viewer.rig.transforms.rows import rows_of
 
 __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 
 _AXES = "xyz"
 _FIRST_ROTATION = 3
+_PREFIXES = {"translation": "t", "rotation": "", "scale": "s"}
+_SHAPES, _SHAPE_NUMBER = "shapes", -2  # heading of the curves of blend shapes
 _PLACE = "place"  # heading of the curves of the whole figure
 _MOST_POINTS = 2000
 _PAGE = 500  # frames by which the visible part of a long motion advances
@@ -38,9 +43,9 @@ class Curve:
     group : str
         Name of the joint or keypoint, used as heading.
     number : int
-        Index of the joint or keypoint; -1 for the whole figure.
+        Index of the joint or keypoint; -1 for the whole figure, -2 for blend shapes.
     name : str
-        Name of the channel: ``"x"``, ``"ty"`` …
+        Name of the channel: ``"x"``, ``"ty"``, ``"sz"`` …, or of a blend shape.
     axis : int
         0 to 2 for x, y, z.
     is_angle : bool
@@ -60,6 +65,7 @@ class Curve:
 
 
 _of_skeleton: Memo[Skeleton, tuple[Curve, ...]] = Memo(kept=2)
+_of_transforms: Memo[TransformClip, tuple[Curve, ...]] = Memo()
 _points: Memo[SampledClip | PointClip, Points] = Memo(kept=64)
 _parts: Memo[Clip, Clip] = Memo(kept=2)
 
@@ -67,17 +73,38 @@ _parts: Memo[Clip, Clip] = Memo(kept=2)
 def curves_of(actor: Actor) -> tuple[Curve, ...]:
     """Return the curves of an actor's motion; a row is an index into them.
 
-    A keyed clip has a curve per DOF; a sampled animation has the figure's position and each joint's
-    angles about x, y and z (R = Rz Ry Rx); captured points have their coordinates.
+    A keyed clip has a curve per DOF, keyed transforms have those of ``rows_of``. A sampled
+    animation has the figure's position and each joint's angles about x, y and z (R = Rz Ry Rx);
+    captured points have their coordinates.
     """
     skeleton, points = actor.figure.skeleton, actor.figure.points
     if isinstance(actor.clip, PointClip) and points is not None:
         return _point_curves(points)
-    if skeleton is None or isinstance(actor.clip, PointClip | TransformClip):
+    if skeleton is None or isinstance(actor.clip, PointClip):
         return ()
+    if isinstance(actor.clip, TransformClip):
+        return _of_transforms.get(actor.clip, id(skeleton), partial(_transform_curves, actor))
     if isinstance(actor.clip, SampledClip):
         return _of_skeleton.get(skeleton, "frames", lambda: _joint_curves(skeleton))
     return _of_skeleton.get(skeleton, "keys", lambda: _dof_curves(skeleton))
+
+
+def _transform_curves(actor: Actor) -> tuple[Curve, ...]:
+    skeleton, clip, shapes = actor.figure.require_skeleton(), actor.clip, actor.figure.blend_shapes
+    assert isinstance(clip, TransformClip)  # the caller checked
+    labels = [printable(label, 60) for label in joint_labels(skeleton)]
+    return tuple(
+        Curve(labels[row.joint], row.joint, _PREFIXES[row.path] + _AXES[row.component],
+              row.component, row.path == "rotation")
+        if row.path != "weights"
+        else Curve(_SHAPES, _SHAPE_NUMBER, printable(_shape_name(shapes, row.shape), 60),
+                   row.component % 3, False)
+        for row in rows_of(clip, skeleton)
+    )  # fmt: skip
+
+
+def _shape_name(shapes: BlendShapes | None, shape: int) -> str:
+    return f"shape {shape}" if shapes is None else shapes.names[shape]
 
 
 def _dof_curves(skeleton: Skeleton) -> tuple[Curve, ...]:

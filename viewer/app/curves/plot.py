@@ -13,13 +13,13 @@ from imgui_bundle import imgui, implot
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.curves.axes import Color, Plot, factor_of, measured
-from viewer.app.curves.data import Curve, channel_of, keyed_values, sampled_points
+from viewer.app.curves.data import Curve, sampled_points
 from viewer.app.curves.editing import set_clip_range
+from viewer.app.curves.keyed import KeyedMotion, keyed_of
 from viewer.app.curves.plotted_keys import draw_keys, edit
 from viewer.app.curves.state import Curves
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
-from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 
 __all__ = ["draw_plot"]
@@ -84,17 +84,18 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
     """Return axes that show the selected curves from their first to their last key or frame."""
     clip, rows = state.actor.clip, state.of(Curves).rows
     low, high = (0.0, 1.0) if clip is None else (clip.start, clip.end)
-    if isinstance(clip, Clip):
-        channels = [channel_of(clip, row) for row in rows]
-        ends = [one.times[[0, -1]] for one in channels if one is not None and len(one.times)]
+    keyed = keyed_of(state.actor)
+    if keyed is not None:
+        found = [keyed.keys(row) for row in rows]
+        ends = [keys[0][[0, -1]] for keys in found if keys is not None and len(keys[0])]
         times = np.concatenate([[low, high], *ends])
         low, high = float(times.min()), float(times.max())
     pad = _MARGIN * (high - low) or 1.0
     low, high = low - pad, high + pad
     factors = [factor_of(state, curves[row]) for row in rows]
     parts = [np.zeros(0)]
-    if isinstance(clip, Clip):
-        shown = keyed_values(clip, rows, np.linspace(low, high, _MOST_SAMPLES))
+    if keyed is not None:
+        shown = keyed.values(rows, np.linspace(low, high, _MOST_SAMPLES))
         parts.append((shown * factors).ravel())
     elif isinstance(clip, SampledClip | PointClip):
         parts += [
@@ -122,20 +123,28 @@ def _draw_line(plot: Plot, row: int) -> None:
         times, values = sampled_points(clip, row, low, high)
         implot.plot_line(f"##{row}", times, factor * values, _spec(color))
         return
-    if not isinstance(clip, Clip):
+    keyed = keyed_of(plot.state.actor)
+    if keyed is None:
         return
-    channel = channel_of(clip, row)
-    keys = channel.times if channel is not None else np.zeros(0)
+    found = keyed.keys(row)
+    keys = np.zeros(0) if found is None else found[0]
     # A curve without keys is 0 everywhere: all of it is extrapolation.
     first, last = (float(keys[0]), float(keys[-1])) if len(keys) else (high, high)
     if len(keys) and first <= high and last >= low:
         times = _inner_times(keys, max(low, first), min(high, last))
-        implot.plot_line(
-            f"##{row}", times, factor * keyed_values(clip, (row,), times)[:, 0], _spec(color)
-        )
+        values = keyed.values((row,), times)[:, 0]
+        if keyed.wraps(row):
+            times, values = _broken(times, values)
+        implot.plot_line(f"##{row}", times, factor * values, _spec(color))
     for start, end in ((low, min(high, first)), (max(low, last), high)):
         if start < end:
-            _draw_dashes(plot, clip, row, start, end)
+            _draw_dashes(plot, keyed, row, start, end)
+
+
+def _broken(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return a curve of angles with gaps where it jumps by a rotation."""
+    jumps = np.flatnonzero(np.abs(np.diff(values)) > math.pi) + 1
+    return np.insert(times, jumps, times[jumps]), np.insert(values, jumps, np.nan)
 
 
 def _inner_times(keys: Floats, low: float, high: float) -> Floats:
@@ -146,14 +155,14 @@ def _inner_times(keys: Floats, low: float, high: float) -> Floats:
     return np.sort(np.clip(times, low, high))
 
 
-def _draw_dashes(plot: Plot, clip: Clip, row: int, start: float, end: float) -> None:
+def _draw_dashes(plot: Plot, keyed: KeyedMotion, row: int, start: float, end: float) -> None:
     """Draw dashes along a curve, each of three short segments that follow its shape."""
     step = (plot.limits[1] - plot.limits[0]) / _DASHES
     # Multiples of the step, so that dashes stay in place while panning.
     lows = step * np.arange(math.floor(start / step), math.ceil(end / step))
     fractions = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
     points = np.clip((lows[:, None] + step * fractions).ravel(), start, end)
-    values = plot.factor(row) * keyed_values(clip, (row,), points)[:, 0]
+    values = plot.factor(row) * keyed.values((row,), points)[:, 0]
     spec = _spec((*plot.color(row)[:3], 0.75), 1.2, implot.LineFlags_.segments)
     implot.plot_line(f"##outside {row} {start < plot.limits[1]}", points, values, spec)
 
@@ -179,7 +188,7 @@ def _draw_range(plot: Plot) -> None:
     if clip is None:
         return
     flags = implot.DragToolFlags_.no_fit
-    if not isinstance(clip, Clip):
+    if keyed_of(plot.state.actor) is None:
         flags |= implot.DragToolFlags_.no_inputs
     moved, start, *_ = implot.drag_line_x(_START_ID, clip.start, faint(_RANGE), 1.0, flags)
     if moved:

@@ -8,19 +8,17 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from viewer.app.curves.axes import Plot
-from viewer.app.curves.data import channel_of
 from viewer.app.curves.editing import (
     add_key_at,
-    change_tangent,
-    clip_of,
+    change_slope,
     delete_chosen,
     move_chosen,
     nearest_row,
 )
+from viewer.app.curves.keyed import KeyedMotion, keyed_of
 from viewer.app.curves.state import KeyPlace
 from viewer.app.files.state import Files
 from viewer.rig.arrays import Floats
-from viewer.rig.motion.clip import Channel, Clip, slopes
 from viewer.rig.number_text import number_text
 
 __all__ = ["draw_keys", "edit"]
@@ -42,20 +40,20 @@ def draw_keys(plot: Plot) -> bool:
     Of several overlapping items, the one drawn first gets the mouse. Selected keys are therefore
     drawn first, then tangents, then other keys.
     """
-    clip = clip_of(plot.state)
-    if clip is None:
+    keyed = keyed_of(plot.state.actor)
+    if keyed is None:
         return False
     low, high, bottom, top = plot.limits
     seen: list[tuple[int, Floats, Floats, list[int]]] = []
     for row in plot.view.rows:
-        channel = channel_of(clip, row)
-        if channel is not None:
-            values = plot.factor(row) * channel.values
-            inside = (channel.times >= low) & (channel.times <= high)
+        keys = keyed.keys(row)
+        if keys is not None:
+            times, values = keys[0], plot.factor(row) * keys[1]
+            inside = (times >= low) & (times <= high)
             inside &= (values >= bottom) & (values <= top)
             # A selected key may be dragged out of the plot.
             inside[[key for owner, key in plot.view.keys if owner == row]] = True
-            seen.append((row, channel.times, values, np.flatnonzero(inside).tolist()))
+            seen.append((row, times, values, np.flatnonzero(inside).tolist()))
     if sum(len(keys) for *_, keys in seen) > _MOST_KEYS:
         _draw_many(plot, seen)
         return False
@@ -125,23 +123,26 @@ def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
 
 def _draw_handles(plot: Plot) -> bool:
     """Draw the tangents of a single selected key; return whether the mouse is over one."""
-    clip, view = clip_of(plot.state), plot.view
-    if clip is None or len(view.keys) != 1:
+    keyed, view = keyed_of(plot.state.actor), plot.view
+    if keyed is None or len(view.keys) != 1:
         return False
     row, key = next(iter(view.keys))
-    channel = channel_of(clip, row)
-    if channel is None or row not in view.rows or len(channel.times) < 2:
+    keys, slopes = keyed.keys(row), keyed.slopes(row)
+    if keys is None or slopes is None or row not in view.rows:
         return False
-    touched = [_draw_handle(plot, channel, (row, key), side) for side in (0, 1)]
+    point = float(keys[0][key]), float(keys[1][key])
+    touched = [
+        _draw_handle(plot, (row, key), side, point, float(slopes[key, side])) for side in (0, 1)
+    ]
     return any(touched)
 
 
-def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bool:
+def _draw_handle(
+    plot: Plot, place: KeyPlace, side: int, point: tuple[float, float], slope: float
+) -> bool:
     """Draw one tangent as a line of fixed length with a knob; dragging makes it explicit."""
-    row, key = place
-    factor, sign = plot.factor(row), (-1.0, 1.0)[side]
-    time, value = float(channel.times[key]), factor * float(channel.values[key])
-    slope = factor * float(slopes(channel)[key, side])
+    factor, sign = plot.factor(place[0]), (-1.0, 1.0)[side]
+    (time, value), slope = (point[0], factor * point[1]), factor * slope
     across, up = plot.scale
     length = _HANDLE_LENGTH * imgui.get_font_size() / math.hypot(1.0, slope * up / across)
     end, height = time + sign * length / across, value + sign * slope * length / across
@@ -157,7 +158,7 @@ def _draw_handle(plot: Plot, channel: Channel, place: KeyPlace, side: int) -> bo
         # The knob stays at least a pixel away from the key on its side, so no tangent is vertical.
         run = sign * max(sign * (x - time), 1.0 / across)
         for each in (0, 1) if imgui.get_io().key_shift else (side,):
-            change_tangent(plot.state, [place], each, (y - value) / run / factor)
+            change_slope(plot.state, [place], each, (y - value) / run / factor)
     return bool(hovered or held)
 
 
@@ -171,8 +172,8 @@ def edit(plot: Plot, touched: bool) -> None:
     touched : bool
         Whether the mouse is over a key or tangent, which then handles clicks.
     """
-    state, view, clip = plot.state, plot.view, clip_of(plot.state)
-    if clip is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
+    state, view, keyed = plot.state, plot.view, keyed_of(plot.state.actor)
+    if keyed is None or state.error or state.of(Files).dialog is not None or not _is_mouse_inside():
         return
     left, io = imgui.MouseButton_.left, imgui.get_io()
     # Keys and lines that can be dragged take the mouse from the plot, but not the keyboard.
@@ -183,19 +184,19 @@ def edit(plot: Plot, touched: bool) -> None:
     if adds or _is_pressed(imgui.Key.insert):
         mouse = implot.get_plot_mouse_pos()
         factors = [plot.factor(row) for row in view.rows]
-        row = nearest_row(clip, view, mouse.x, mouse.y, factors)
+        row = nearest_row(keyed, view, mouse.x, mouse.y, factors)
         if row >= 0:
-            _add_key(plot, clip, row, mouse.x)
+            _add_key(plot, keyed, row, mouse.x)
     elif _is_pressed(imgui.Key.delete):
         delete_chosen(state)
     elif is_free and imgui.is_mouse_released(left) and not (touched or was_dragged or is_second):
         view.keys = frozenset()
 
 
-def _add_key(plot: Plot, clip: Clip, row: int, time: float) -> None:
+def _add_key(plot: Plot, keyed: KeyedMotion, row: int, time: float) -> None:
     """Add a key at the mouse; an existing one there is selected instead."""
-    channel = channel_of(clip, row)
-    times = np.zeros(0) if channel is None else channel.times
+    keys = keyed.keys(row)
+    times = np.zeros(0) if keys is None else keys[0]
     near = np.flatnonzero(np.abs(times - time) * plot.scale[0] <= _SAME_KEY)
     if len(near):
         plot.view.keys = frozenset({(row, int(near[0]))})

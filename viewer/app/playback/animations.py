@@ -48,7 +48,7 @@ def has_animations(state: AppState) -> bool:
 
 
 def no_animations(state: AppState) -> str:
-    """Return why no animation of the chosen actor can be played."""
+    """Return the reason why no animation of the chosen actor can be played."""
     return "" if state.actor.figure.animations else "this figure has no animations"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from viewer.app.core.state import AppState
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.transform_clip import TransformClip
 
 __all__ = ["pause_for_edit"]
 
@@ -21,5 +22,9 @@ def pause_for_edit(state: AppState) -> None:
         return
     stopped = "Paused: the" if clock.playing else "The"
     clock.playing = False
-    kept = "press Key to keep it" if isinstance(clip, Clip) else "sampled motions cannot be keyed"
+    kept = (
+        "press Key to keep it"
+        if isinstance(clip, Clip | TransformClip)
+        else "sampled motions cannot be keyed"
+    )
     state.say_status(f"{stopped} clip overwrites this pose when the time changes; {kept}")

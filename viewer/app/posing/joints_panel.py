@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
-import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import slider_float
@@ -29,6 +27,21 @@ from viewer.app.posing.ball_joint import draw_own_numbers, draw_vector_component
 from viewer.app.posing.captured_points import draw_captured_points
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.figure_place import draw_figure_place
+from viewer.app.posing.joint_rows import (
+    OWN_NUMBERS,
+    SCALE,
+    TRANSLATION,
+    Rows,
+    joint_rows,
+    row_labels,
+)
+from viewer.app.posing.joint_transform import (
+    draw_scale,
+    draw_translation,
+    moved_joints,
+    toggle_transform,
+    unlocked_joints,
+)
 from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.posing.pose_actions import (
     copy_numbers,
@@ -40,27 +53,18 @@ from viewer.app.posing.pose_actions import (
 )
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
-from viewer.rig.hierarchy import depth_first
-from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.number_text import angle_text, number_text
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints, shown_parents
+from viewer.rig.skeleton import DOF_KINDS, Skeleton
 
-__all__ = ["draw", "rows"]
-
-Rows: TypeAlias = tuple[tuple[int, int, int], ...]
-
-OWN_NUMBERS = -2
-"""Value used instead of a DOF for the row with the raw pose values of the body model."""
+__all__ = ["draw"]
 
 _FIRST_ROTATION = 3
 _LABEL_WIDTH = 1.6  # in font sizes
 _INDENT = 9.0  # points per level
 _DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
-_known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
-_known_rows: Memo[Skeleton, Rows] = Memo(kept=4)
 _MAY_TYPE_BEYOND = imgui.SliderFlags_.none
 _STAYS_WITHIN = imgui.SliderFlags_.always_clamp
 
@@ -86,8 +90,9 @@ def draw(state: AppState) -> None:
         return
     draw_figure_place(state, actor.pose)
     has_own = actor.figure.pose_layout is not None
-    shown = rows(skeleton, frozenset(joint_tree(state).opened), joint_tree(state).filter, has_own)
-    labels = _labels(skeleton)
+    tree, moved = joint_tree(state), moved_joints(state)
+    shown = joint_rows(skeleton, frozenset(tree.opened), tree.filter, has_own, moved)
+    labels = row_labels(skeleton)
     if not shown:
         imgui.text_disabled("no joint name contains this text")
     clipper = imgui.ListClipper()
@@ -98,6 +103,12 @@ def draw(state: AppState) -> None:
             if dof == OWN_NUMBERS:
                 _indent(depth)
                 draw_own_numbers(state, actor.figure, actor.pose, joint)
+            elif dof == TRANSLATION:
+                _indent(depth)
+                draw_translation(state, actor.pose, joint, labels[joint])
+            elif dof == SCALE:
+                _indent(depth)
+                draw_scale(state, actor.pose, joint, labels[joint])
             elif dof < 0:
                 _draw_joint(state, skeleton, joint, depth, labels[joint])
             else:
@@ -175,55 +186,6 @@ def _draw_pose_menu(state: AppState) -> None:
     imgui.end_popup()
 
 
-def _labels(skeleton: Skeleton) -> tuple[str, ...]:
-    names = joint_labels(skeleton)
-    return _known_labels.get(skeleton, None, lambda: tuple(printable(label, 60) for label in names))
-
-
-def rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool = False) -> Rows:
-    """Return the listed rows as (joint, DOF or -1 for the joint's own row, depth).
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        Joints and DOFs.
-    opened : frozenset of int
-        Joints whose DOFs and children are listed.
-    wanted : str
-        If not empty, only joints whose name contains it are listed, without hierarchy.
-    has_own : bool
-        Whether a row with the file's own numbers, ``OWN_NUMBERS``, follows each joint's DOFs.
-    """
-    key = (opened, wanted, has_own)
-    return _known_rows.get(skeleton, key, lambda: _rows(skeleton, opened, wanted, has_own))
-
-
-def _rows(skeleton: Skeleton, opened: frozenset[int], wanted: str, has_own: bool) -> Rows:
-    dofs: list[list[int]] = [[] for _ in range(skeleton.n_joints)]
-    for dof, joint in enumerate(skeleton.dof_joints.tolist()):
-        dofs[joint].append(dof)
-    listed: list[tuple[int, int, int]] = []
-    depths, visible = [0] * skeleton.n_joints, [True] * skeleton.n_joints
-    labels = _labels(skeleton)
-    parents = shown_parents(skeleton).tolist()
-    for joint in shown_joints(skeleton).tolist():
-        parent = parents[joint]
-        if wanted:
-            visible[joint] = wanted.lower() in labels[joint].lower()
-        elif parent >= 0:
-            depths[joint] = depths[parent] + 1
-            visible[joint] = visible[parent] and parent in opened
-        if visible[joint]:
-            listed.append((joint, -1, depths[joint]))
-            if wanted or joint in opened:
-                listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
-                if has_own:
-                    listed.append((joint, OWN_NUMBERS, depths[joint] + 1))
-    # Parents come before their children in a skeleton, but not always immediately before.
-    place = np.argsort(depth_first(skeleton.parents)).tolist()
-    return tuple(sorted(listed, key=lambda row: place[row[0]]))
-
-
 def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, label: str) -> None:
     _indent(depth)
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.open_on_arrow
@@ -243,6 +205,8 @@ def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, lab
     if imgui.begin_popup_context_item(f"menu of joint {joint}"):
         if menu_item(state, "Reset this joint"):
             reset_joint(state, joint)
+        if menu_item(state, "Translation and scale", "", joint in unlocked_joints(state)):
+            toggle_transform(state, joint)
         imgui.end_popup()
 
 

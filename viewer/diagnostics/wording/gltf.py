@@ -8,9 +8,16 @@ CODES = {
     "G003": Code("warning", "inconsistent glTF nodes", "correct the nodes or export again"),
     "G004": Code("warning", "inconsistent glTF skin", "bind the mesh again or export again"),
     "G005": Code("warning", "invalid glTF animation", "export the animation again"),
+    "G006": Code("warning", "invalid VRM data", "export the character again"),
 }
 
 MESSAGES = {
+    # VRM
+    "G006.bone": "unknown human bone {bone:quoted}: ignored",
+    "G006.bone-node": "human bone {bone:quoted}: expected the index of a node, found {found}: "
+    "ignored",
+    "G006.bind": "expected a morph target and its weight, found target {found}: ignored",
+    "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
     "F002.gltf-version": "expected glTF 2.0, found version {found}",
@@ -19,7 +26,7 @@ MESSAGES = {
     "F002.gltf-no-json": "expected a JSON object, found no text",
     "F002.gltf-utf-16": "expected JSON in UTF-8, found UTF-16 text",
     "F002.gltf-json": "expected JSON, found a syntax error: {reason:text} (character {at})",
-    "F002.gltf-digits": "expected numbers of at most {most} digits, found a longer one",
+    "F002.gltf-digits": "expected numbers of at most {most} digits, found a longer number",
     "G001.chunk-again": "ignored another {kind:text} chunk",
     "G001.chunk-length": "{kind:text} chunk: expected {expected:#byte}, found {found}",
     "G001.trailing": "ignored {n:#byte} after the last chunk",
@@ -32,7 +39,7 @@ MESSAGES = {
     "F002.gltf-type": "expected {wanted}, found {found}",
     "F002.gltf-index": "expected an index below {count} ({what}), found {found}",
     # Buffers and images
-    "F002.gltf-scheme": "expected data or a relative file name, found {found:quoted}",
+    "F002.gltf-scheme": "expected a data URI or a relative file name, found {found:quoted}",
     "F002.gltf-outside": "{found:quoted} {reason}",
     "F002.gltf-data-uri": "expected a comma before the data, found {found:quoted}",
     "F002.gltf-base64": "expected base64 data, found other characters or an incomplete end",
@@ -40,7 +47,7 @@ MESSAGES = {
     "F002.gltf-view": "expected bytes {first} to {end} of buffer {buffer}, found the end of its "
     "data after {size} bytes",
     "F002.gltf-no-data": "expected a uri or a binary chunk, found neither",
-    "F002.gltf-compressed": "expected compressed data, found damaged ones",
+    "F002.gltf-compressed": "expected valid compressed data, found damaged data",
     "F002.gltf-draco": "compressed with Draco, which needs DracoPy: pip install DracoPy",
     "F002.gltf-draco-id": "expected an attribute of the compressed data, found {found}",
     "F002.gltf-decoded-width": "expected {expected:#component}, found {found} in compressed data",
@@ -60,7 +67,7 @@ MESSAGES = {
     "G002.normalized": "expected normalised integers, found none marked as normalised: normalised",
     # Document
     "G001.no-asset": "expected an asset with a version, found none: read as glTF 2.0",
-    "F002.gltf-extensions": "expected supported extensions only, found {names:list12}",
+    "F002.gltf-extensions": "expected only supported extensions, found {names:list12}",
     "F007.gltf-extensions": "ignored unsupported {names:list12}",
     "F007.gltf-lights": "{n:#light} not used",
     "F007.gltf-scenes": "{n} scenes: only {found:quoted} is shown",
@@ -80,39 +87,43 @@ MESSAGES = {
     "F002.gltf-corner": "index {entry}: expected a vertex below {vertices}, found {found}",
     "F002.gltf-targets": "expected {expected:#morph target} as in the first primitive, found "
     "{found}",
-    "F003.gltf-positions": "expected finite positions, found {n} others (first: vertex {vertex})",
-    "W003.gltf-weights": "expected finite weights, found {n} others (first: {found} at vertex "
+    "F003.gltf-positions": "expected finite positions, found {n} non-finite ones (first: vertex "
     "{vertex})",
+    "W003.gltf-weights": "expected finite weights, found {n} non-finite ones (first: {found} at "
+    "vertex {vertex})",
     "W010.gltf-joint": "vertex {vertex}: expected a joint below {joints} (skin {skin}), found "
     "{found}",
-    "G002.finite": "{n:#vertex|has|have} numbers that are not finite (first: vertex {vertex}): "
-    "set to 0",
+    "G002.finite": "{n:#vertex} with non-finite values (first: vertex {vertex}): set to 0",
     "G002.no-primitives": "mesh without primitives",
     "G002.no-positions": "no POSITION: not drawn",
-    "G002.corners": "{n} vertex indices are no whole triangles: the last {left} ignored",
-    "G002.weights": "expected {expected:#weight} as there are morph targets, found {found}",
+    "G002.corners": "{n} vertex indices, not a multiple of 3: the last {left} ignored",
+    "G002.weights": "expected {expected:#weight}, one per morph target, found {found}",
     "F007.gltf-undrawn": "{n:#primitive} of points or lines not drawn",
     # Skins
-    "F002.gltf-bind-count": "expected {expected:#matrix} as there are joints, found {found}",
+    "F002.gltf-bind-count": "expected {expected:#matrix}, one per joint, found {found}",
     "F002.gltf-bind-row": "joint {joint}: expected 0 0 0 1 as the last row, found {found}",
-    "F003.gltf-bind": "joint {joint}: expected a finite inverse bind matrix, found another",
+    "F003.gltf-bind": "joint {joint}: expected a finite inverse bind matrix, found a non-finite "
+    "one",
+    "G004.no-joints": "skin without joints: not used",
     "G004.joint-twice": "{n:#joint|is|are} listed more than once",
     "G004.skeleton": "expected the index of a node, found {found}: ignored",
-    "G004.bind-count": "expected {expected:#matrix} as there are joints, found {found}: the rest "
+    "G004.bind-count": "expected {expected:#matrix}, one per joint, found {found}: the rest "
     "ignored",
     "G004.influence-sets": "sets {sets:list} have joints without weights or weights without "
     "joints: ignored",
     # Animations
     "F002.gltf-no-keys": "expected times of at least one key, found none",
-    "F002.gltf-times": "key {index}: expected increasing times, found {found:.6g} after "
+    "F002.gltf-times": "key {index}: expected ascending times, found {found:.6g} after "
     "{before:.6g}",
     "F002.gltf-outputs": "expected {expected:#element} for {keys:#key}, found {found}",
     "F002.gltf-rotation": "key {index}: expected a rotation, found only zeros",
     "F003.gltf-keys": "key {index}: expected finite numbers, found {found}",
-    "F007.gltf-channels": "{n:#animation channel|changes|change} nothing that is shown: "
-    "{names:list}",
-    "G005.animation": "{problem}: animation left out",
-    "G005.channel-twice": "another channel for {path:text} of node {node}: ignored",
+    "F007.gltf-channels": "{n:#animation channel|has|have} no visible effect: {names:list}",
+    "G005.animation": "{problem}: animation omitted",
+    "G005.equal-times": "{n:#key|has|have} the same time as the next key: ignored",
+    "G005.range": "expected keys from {start:.6g} to {end:.6g} s as declared by the accessors, "
+    "found {first:.6g} to {last:.6g} s",
+    "G005.channel-twice": "ignored second channel for {path:text} of node {node}",
 }
 
 PHRASES: dict[str, str] = {}

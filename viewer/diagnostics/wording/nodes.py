@@ -2,13 +2,13 @@
 
 MESSAGES = {
     "F002.no-figure": "expected meshes, skins or a hierarchy of nodes, found nothing to show",
-    "F002.many-vertices": "expected at most {most} vertices, found {found} on all nodes together",
+    "F002.many-vertices": "expected at most {most} vertices, found {found} on all nodes",
     "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
     "vertex} along the edges",
-    "F007.no-weights": "{n:#vertex} without weights: attached to the first joint that each lists",
+    "F007.no-weights": "{n:#vertex} without weights: attached to the first listed joint",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
     "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
-    "F007.weight-sums": "weights of {n:#vertex} do not add up to 1 (by up to {most:.2g}): divided "
+    "F007.weight-sums": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "
     "by their sum",
 }
 

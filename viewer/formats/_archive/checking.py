@@ -48,7 +48,7 @@ def finite(
     archive : Archive
         Archive that contains the numbers.
     key : str
-        Their key in the archive.
+        Key of the numbers in the archive.
     values : (N, ...)
         Numbers to check.
     part : str
@@ -112,7 +112,7 @@ def _with_neutral(numbers: Floats, bad: Bools, part: Part) -> Floats:
         lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
         if part == "frames":
             return held_rows(numbers, lost)
-        # The whole matrix is replaced: a single 0 in it would give a different transform.
+        # The whole matrix is replaced: a single 0 would give a different transform.
         return np.where(lost[:, None, None], np.eye(4), numbers)
     return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
 
@@ -125,7 +125,7 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
     archive : Archive
         Archive that contains the numbers.
     key : str
-        Their key in the archive.
+        Key of the numbers in the archive.
     values : (T, 3)
         Vertex indices.
     n_vertices : int

@@ -47,13 +47,13 @@ _MAX_AXES = 32
 _MAX_BYTES = 1 << 60  # elements of an array; numpy cannot count more, even if an axis is 0
 _LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes without checking them
 
-_LONGEST_DIRECTORY = 2 << 20  # bytes, about 30,000 members, as each member takes memory
+_LONGEST_DIRECTORY = 2 << 20  # bytes, about 30,000 members: each member takes memory
 _MAX_RATIO = 100  # ratio of unpacked to packed size; smooth motions reach 10 to 20
 _SMALL = 64 << 20  # bytes; below this any ratio is accepted, as arrays of zeros compress well
 _ENCRYPTED = 0x41  # flag bits 0 and 6
 _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
 _CHUNK = 1 << 20
-# All exceptions that zipfile raises for damaged archives, as found by the mutation tests.
+# All exceptions that zipfile raises for damaged archives, as found by mutation tests.
 _DAMAGE = (
     zipfile.BadZipFile,
     zipfile.LargeZipFile,
@@ -83,7 +83,7 @@ _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 def array_dtype(code: str) -> np.dtype[Any] | None:
     """Return a numeric or string dtype by its numpy spelling, or None for other types.
 
-    Not supported are records, sub-arrays, objects, dates and platform-dependent types.
+    Records, sub-arrays, objects, dates and platform-dependent types are not supported.
 
     >>> array_dtype(">f4"), array_dtype("|O"), array_dtype("S0")
     (dtype('>f4'), None, None)
@@ -110,7 +110,7 @@ def item_count(shape: tuple[int, ...], item_size: int) -> int | None:
 
 
 def shaped(flat: NDArray[Any], shape: tuple[int, ...], is_fortran: bool) -> NDArray[Any]:
-    """Return flat values in their shape, C order and native byte order; a copy if needed.
+    """Return flat values in their shape, C order and native byte order; copied if needed.
 
     Raises
     ------
@@ -155,7 +155,7 @@ class _Reader(io.BufferedReader):
 
 
 class _Storage:
-    """The file of a source, reopened for each read; its bytes if there is no file."""
+    """The file of a source, reopened for each read, or its bytes if there is no file."""
 
     def __init__(self, source: Source) -> None:
         self.path = source.path
@@ -198,7 +198,7 @@ class _Storage:
         return file
 
     def fault(self, key: str, problem: Phrase) -> FormatError:
-        """Return an error that names the file and the key."""
+        """Return an error that gives the file and the key."""
         values = {"item": printable(key, 60), "problem": problem}
         return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
 
@@ -353,7 +353,7 @@ def _load(storage: _Storage, key: str, header: _Header, stream: IO[bytes]) -> ND
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
         raise storage.fault(key, Phrase("npy-memory", size=size)) from None
-    # In chunks, because reading at once would need twice the memory.
+    # The data is read in chunks, because reading it at once would need twice the memory.
     room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
     done = 0
     while done < size:

@@ -12,7 +12,7 @@ __all__ = ["is_archive", "open_archive"]
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
-# Protocols 2 to 5 have a header; 0 and 1 begin with the value that they build.
+# Protocols 2 to 5 have a header; protocols 0 and 1 begin with the value that they build.
 _PICKLE = re.compile(
     rb"\x80[\x02-\x05]|\(d[pqSUVX(.]|\}[q(.]|\(lp[0-9]|\][q(.]"
     rb"|c(?:__builtin__|builtins|copy_reg|collections|numpy|scipy|chumpy|os|posix|nt)[\w.]*\r?\n"
@@ -20,7 +20,7 @@ _PICKLE = re.compile(
 
 
 def is_archive(head: bytes) -> bool:
-    r"""Return whether a file that begins like this is a pickle, an ``.npz`` or an ``.npy``.
+    r"""Return whether a file that begins with these bytes is a pickle, an ``.npz`` or an ``.npy``.
 
     >>> is_archive(b"\x80\x02}q\x01."), is_archive(b"positions 4 {")
     (True, False)
@@ -34,13 +34,13 @@ def open_archive(source: Source) -> Archive:
     Parameters
     ----------
     source : Source
-        The file. Harmless errors are added to its warnings. Its ``max_size`` is also the largest
-        size of all members of an ``.npz`` together, unpacked.
+        The file. Harmless errors are added to its warnings. Its ``max_size`` also limits the total
+        unpacked size of all members of an ``.npz``.
 
     Raises
     ------
     FormatError
-        If the file is none of these, is damaged, or contains anything but data.
+        If the file is none of these, is damaged, or contains anything other than data.
     """
     # Imported late, so that readers of other formats do not import them.
     from viewer.formats._archive.npz import open_npy, open_npz

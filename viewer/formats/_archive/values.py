@@ -2,7 +2,7 @@
 
 A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever passed to
 Python's own unpickler: ``_pickle/`` supports the few opcodes needed for arrays and plain data, and
-refuses all others by name. All other values are returned as ``Opaque``.
+rejects all others by name. All other values are returned as ``Opaque``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
 
 @dataclass(frozen=True, slots=True)
 class Opaque:
-    """A value that was not evaluated, because that could run code or it is not needed.
+    """A value that was not evaluated because that could run code, or because it is not needed.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Sparse:
     Attributes
     ----------
     shape : (2,)
-        Rows and columns as declared by the file, to be checked before a dense matrix is made.
+        Rows and columns as declared by the file, to be checked before a dense matrix is created.
     data, indices : (N,)
         Stored values, and the row (csc) or column (csr) of each.
     indptr : (columns + 1,) or (rows + 1,)
@@ -117,7 +117,7 @@ class Sparse:
         Returns
         -------
         rows, columns, values : (N,)
-            In the order of the file. A pair may occur twice; such entries add up.
+            Entries in the order of the file. A pair may occur twice; such entries are summed.
 
         >>> eye = Sparse((2, 2), np.ones(2), np.arange(2), np.arange(3), "csc")
         >>> [part.tolist() for part in eye.entries()]
@@ -137,7 +137,7 @@ Plain: TypeAlias = str | bytes | int | float | bool | None
 Value: TypeAlias = (
     Plain | Deferred | Sparse | Opaque | list[Any] | tuple[Any, ...] | dict[str | bytes | int, Any]
 )
-"""Any value of an archive; containers hold such values again."""
+"""Any value of an archive; containers contain such values in turn."""
 
 Axes: TypeAlias = Sequence[int | str | None]
 """An expected shape: for each axis a size, None for any, or a letter for equal sizes."""
@@ -192,7 +192,7 @@ class Archive:
         Parameters
         ----------
         key : str
-            Its name in the file. Numbers in nested lists count as an array.
+            Name in the file. Numbers in nested lists count as an array.
         shape : sequence, optional
             For each axis a size, None for any, or a letter: axes with the same letter are equal.
         kinds : str
@@ -212,12 +212,12 @@ class Archive:
         return widened(value)
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
-        """Return a matrix in sparse form, whether the file has it sparse or dense.
+        """Return a matrix in sparse form, whether it is stored sparse or dense.
 
         Parameters
         ----------
         key : str
-            Its name in the file.
+            Name in the file.
         shape : sequence of two, optional
             As for ``array``; checked before memory of that size is allocated.
 
@@ -239,12 +239,12 @@ class Archive:
         return Sparse(dense.shape, dense[rows, columns], columns, starts, "csr")
 
     def text(self, key: str) -> str:
-        """Return a single string, which may be stored as a string, bytes, or an array of one.
+        """Return a single string, which may be stored as a string, bytes, or a one-element array.
 
         Raises
         ------
         FormatError
-            If it is none of these.
+            If the value is none of these.
         """
         value = self.get(key)
         if isinstance(value, Deferred) and value.dtype.kind in "SU" and value.shape in ((), (1,)):
@@ -265,11 +265,11 @@ class Archive:
         places: ArrayLike | None = None,
         **values: Any,
     ) -> None:
-        """Record an error in the value called ``item``, see ``Source.refuse``."""
+        """Record an error in the value called ``item``; see ``Source.refuse``."""
         self.source.refuse(key, None, count, part, places, item=printable(item, 60), **values)
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
-        """Return the exception for an error in the value called ``item``, see ``Source.fault``."""
+        """Return the exception for an error in the value called ``item``; see ``Source.fault``."""
         return self.source.fault(key, item=printable(item, 60), **values)
 
 
@@ -322,7 +322,7 @@ def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
 
 
 def _from_lists(value: Value) -> Deferred | None:
-    """Return numbers in nested lists as an array, None if the lists are ragged or not numeric."""
+    """Return numbers in nested lists as an array; None if the lists are ragged or not numeric."""
     # Only numbers are passed to numpy: one long string would make all elements that long.
     if not _is_numbers(value):
         return None

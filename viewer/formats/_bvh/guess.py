@@ -13,7 +13,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
-from viewer.rig.retargeting.joint_names import canonical_names
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 
 __all__ = ["frame_rate", "guess_unit", "guess_up"]
@@ -27,14 +27,14 @@ _RATES = (
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
 _LONG = 2.0  # ratio of the z extent to the y extent above which z is up
-_UPRIGHT = 0.8  # smallest cosine of the angle to an axis that a body stands along
-_LOOKS = 16  # frames that are examined
+_UPRIGHT = 0.8  # smallest cosine of the angle between a standing body and an axis
+_LOOKS = 16  # number of frames to examine
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
 _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
 
 
 def frame_rate(source: Source, frame_time: bytes | None) -> float:
-    """Return frames per second: the standard rate that rounds to the frame time as written.
+    """Return the standard frame rate whose rounded frame time is the one in the file.
 
     ``0.0333333`` is 30 per second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
     """
@@ -67,10 +67,10 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     Returns
     -------
     unit : str
-        As in ``Figure.unit``: metres, centimetres or millimetres, whichever gives a height
-        between a child's and a giant's; empty if none does.
+        As in ``Figure.unit``: metres, centimetres or millimetres, whichever gives a plausible human
+        height; empty if none does.
     facts : tuple of (str, str)
-        As in ``Figure.facts``: ``("unit", "cm, taken from …")``.
+        As in ``Figure.facts``: ``("unit", "cm, estimated from …")``.
     note : Phrase or None
         As in ``SkeletonMotion.unit_note``; None if the unit is metres.
     """
@@ -81,10 +81,10 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     values = {"size": size, "metres": metres if is_near else 0.0}
     for unit, (low, high) in SIZES.items():
         if low <= size <= high:
-            fact = f"{unit}, taken from the skeleton's size of {size:.4g}{inches}"
+            fact = f"{unit}, estimated from the skeleton's size of {size:.4g}{inches}"
             note = Phrase("unit-from-size", unit=UNIT_NAMES[unit], **values)
             return unit, (("unit", fact),), None if unit == "m" else note
-    fact = f"unknown, the skeleton's size is {size:.4g}{inches}"
+    fact = f"unknown; the skeleton's size is {size:.4g}{inches}"
     note = Phrase("unit-unknown", **values)
     return "", (("unit", fact),), note if size > 0.0 else None
 
@@ -92,7 +92,7 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
 ) -> tuple[Literal["y", "z"], Facts, tuple[Phrase, ...]]:
-    """Return the up axis of the rest skeleton: from feet to head, else along its longest side.
+    """Return the up axis of the rest skeleton: from feet to head, or along its longest side.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def guess_up(
     """
     skeleton = figure.skeleton
     assert skeleton is not None  # created by the reader
-    names = canonical_names(skeleton.names, skeleton.parents)
+    names = joint_meanings(skeleton)
     upper, lower = (
         [names.index(name) for name in part if name in names] for part in (_UPPER, _LOWER)
     )
@@ -141,7 +141,7 @@ def guess_up(
 
 
 def _axis(direction: Floats) -> str:
-    """Return the axis that a direction mostly lies along, ``"+y"``; empty if there is none."""
+    """Return the axis nearest to a direction, such as ``"+y"``; empty if there is none."""
     axis = int(np.abs(direction).argmax())
     if not abs(direction[axis]) > _UPRIGHT * np.linalg.norm(direction):
         return ""

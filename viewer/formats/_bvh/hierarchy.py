@@ -48,7 +48,7 @@ class Hierarchy:
     joints : list of BvhJoint
         Joints and End Sites; parents come first.
     motion : int
-        Offset after the word MOTION, -1 without one.
+        Offset after the word MOTION; -1 if there is none.
     """
 
     joints: list[BvhJoint] = field(default_factory=list)
@@ -61,7 +61,7 @@ def read_hierarchy(source: Source) -> Hierarchy:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     return _Parser(source).hierarchy()
 
@@ -120,7 +120,7 @@ class _Parser:
             raise self._fault("F002.bvh-item", joint=called(joint))
 
     def _open_joint(self, is_end: bool = False) -> None:
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         start, keyword = self.word.start(), self.keyword
         self._advance()
         if keyword == b"END" and self.keyword == b"SITE":
@@ -145,7 +145,7 @@ class _Parser:
 
     def _begins_item(self) -> bool:
         """Return whether a keyword and its number follow a name whose "{" is missing."""
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         if self.keyword not in _ITEMS[:2]:
             return False
         following = self.source.next_word(self.word.end())
@@ -159,7 +159,7 @@ class _Parser:
         self._advance()
 
     def _offset(self, joint: BvhJoint) -> None:
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         keyword = self.word
         if joint.offset is not None:
             raise self._fault("F002.bvh-offset-again", joint=called(joint))
@@ -194,7 +194,7 @@ class _Parser:
             self._advance()
 
     def _channels(self, joint: BvhJoint) -> None:
-        assert self.word is not None  # the caller checked it
+        assert self.word is not None  # checked by the caller
         keyword = self.word
         if joint.channels is not None:
             raise self._fault("F002.bvh-channels-again", joint=called(joint))
@@ -240,6 +240,6 @@ class _Parser:
 
 
 def called(joint: BvhJoint) -> Phrase:
-    """Return the phrase that names a joint or End Site in messages."""
+    """Return the phrase for a joint or End Site in messages."""
     name = Phrase("joint", name=joint.name) if joint.name else Phrase("unnamed-joint")
     return Phrase("end-site", joint=name) if joint.is_end else name

@@ -56,12 +56,12 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     Returns
     -------
     Motion
-        Motion with at least one frame: zeros, hence the rest pose, if the file has none.
+        Motion with at least one frame: zeros (the rest pose) if the file has none.
 
     Raises
     ------
     FormatError
-        For a word that is not a number, or a row that is too short or too long; gives the line.
+        If a word is not a number, or a row is too short or too long; the error has the line.
     """
     if start < 0:
         source.warn("F007.bvh-no-motion", source.end)
@@ -212,7 +212,8 @@ def _check_lines(source: Source, start: int, width: int, declared: int | None) -
     if not odd or len(lines) < 2:
         return
     if len(odd) == len(lines):
-        # No row has the right length: each line is a frame only if their counts are equal.
+        # If no row has the right length, each line is a frame only if all lines have the same
+        # count.
         if len(lines) == declared:
             raise _wrong_row(source, 0, width, lines[0])
         return

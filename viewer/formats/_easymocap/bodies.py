@@ -50,7 +50,7 @@ class BodyLayout:
     names : tuple of K str
         Joints that are rotated, the root first.
     columns : tuple of (int, int)
-        Ranges of ``poses`` for all joints but the root, in the order of ``names``.
+        Ranges of ``poses`` for all joints except the root, in the order of ``names``.
     root : int
         Number of values of the root's own rotation at the beginning: 3 or 0.
     hands : tuple of (str, int, int)
@@ -78,7 +78,7 @@ _LAYOUTS = {
     ),
     63: BodyLayout("SMPL+H", _BODY, ((0, 63),), root=0, is_flat=False),
     156: BodyLayout("SMPL+H", _SMPLH.names, ((3, 156),)),
-    # The face comes last here, and before the hands in SMPL-X.
+    # The face is last here, but precedes the hands in SMPL-X.
     87: BodyLayout(
         "SMPL-X",
         (*_BODY, *_FACE),
@@ -97,8 +97,8 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
     Raises
     ------
     RecordError
-        If no layout has this length, or the record is invalid and so cannot determine the layout
-        of others.
+        If no layout has this length, or the record is invalid and therefore cannot determine the
+        layout of others.
     """
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
@@ -131,7 +131,7 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
     Raises
     ------
     RecordError
-        If they are not finite numbers.
+        If the coefficients are not finite numbers.
     """
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
@@ -148,7 +148,7 @@ Remark = tuple[str, str, str]
 
 @dataclass(slots=True)
 class Rows:
-    """Values of one person in some frames, in the order read, with their origins."""
+    """Values of one person in some frames, in reading order, with their origins."""
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
@@ -163,7 +163,7 @@ class Rows:
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
     ) -> Timing:
-        """Return the frames of the recording that the kept rows belong to; absent elsewhere."""
+        """Return the frames of the recording to which the kept rows belong; absent in others."""
         rows = np.full(n_frames, -1, dtype=np.int32)
         frames = np.array(self.frames, dtype=np.int64)
         frames = frames if keep is None else frames[keep]
@@ -212,7 +212,7 @@ class BodyRows(Rows):
         Raises
         ------
         RecordError
-            If a value is missing, or its length differs from before.
+            If a value is missing, or its length has changed.
         """
         try:
             for key, count, put in self._plan:
@@ -261,7 +261,7 @@ class BodyRows(Rows):
         return zip(self.layout.widths, self.buffers, strict=True)
 
     def values(self) -> tuple[dict[str, Floats], Bools, list[RowFault]]:
-        """Return the values by key, a mask of valid rows, and the errors in the others.
+        """Return the values by key, a mask of valid rows, and the errors in invalid rows.
 
         Returns
         -------
@@ -294,7 +294,7 @@ class BodyRows(Rows):
         return values, keep, faults
 
     def _with_missing(self, key: str, rows: Floats) -> Floats:
-        """Repeat earlier coefficients where records omit them, and add a note."""
+        """Repeat earlier coefficients in records that omit them, and add a note."""
         lacking = self._lacking[key]
         is_given: Bools = np.ones(len(rows), dtype=np.bool_)
         is_given[lacking] = False
@@ -333,7 +333,7 @@ class BodyRows(Rows):
         own = poses[:, : layout.root]
         turns = values["Rh"] if own.any() else None
         vectors[:, 0] = values["Rh"] if turns is None else own
-        vectors.flags.writeable = False  # so that it is not copied again
+        vectors.flags.writeable = False  # a read-only array is not copied again
         hands = {side: poses[:, start:stop] for side, start, stop in layout.hands}
         hands |= {
             side: values[key]

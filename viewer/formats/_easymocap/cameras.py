@@ -12,7 +12,7 @@
       dt: d
       data: [ 1200., 0., 512., 0., …
           … ]
-    dist_01: …   H_01: 1080   W_01: 1920         in intri.yml; D_01 is dist_01 as well
+    dist_01: …   H_01: 1080   W_01: 1920         in intri.yml; D_01 is the same as dist_01
     R_01: …      Rot_01: …    T_01: …            in extri.yml: rotation vector, matrix, translation
 
 No other YAML syntax is supported.
@@ -47,7 +47,7 @@ _PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
 _ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
 _MOST = 100_000  # elements of a matrix
 _NEAR = 1e-3  # tolerance for a rotation matrix; calibrations have few digits
-_LARGEST = 1e9  # largest number of pixels in a calibration, and of scene units to a camera
+_LARGEST = 1e9  # limit of pixels in a calibration, and of a camera's distance in scene units
 _SHORTEST = 1e-3  # smallest focal length, pixels
 _MOST_BENT = 1e6  # largest distortion coefficient
 
@@ -130,7 +130,7 @@ def _cameras(
 
 
 def _names(inner: Storage, outer: Storage) -> list[str]:
-    """Return the cameras that one of the files lists, or else those that have a matrix K."""
+    """Return the cameras that one of the files lists, or those that have a matrix K."""
     for file in (inner, outer):
         listed = file.values.get("names")
         if isinstance(listed, list):
@@ -172,14 +172,14 @@ def _camera(name: str, inner: Storage, outer: Storage) -> CameraView:
 
 
 def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGEST) -> None:
-    """Refuse numbers too large for rendering in single precision."""
+    """Refuse numbers that are too large for rendering in single precision."""
     worst = float(values.ravel()[np.abs(values).argmax()]) if values.size else 0.0
     if abs(worst) > largest:
         raise file.fault("F003.camera-limit", item=key, limit=largest, found=worst)
 
 
 def _rotation(file: Storage, name: str) -> Floats:
-    """Return R: the matrix if the file has it, else that of the rotation vector."""
+    """Return R: the matrix if the file has one, otherwise that of the rotation vector."""
     if f"Rot_{name}" not in file.values:
         return rotation_vector_to_matrix(_matrix(file, f"R_{name}", (3,)))
     rotation = _matrix(file, f"Rot_{name}", (3, 3))
@@ -229,7 +229,7 @@ def read_storage(source: Source) -> Storage:
     Raises
     ------
     FormatError
-        If a line is not supported; gives the line.
+        If a line is not supported; the error has the line.
     """
     file = Storage(source)
     values = file.values

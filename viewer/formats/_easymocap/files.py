@@ -19,7 +19,7 @@ POINTS = "keypoints3d"
 """Folder of keypoints."""
 
 _SUFFIX = ".json"
-# A timeline may have this many frames for every file, plus a constant.
+# Maximum number of frames of a timeline: this many for every file, plus a constant.
 _MOST_HOLES = 10
 _FEW = 1000
 
@@ -65,7 +65,7 @@ class FrameFiles:
 
 
 def find_frames(source: Source) -> FrameFiles:
-    """Find the frame files of an output folder of EasyMocap, a subfolder of it, or a single file.
+    """Find the frame files of an EasyMocap output folder, one of its subfolders, or a single file.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def find_frames(source: Source) -> FrameFiles:
     Raises
     ------
     FormatError
-        If there are none, or a folder cannot be listed.
+        If there are no frame files, or a folder cannot be listed.
     """
     if not source.is_folder:
         folder = FrameFolder(source.path.parent)
@@ -134,7 +134,7 @@ def _folders(source: Source, names: list[str], inside: list[str]) -> list[FrameF
 
 
 def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> list[str]:
-    """Descend into the first subfolder with frames: fits of single views have one for each."""
+    """Descend into the first subfolder with frames: each view may have its own subfolder."""
     holding = [(name, files) for name in inside if (files := _look(source, folder.path / name)[0])]
     if not holding:
         return []

@@ -21,7 +21,7 @@ _MOST_NAMED = 5  # missing frames in a message
 
 
 class ImageFolders:
-    """Images in folders; the last one shown by each camera is cached.
+    """Images in folders; the last image shown for each camera is cached.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class ImageFolders:
         return tuple(name for name, files in self._files.items() if files)
 
     def at(self, camera: str, seconds: float) -> CameraImage | None:
-        """Return the image at a time, see ``viewer.rig.captures.camera_images``."""
+        """Return the image at a time; see ``viewer.rig.captures.camera_images``."""
         files = self._files.get(camera, {})
         number = self._frames.start + round(seconds * self._rate)
         known = self._shown.get(camera)
@@ -72,7 +72,7 @@ class ImageFolders:
         return picture_dimensions(files[min(files)]) if files else None
 
     def sized(self, view: CameraView) -> CameraView:
-        """Return a camera with the size of its images if the calibration lacks it."""
+        """Return a camera with the size of its images if the calibration does not give it."""
         size = None if view.size is not None else self.size_of(view.name)
         return view if size is None else replace(view, size=size)
 
@@ -103,9 +103,9 @@ def find_images(
     Parameters
     ----------
     parents : sequence of Path
-        Folders whose ``images`` is searched, in this order.
+        Folders whose subfolder ``images`` is searched, in this order.
     views : sequence of CameraView
-        The cameras, whose names are those of the folders.
+        The cameras, which have the same names as the folders.
     frame_rate : float
         Frames per second.
     frames : range
@@ -116,7 +116,7 @@ def find_images(
     Raises
     ------
     FormatError
-        If the given folder has none of the cameras.
+        If the given folder has images of none of the cameras.
     """
     for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
         folders = {view.name: parent / view.name for view in views if _is_name(view.name)}

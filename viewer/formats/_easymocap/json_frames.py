@@ -73,7 +73,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> Record:
     return values
 
 
-# Made once, because creating a decoder is slow.
+# Created only once, because creating a decoder is slow.
 _decode = json.JSONDecoder(object_pairs_hook=_unique).decode
 
 
@@ -90,7 +90,7 @@ def load_people(path: str, max_size: int) -> list[Any]:
     Raises
     ------
     FormatError
-        If it cannot be read, or is not JSON with a list of people.
+        If the file cannot be read, or is not JSON with a list of people.
     """
     text = _text(path, max_size)
     try:
@@ -104,7 +104,7 @@ def load_people(path: str, max_size: int) -> list[Any]:
         found = repeated_key(text)
         line = _line(text, found[1] if found else None)
         raise _fault("F002.json-twice", path, line, found=str(problem)) from None
-    except ValueError:  # the only other error that decoding raises
+    except ValueError:  # the only other error that decoding can raise
         line = _line(text, long_number_place(text))
         raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:
@@ -120,7 +120,7 @@ def _fault(key: str, path: str, line: int | None, **values: Any) -> FormatError:
 
 
 def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
-    """Return the line of a person's record in a frame file, or of a key in it; slow, for errors.
+    """Return the line of a person's record, or of a key in it, in a frame file; for errors only.
 
     Parameters
     ----------
@@ -173,12 +173,12 @@ def _read(path: str, max_size: int) -> bytes:
 
 
 def person_of(record: Any, place: int) -> int:
-    """Return the person of a record: ``id``, ``personID``, or else its index in the list.
+    """Return the person of a record: ``id``, ``personID``, or its index in the list.
 
     Raises
     ------
     RecordError
-        If it is not a record, or its identity is invalid.
+        If the value is not a record, or its identity is invalid.
     """
     if type(record) is dict and type(person := record.get("id")) is int and -1 <= person < 1 << 31:
         return person
@@ -205,7 +205,7 @@ def row_of(record: Record, key: str) -> list[Any]:
     Raises
     ------
     RecordError
-        If it is not a list.
+        If the value is not a list.
     """
     values = record.get(key)
     if isinstance(values, list) and len(values) == 1 and isinstance(values[0], list):
@@ -234,7 +234,8 @@ def width_of(record: Record, key: str, count: int | None = None) -> int:
     Raises
     ------
     RecordError
-        If it is not a list, has more or fewer values, or has any that is not a finite number.
+        If the value is not a list, has more or fewer values, or contains anything other than finite
+        numbers.
     """
     count = len(row_of(record, key)) if count is None else count
     numbers = array("d")

@@ -1,7 +1,7 @@
-"""Keypoints from EasyMocap records, collected per person.
+"""Keypoints of EasyMocap records, collected per person.
 
 ``keypoints3d`` has rows of x, y, z and confidence, or of x, y, z with full confidence; hands and
-face may have keys of their own. A confidence of 0 means "not detected".
+face may have separate keys. A confidence of 0 means "not detected".
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, 
     record : dict
         Record of one person.
     title : str
-        Name of the layout, used if ``keypoints3d`` has that number of points.
+        Name of the layout, used if ``keypoints3d`` has its number of points.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def point_layout(record: dict[str, Any], title: str = "") -> tuple[PointLayout, 
             beside[key] = _one_hand(side)
     joined = joined_layout("", [body, *beside.values()])
     whole = keypoint_layout(len(joined.names))
-    # Body, hands and face in the standard order are a layout with its own name.
+    # Body, hands and face in the standard order form a layout with its own name.
     named = whole if whole.names == joined.names else None
     text = " + ".join([body.title, *beside])
     return named or PointLayout(text, joined.names, joined.limbs, joined.sides), tuple(parts)
@@ -105,7 +105,7 @@ class PointRows(Rows):
         Raises
         ------
         RecordError
-            If a key is missing, or its number of points differs from before.
+            If a key is missing, or its number of points has changed.
         """
         before = len(self.buffer)
         try:

@@ -37,7 +37,7 @@ from viewer.rig.motion.body_motion import BodyMotion
 
 __all__ = ["Options", "Reading"]
 
-_SIZES = (64, 256, 1024, 4096)  # frames per part; further parts have the last size
+_SIZES = (64, 256, 1024, 4096)  # frames per part; later parts have the last size
 _MOST_WARNINGS = 20
 
 
@@ -73,7 +73,7 @@ class Reading:
     options : Options
         Settings that the files do not state.
     body_layout, point_layout : layouts or None
-        Layout of the first record that has one; others must agree, but may add coefficients.
+        Layout of the first record that has one; other records must agree, but may add coefficients.
     first_fault : Diagnostic or None
         First error.
     """
@@ -142,7 +142,7 @@ class Reading:
             self._take_person(person, record, folder, frame, (path, place), part)
 
     def _note_ids(self, path: str, record: dict[str, Any]) -> None:
-        """Add a note on the identity used where a record has none, or two that differ."""
+        """Add a note on the identity that is used if a record has none, or two different ones."""
         if "id" not in record and "personID" not in record:
             self.note("F007.record-no-id", path)
         elif "id" in record and record["id"] != record["personID"]:

@@ -65,7 +65,7 @@ def _environment(memory: int) -> dict[str, str]:
 
 
 def _ending(code: int, errors: bytes) -> Phrase:
-    """Return how a process ended, as a phrase."""
+    """Return a phrase that describes how a process ended."""
     if code < 0:
         return Phrase("ended-by-signal", number=-code)
     lines = errors.decode(errors="replace").strip().splitlines()

@@ -88,7 +88,7 @@ def _unit(metres: float) -> str:
 
 
 def _say_unused(source: Source, told: dict[str, Any]) -> None:
-    """Say what was converted, and which elements of the file are not used."""
+    """Record what was converted, and which elements of the file are not used."""
     if told["unused"]:
         items = [counted(n, word) for word, n in told["unused"].items()]
         source.warn("F007.fbx-unused", items=items)
@@ -102,7 +102,7 @@ def _say_unused(source: Source, told: dict[str, Any]) -> None:
 
 
 def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, Any]) -> None:
-    """Say what of a mesh has no equivalent."""
+    """Record the properties of a mesh that have no equivalent."""
     if mesh["color_sets"] > 1:
         source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
     for shape in mesh["shapes"]:

@@ -202,12 +202,12 @@ def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
 
 
 def _with_bone(get: Any) -> NDArray[np.bool_]:
-    """Return which clusters have a joint."""
+    """Return a mask of the clusters that have a joint."""
     return get("bones") >= 0
 
 
 def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -> NodeSkin | None:
-    """Return the skin of a mesh, and say what of it is not used."""
+    """Return the skin of a mesh, and record which parts of it are not used."""
     if told["skin"] is None:
         return None
     get = _getter(arrays, f"{prefix}.skin")

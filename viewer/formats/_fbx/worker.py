@@ -2,7 +2,7 @@
 
 Run as ``python -m viewer.formats._fbx.worker FILE`` for everything but the keys, and with a number
 after it for the keys of one animation stack. It writes an ``.npz``: arrays, and JSON under
-``"json"``. Of ufbx's binding only a few habits are safe: see ``_Scene``.
+``"json"``. Only a few ways of using ufbx's binding are safe: see ``_Scene``.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ def _limit_memory() -> None:
 class _Scene:
     """A scene of ufbx.
 
-    Objects of the binding do not keep the objects they came from alive, so all are held until the
-    process ends. Its lists run past their end when they are iterated over, so they are indexed.
+    Objects of the binding do not keep their parent objects alive, so all are held until the process
+    ends. Iteration runs past the end of its lists, so they are indexed.
     """
 
     def __init__(self, ufbx: Any, path: str) -> None:
@@ -105,7 +105,7 @@ class _Scene:
         return wanted
 
     def message(self, stack: list[str]) -> tuple[Arrays, dict[str, Any]]:
-        """Return everything but the keys, or the keys of one stack."""
+        """Return everything except the keys, or the keys of one stack."""
         if stack:
             from viewer.formats._fbx.worker_keys import keys_of
 

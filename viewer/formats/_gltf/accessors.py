@@ -118,7 +118,7 @@ class Accessors:
         index : int
             A valid index.
         kinds : sequence of str
-            Element types that are expected, such as ``"VEC3"``.
+            Expected element types, such as ``"VEC3"``.
         user : str
             JSON pointer to what refers to the accessor.
         rows : (M,) int32, optional
@@ -129,12 +129,12 @@ class Accessors:
         Returns
         -------
         (N, C) or (M, C)
-            May be infinite or NaN. The components of a matrix are column by column.
+            Values, possibly infinite or NaN. The components of a matrix are in column order.
 
         Raises
         ------
         FormatError
-            If it is invalid, of another type, or its data are missing.
+            If it is invalid, has a different type, or its data is missing.
         """
         layout = self._layout(index, kinds, user)
         values = self._picked(layout, rows, decoded)
@@ -153,7 +153,7 @@ class Accessors:
     ) -> Floats:
         """Return an accessor whose integers must be normalised, as colours and weights are.
 
-        Parameters, shape and errors are those of ``floats``. A missing flag is warned of.
+        Parameters, shape and errors are those of ``floats``. A missing flag causes a warning.
         """
         values = self.floats(index, kinds, user, rows, decoded)
         layout = self._layout(index, kinds, user)
@@ -172,8 +172,7 @@ class Accessors:
     ) -> NDArray[np.int64]:
         """Return an accessor as whole numbers: (N, C) or (M, C) int64.
 
-        Parameters and errors are those of ``floats``; components that are floating-point numbers
-        are an error too.
+        Parameters and errors are those of ``floats``; floating-point components are also an error.
         """
         layout = self._layout(index, kinds, user)
         if layout.dtype.kind == "f" or layout.is_normalized:
@@ -192,7 +191,7 @@ class Accessors:
         Raises
         ------
         FormatError
-            As ``floats`` does.
+            As for ``floats``.
         """
         columns = self.floats(index, ("MAT4",), user).reshape(-1, 4, 4)
         return np.ascontiguousarray(columns.transpose(0, 2, 1))
@@ -238,7 +237,7 @@ class Accessors:
         return values if sparse is None else self._replaced(values, layout, sparse)
 
     def _replaced(self, values: NDArray[Any], layout: _Layout, sparse: Element) -> NDArray[Any]:
-        """Return values with those that a sparse accessor lists replaced."""
+        """Return values in which the elements listed by a sparse accessor are replaced."""
         count = sparse.whole("count")
         if count > layout.count:
             raise sparse.fault("F002.gltf-sparse", "count", most=layout.count, found=count)

@@ -1,4 +1,4 @@
-"""Animations of a glTF document: names, ranges and nodes at once, keys when they are played."""
+"""Animations of a glTF document: names, ranges and nodes are read at once, keys when played."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element, Table
 from viewer.formats._gltf.keys import read_times
 from viewer.formats._gltf.target_paths import Targets
-from viewer.formats._nodes.content import NodeAnimation
+from viewer.formats._nodes.content import NodeAnimation, NodeChannel
 
 __all__ = ["read_animations"]
+
+_SAME_TIME = 1e-4  # s; decimals of times in JSON
 
 
 @dataclass(slots=True)
 class _Unused:
-    """Channels that move nothing that is shown."""
+    """Channels without visible effect."""
 
     n: int = 0
     names: dict[str, None] = field(default_factory=dict)
@@ -28,10 +30,10 @@ class _Unused:
 
 
 def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation, ...]:
-    """Return the animations that are valid as far as their keys need not be read.
+    """Return the animations that are valid, except for keys that are read later.
 
-    An invalid animation is left out with a warning. The keys of the first one are read, because
-    it is the one that is played by default.
+    An invalid animation is omitted with a warning. The keys of the first one are read, because
+    it is the one that is played by default; those of all are if errors are kept.
     """
     table = document.table("animations")
     unused = _Unused()
@@ -39,7 +41,8 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     for index in range(len(table)):
         try:
             animation = _animation(document, targets, table[index], unused)
-            found.append(animation if found else _checked(animation))
+            reads = not found or document.source.diagnostics.keeps_errors
+            found.append(_checked(animation) if reads else animation)
         except FormatError as problem:
             _leave_out(document, problem, index)
     if unused.n:
@@ -71,14 +74,27 @@ def _animation(
     plain = _plain_channels(channels.items, samplers.items, targets)
     nodes, inputs = plain or _any_channels(document, targets, animation, unused)
     start, end = _range(document, animation, inputs)
-    read = partial(read_channels, document, targets, animation)
+    read = partial(_channels, document, targets, animation, (start, end))
     return NodeAnimation(animation.text("name"), start, end, frozenset(nodes), read)
+
+
+def _channels(
+    document: Document, targets: Targets, animation: Element, declared: tuple[float, float]
+) -> tuple[NodeChannel, ...]:
+    """Return the channels of an animation, with a warning if its range is another."""
+    channels = read_channels(document, targets, animation)
+    start, end = declared
+    first = min((float(channel.times[0]) for channel in channels), default=start)
+    last = max((float(channel.times[-1]) for channel in channels), default=end)
+    if max(abs(first - start), abs(last - end)) > _SAME_TIME:
+        animation.warn("G005.range", "samplers", start=start, end=end, first=first, last=last)
+    return channels
 
 
 def _plain_channels(
     channels: list[Any], samplers: list[Any], targets: Targets
 ) -> tuple[set[int], set[int]] | None:
-    """Return the nodes and the accessors of times of channels as nearly all files have them.
+    """Return the nodes and the time accessors of channels in the form that nearly all files use.
 
     None if any channel is invalid or unusual. Files have tens of thousands of channels, so this
     takes less time than parsing them did.
@@ -99,7 +115,7 @@ def _plain_channels(
 def _any_channels(
     document: Document, targets: Targets, animation: Element, unused: _Unused
 ) -> tuple[set[int], set[int]]:
-    """Return the nodes and the accessors of times of any channels; raises FormatError."""
+    """Return the nodes and the time accessors of any channels; raises FormatError."""
     channels, samplers = animation.table("channels"), animation.table("samplers")
     nodes: set[int] = set()
     inputs: set[int] = set()

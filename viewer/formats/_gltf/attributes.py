@@ -33,7 +33,7 @@ class Attributes:
     n_vertices : int
         Elements that each accessor must have.
     rows : (V,) int32 or None
-        Vertices to read, as other primitives use the rest; None for all.
+        Vertices to read, since other primitives use the rest; None for all.
     decoded : dict
         Components of the attributes that are compressed with Draco.
     """
@@ -55,7 +55,7 @@ class Attributes:
         Raises
         ------
         FormatError
-            If it is no accessor, or has another number of elements.
+            If it is not an accessor, or has a different number of elements.
         """
         accessors = self.document.accessors
         index = self.element.index(name, len(accessors), "accessors")
@@ -102,7 +102,7 @@ class Attributes:
         return row if self.rows is None else int(self.rows[row])
 
     def finite(self, name: str, values: Floats) -> Floats:
-        """Return values with those that are not finite set to 0, with a warning."""
+        """Return values in which non-finite ones are set to 0, with a warning."""
         bad = _not_finite(values)
         if not bad.any():
             return values
@@ -153,7 +153,7 @@ def read_uvs(attributes: Attributes) -> tuple[Floats, ...]:
 
 
 def read_colors(attributes: Attributes) -> Floats | None:
-    """Return the vertex colours, linear with opacity: (V, 4); None without."""
+    """Return the vertex colours, linear with opacity: (V, 4); None if there are none."""
     colors = attributes.fractions("COLOR_0", "VEC3", "VEC4")
     if colors is None:
         return None

@@ -22,7 +22,7 @@ class View:
     Attributes
     ----------
     data : (N,) uint8
-        Its bytes, read-only.
+        Bytes of the view, read-only.
     stride : int
         Bytes from one element to the next; 0 if elements are tightly packed.
     offset : int
@@ -48,7 +48,7 @@ class EncodedImage:
     data : bytes
         The encoded image.
     is_embedded : bool
-        Whether it is part of the document instead of a file of its own.
+        Whether it is part of the document rather than a separate file.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Buffers:
         Raises
         ------
         FormatError
-            If it has no data, or they cannot be read.
+            If it has no data, or the data cannot be read.
         """
         if index not in self._data:
             self._data[index] = self._read(index)
@@ -126,7 +126,7 @@ class Buffers:
         Raises
         ------
         FormatError
-            If its data are missing, cannot be read, or lie outside the folder.
+            If its data is missing, cannot be read, or is outside the folder.
         """
         image = self._images[index]
         name, kind = image.text("name"), image.text("mimeType")

@@ -15,7 +15,7 @@ _ANGLE = math.radians(45.0)  # vertical field of view in place of an invalid one
 
 
 def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
-    """Return all cameras; an invalid one has a usual field of view and is warned of."""
+    """Return all cameras; an invalid camera gets a default field of view, with a warning."""
     table = document.table("cameras")
     cameras = []
     for index in range(len(table)):

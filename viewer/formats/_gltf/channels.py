@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element, Table
 from viewer.formats._gltf.keys import Keys, read_keys, read_times
@@ -23,12 +25,14 @@ class _Reading:
     samplers: Table
     times: dict[int, Floats] = field(default_factory=dict)
     keys: dict[tuple[int, str, int], Keys] = field(default_factory=dict)
+    n_equal: int = 0
+    """Number of keys at the time of the next one, by which they are replaced."""
 
 
 def read_channels(
     document: Document, targets: Targets, animation: Element
 ) -> tuple[NodeChannel, ...]:
-    """Return the channels of an animation that move something that is shown.
+    """Return the channels of an animation that have a visible effect.
 
     Raises
     ------
@@ -46,6 +50,8 @@ def read_channels(
                 channel.warn("G005.channel-twice", "target", node=node, path=moved.path)
             else:
                 found[node, moved.path] = _channel(reading, channel, moved, node)
+    if reading.n_equal:
+        animation.warn("G005.equal-times", "samplers", n=reading.n_equal)
     return tuple(found.values())
 
 
@@ -80,5 +86,7 @@ def _channel(reading: _Reading, channel: Element, moved: Moved, node: int) -> No
 def _times(reading: _Reading, sampler: Element) -> Floats:
     accessor = sampler.index("input", len(reading.document.accessors), "accessors")
     if accessor not in reading.times:
-        reading.times[accessor] = read_times(reading.document, sampler)
+        times = read_times(reading.document, sampler)
+        reading.times[accessor] = times
+        reading.n_equal += int((np.diff(times) == 0.0).sum())
     return reading.times[accessor]

@@ -38,7 +38,7 @@ class Container:
     root : dict
         Parsed JSON.
     binary : memoryview or None
-        Contents of the binary chunk, with its padding; None without one.
+        Contents of the binary chunk, with its padding; None if there is none.
     """
 
     root: dict[str, Any]
@@ -55,7 +55,7 @@ def open_container(source: Source) -> Container:
     """
     data = source.data
     if not data.startswith(MAGIC):
-        return Container(parsed(source, memoryview(data), has_lines=True), None)
+        return Container(parsed(source, data, has_lines=True), None)
     chunks: dict[bytes, memoryview] = {}
     for kind, content in _chunks(source):
         if kind in (_JSON, _BINARY) and kind in chunks:
@@ -63,7 +63,7 @@ def open_container(source: Source) -> Container:
         chunks.setdefault(kind, content)
     if _JSON not in chunks:
         raise source.fault("F002.glb-json")
-    return Container(parsed(source, chunks[_JSON], has_lines=False), chunks.get(_BINARY))
+    return Container(parsed(source, bytes(chunks[_JSON]), has_lines=False), chunks.get(_BINARY))
 
 
 def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:

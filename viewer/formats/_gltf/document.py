@@ -73,12 +73,12 @@ class Document:
             raise self.source.fault("F002.gltf-decoded", pointer, **values)
 
     def kept(self, read: Callable[[], Content], neutral: Content) -> Content:
-        """Return what a function reads; after an error, a neutral value if errors are kept.
+        """Return the result of a function; after an error, a neutral value if errors are kept.
 
         Raises
         ------
         FormatError
-            As the function does, if the first error is to be raised.
+            As for the function, if the first error is to be raised.
         """
         try:
             return read()
@@ -89,7 +89,7 @@ class Document:
             return neutral
 
     def extras(self) -> Any:
-        """Return the application data of the root; None without any."""
+        """Return the application data of the root; None if there is none."""
         return self.root.values.get("extras")
 
 

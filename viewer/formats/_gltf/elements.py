@@ -18,6 +18,8 @@ __all__ = ["Element", "Table", "pointer_to"]
 
 Choice = TypeVar("Choice", int, str)
 
+_BEYOND = 1 << 64  # whole numbers that no file can mean
+
 
 def pointer_to(base: str, *keys: str | int) -> str:
     """Return the JSON pointer of a member (RFC 6901).
@@ -25,8 +27,11 @@ def pointer_to(base: str, *keys: str | int) -> str:
     >>> pointer_to("/nodes/3", "extensions", "a/b")
     '/nodes/3/extensions/a~1b'
     """
-    escaped = (str(key).replace("~", "~0").replace("/", "~1") for key in keys)
-    return "/".join((base, *escaped))
+    for key in keys:
+        if type(key) is str and ("/" in key or "~" in key):
+            key = key.replace("~", "~0").replace("/", "~1")
+        base = f"{base}/{key}"
+    return base
 
 
 class Element:
@@ -64,7 +69,7 @@ class Element:
         self.source.warn(key, self.at(name) if name else self.pointer or "/", **values)
 
     def wrong(self, name: str, wanted: str) -> FormatError:
-        """Return the exception for a member of another type than the one expected."""
+        """Return the exception for a member of an unexpected type."""
         if name not in self.values:
             return self.fault("F002.gltf-missing", wanted=wanted, member=name)
         return self.fault("F002.gltf-type", name, wanted=wanted, found=describe(self.values[name]))
@@ -82,7 +87,7 @@ class Element:
             return default
         if type(value) is float and value.is_integer():
             value = int(value)
-        if type(value) is not int or value < 0:
+        if type(value) is not int or not 0 <= value < _BEYOND:
             raise self.wrong(name, "a whole number of at least 0")
         return value
 
@@ -96,7 +101,7 @@ class Element:
         count : int
             Number of elements that it can refer to.
         what : str
-            These elements, as a property of the root: ``"nodes"``.
+            Name of these elements in the root: ``"nodes"``.
 
         Raises
         ------
@@ -217,7 +222,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is no list; its items are checked when they are used.
+            If it is not a list; its items are checked when they are used.
         """
         items = self.values.get(name, [])
         if type(items) is not list:
@@ -241,20 +246,20 @@ class Element:
         return items
 
     def _wrong_index(self, name: str, place: int, item: Any, count: int, what: str) -> FormatError:
-        """Return the exception for an item that is no valid index."""
+        """Return the exception for an item that is not a valid index."""
         pointer = self.at(name, place)
-        if type(item) is int and item >= 0:
+        if type(item) is int and 0 <= item < _BEYOND:
             return self.source.fault("F002.gltf-index", pointer, what=what, count=count, found=item)
         wanted = "a whole number of at least 0"
         return self.source.fault("F002.gltf-type", pointer, wanted=wanted, found=describe(item))
 
     def extension(self, name: str) -> Element | None:
-        """Return an extension of this object; None without it.
+        """Return an extension of this object; None if there is none.
 
         Raises
         ------
         FormatError
-            If it, or the list of extensions, is no object.
+            If it, or the list of extensions, is not an object.
         """
         extensions = self.part("extensions")
         return None if extensions is None else extensions.part(name)
@@ -282,7 +287,7 @@ class Table:
         return len(self.items)
 
     def __getitem__(self, index: int) -> Element:
-        """Return an item; raises FormatError if it is no object, IndexError after the last."""
+        """Return an item; raises FormatError if it is not an object, IndexError after the last."""
         values = self.items[index]
         pointer = f"{self.pointer}/{index}"
         if type(values) is not dict:

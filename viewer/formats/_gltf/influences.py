@@ -11,7 +11,7 @@ __all__ = ["read_influences"]
 
 
 def read_influences(attributes: Attributes) -> tuple[Ints, Floats] | tuple[None, None]:
-    """Return joints (V, K) int32 and weights (V, K), as stored; None without.
+    """Return joints (V, K) int32 and weights (V, K), as stored; None if there are none.
 
     Joints of weight 0 are 0, as files may contain any number there.
 

@@ -15,17 +15,18 @@ __all__ = ["parsed"]
 
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_THOROUGH = 1 << 20  # characters below which repeated keys are always looked for
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
-def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
+def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     """Return the parsed root object.
 
     Parameters
     ----------
     source : Source
         The file, which records diagnostics.
-    data : memoryview
+    data : bytes
         UTF-8 text, possibly padded.
     has_lines : bool
         Whether the text is the whole file, so that errors have a line.
@@ -33,9 +34,9 @@ def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
     Raises
     ------
     FormatError
-        If it is no valid JSON object.
+        If it is not a valid JSON object.
     """
-    text = _text(source, bytes(data).rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
+    text = _text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []
     repeated: list[str] = []
 
@@ -50,7 +51,10 @@ def parsed(source: Source, data: memoryview, has_lines: bool) -> dict[str, Any]:
             repeated.extend(key for key, count in counts.items() if count > 1)
         return values
 
-    decoder = json.JSONDecoder(object_pairs_hook=unique, parse_constant=constant)
+    # Looking for repeated keys takes half as long as parsing.
+    looks = len(text) < _THOROUGH or source.diagnostics.keeps_errors
+    hook = unique if looks else None
+    decoder = json.JSONDecoder(object_pairs_hook=hook, parse_constant=constant)
     try:
         root = decoder.decode(text)
     except json.JSONDecodeError as problem:

@@ -35,12 +35,12 @@ class Keys:
 
 
 def read_times(document: Document, sampler: Element) -> Floats:
-    """Return the times of a sampler's keys: (N,) seconds, increasing, N > 0.
+    """Return the times of a sampler's keys: (N,) seconds, in ascending order, N > 0.
 
     Raises
     ------
     FormatError
-        If there are none, or they are malformed, not finite or not increasing.
+        If there are none, or they are malformed, not finite or not in ascending order.
     """
     accessor = sampler.index("input", len(document.accessors), "accessors")
     if accessor < 0:
@@ -51,11 +51,11 @@ def read_times(document: Document, sampler: Element) -> Floats:
     if not np.isfinite(times).all():
         key = int((~np.isfinite(times)).argmax())
         raise sampler.fault("F003.gltf-keys", "input", index=key, found=float(times[key]))
-    is_later = np.diff(times) > 0.0
-    if not is_later.all():
-        key = int(is_later.argmin()) + 1
-        values = {"found": float(times[key]), "before": float(times[key - 1])}
-        raise sampler.fault("F002.gltf-times", "input", index=key, **values)
+    is_earlier = np.diff(times) < 0.0
+    if is_earlier.any():
+        key = int(is_earlier.argmax()) + 1
+        found, before = float(times[key]), float(times[key - 1])
+        raise sampler.fault("F002.gltf-times", "input", index=key, found=found, before=before)
     return times
 
 
@@ -71,7 +71,7 @@ def read_keys(
     sampler : Element
         A sampler.
     times : (N,)
-        Its times.
+        Times of the keys; of several keys at the same time, the last one counts.
     path : str
         Property that it moves.
     n_shapes : int
@@ -80,7 +80,7 @@ def read_keys(
     Raises
     ------
     FormatError
-        If the values are malformed, too many or too few, not finite, or no rotations.
+        If the values are malformed, too many or too few, not finite, or not rotations.
     """
     names = tuple(_INTERPOLATIONS)
     interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
@@ -93,16 +93,23 @@ def read_keys(
     expected = len(times) * per_key * width
     if rows.size != expected:
         # In elements of the accessor: vectors, or single weights.
-        size = rows.shape[1]
-        counts = (expected // size, len(rows), len(times))
-        raise _wrong_count(sampler, *counts)
+        raise _wrong_count(sampler, expected // rows.shape[1], len(rows), len(times))
     keys = rows.reshape(len(times), per_key, width)
     _check_finite(sampler, keys)
     if path == "rotation":
         keys = _rotations(sampler, keys, _is_whole(document, accessor))
     # Stored as in-tangent, value, out-tangent; tangents are slopes per second (3.11.3.3).
     tangents = keys[:, (0, 2)] if per_key == 3 else None
-    return Keys(times, keys[:, per_key // 2], interpolation, tangents)
+    return _without_equal(Keys(times, keys[:, per_key // 2], interpolation, tangents))
+
+
+def _without_equal(keys: Keys) -> Keys:
+    """Return keys with the last of those at the same time, as exporters repeat the final key."""
+    is_kept = np.append(np.diff(keys.times) > 0.0, True)
+    if is_kept.all():
+        return keys
+    tangents = None if keys.tangents is None else keys.tangents[is_kept]
+    return Keys(keys.times[is_kept], keys.values[is_kept], keys.interpolation, tangents)
 
 
 def _wrong_count(sampler: Element, expected: int, found: int, keys: int) -> FormatError:

@@ -22,7 +22,7 @@ def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
     Parameters
     ----------
     table : Table
-        Objects only.
+        Table that contains only objects.
     name : str
         Name of the member.
     width : int
@@ -38,7 +38,7 @@ def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
     Raises
     ------
     FormatError
-        If a member is anything but ``width`` finite numbers.
+        If a member is anything other than ``width`` finite numbers.
     """
     places = [place for place, values in enumerate(table.items) if name in values]
     items = [table.items[place][name] for place in places]
@@ -64,7 +64,7 @@ def _array(items: list[Any], width: int) -> Floats | None:
 
 
 def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
-    """Return a member that is an index below ``count`` for each object, -1 without it: (N,).
+    """Return a member that is an index below ``count`` for each object, -1 if missing: (N,).
 
     Raises
     ------

@@ -62,7 +62,7 @@ def decoded_view(compressed: Element, data: Bytes, spend: Callable[[int, str], N
 
 
 def _check(compressed: Element, mode: str, kind: str, stride: int) -> None:
-    """Refuse a stride or filter that does not go with the mode."""
+    """Refuse a stride or filter that does not match the mode."""
     if mode != "ATTRIBUTES":
         if stride not in (2, 4):
             raise compressed.wrong("byteStride", "2 or 4")

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from viewer.formats._gltf.animations import read_animations
 from viewer.formats._gltf.bindings import checked_bindings
 from viewer.formats._gltf.cameras import read_cameras
@@ -27,8 +29,9 @@ from viewer.formats._gltf.nodes import read_tree
 from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
+from viewer.formats._gltf.targets import node_weights
 from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
-from viewer.formats._nodes.content import NodeFile, NodeMesh
+from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._source import Source
 
 __all__ = ["read_nodes"]
@@ -51,10 +54,11 @@ def read_nodes(source: Source) -> NodeFile:
     document = open_document(source)
     _check_version(document)
     check_extensions(document)
-    tree = read_tree(document)
     skins = read_skins(document)
+    tree = _without_empty_skins(read_tree(document), skins)
     materials = read_materials(document)
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
+    tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
         meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
         materials = (*materials, DEFAULT_MATERIAL)
@@ -80,6 +84,13 @@ def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
         replace(one, material=index) if one.material < 0 else one for one in mesh.primitives
     )
     return replace(mesh, primitives=tuple(primitives))
+
+
+def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTree:
+    """Return the nodes without their references to skins that have no joints."""
+    empty = [index for index, skin in enumerate(skins) if not len(skin.joints)]
+    used = np.where(np.isin(tree.skins, empty), -1, tree.skins).astype(np.int32)
+    return replace(tree, skins=used) if empty else tree
 
 
 def _object(document: Document, name: str) -> dict[str, object]:

@@ -30,7 +30,10 @@ def _skin(document: Document, skin: Element) -> NodeSkin:
     n_nodes = len(document.table("nodes"))
     joints = skin.indices("joints", n_nodes, "nodes")
     if not joints:
-        raise skin.wrong("joints", "at least one node")
+        if not skin.has("joints"):
+            raise skin.wrong("joints", "a list of nodes")
+        skin.warn("G004.no-joints", "joints")
+        return NodeSkin(skin.text("name"), np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
     if len(set(joints)) != len(joints):
         skin.warn("G004.joint-twice", "joints", n=len(joints) - len(set(joints)))
     root = skin.values.get("skeleton", 0)
@@ -41,7 +44,7 @@ def _skin(document: Document, skin: Element) -> NodeSkin:
 
 
 def _inverse_bind(document: Document, skin: Element, n_joints: int) -> Floats:
-    """Return one matrix per joint; identities without any."""
+    """Return one matrix per joint; identities if there are none."""
     name = "inverseBindMatrices"
     accessor = skin.index(name, len(document.accessors), "accessors")
     if accessor < 0:

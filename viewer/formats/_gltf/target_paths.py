@@ -19,14 +19,14 @@ _INDEX = re.compile(r"/[0-9]+")
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """What a channel moves.
+    """Target of a channel.
 
     Attributes
     ----------
     path : str
         Entry of ``TRANSFORM_PATHS``; for anything else a name for messages.
     nodes : tuple of int
-        Empty if it moves nothing that is shown.
+        Nodes; empty if it has no visible effect.
     """
 
     path: str

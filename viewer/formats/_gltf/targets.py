@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._gltf.attributes import Attributes
+from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element, Table
+from viewer.formats._nodes.content import NodeMesh, NodeTree
 from viewer.rig.arrays import Floats
 
-__all__ = ["n_targets", "read_targets", "shape_weights", "target_names"]
+__all__ = ["n_targets", "node_weights", "read_targets", "shape_weights", "target_names"]
 
 
 def n_targets(mesh: Element, primitives: Table) -> int:
@@ -69,18 +71,33 @@ def shape_weights(mesh: Element, count: int) -> Floats:
     Raises
     ------
     FormatError
-        If they are no numbers.
+        If they are not numbers.
     """
     weights = mesh.numbers("weights")
-    if weights is None:
-        return np.zeros(count)
+    return np.zeros(count) if weights is None else _fitted(mesh, weights, count)
+
+
+def node_weights(
+    document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]
+) -> dict[int, Floats]:
+    """Return the weights of nodes that override those of their meshes: (S,) each."""
+    nodes = document.table("nodes")
+    return {
+        node: _fitted(nodes[node], weights, len(meshes[tree.meshes[node]].target_names))
+        for node, weights in tree.shape_weights.items()
+        if tree.meshes[node] >= 0
+    }
+
+
+def _fitted(element: Element, weights: Floats, count: int) -> Floats:
+    """Return weights for all morph targets; missing ones are 0."""
     if len(weights) != count:
-        mesh.warn("G002.weights", "weights", expected=count, found=len(weights))
+        element.warn("G002.weights", "weights", expected=count, found=len(weights))
     return np.concatenate([weights[:count], np.zeros(max(0, count - len(weights)))])
 
 
 def target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
-    """Return the names of the morph targets, empty strings without.
+    """Return the names of the morph targets; empty strings if there are none.
 
     Names are application data: of the mesh, of a primitive, or of the targets themselves.
     """
@@ -100,6 +117,6 @@ def _listed(element: Element) -> list[Any]:
 
 
 def _extra(values: Any, name: str) -> Any:
-    """Return application data of an object; None without."""
+    """Return application data of an object; None if there is none."""
     extras = values.get("extras") if type(values) is dict else None
     return extras.get(name) if type(extras) is dict else None

@@ -85,7 +85,7 @@ def _checked(
 def strip(corners: Ints) -> Ints:
     """Return the triangles of a strip, every other one reversed (glTF 2.0, 3.7.2.1).
 
-    Degenerate triangles, which connect parts of a strip, are left out.
+    Degenerate triangles, which connect parts of a strip, are omitted.
 
     >>> strip(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
     [[0, 1, 2], [1, 3, 2]]

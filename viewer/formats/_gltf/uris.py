@@ -28,7 +28,7 @@ def media_type(uri: str) -> str:
 
 
 def uri_bytes(element: Element, most: int | None = None) -> bytes:
-    """Return the data that the ``uri`` of a buffer or image refers to.
+    """Return the data to which the ``uri`` of a buffer or image refers.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def uri_bytes(element: Element, most: int | None = None) -> bytes:
 
 
 def uri_path(element: Element) -> Path:
-    """Return the file that the ``uri`` of a buffer or image refers to; it need not exist.
+    """Return the file to which the ``uri`` of a buffer or image refers; it need not exist.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def uri_path(element: Element) -> Path:
     if path is None:
         reason = refused_text(name)
         raise element.fault("F002.gltf-outside", "uri", found=name[:_SHOWN], reason=reason)
-    # Many exporters do not encode names, so a name may contain a % of its own.
+    # Many exporters do not encode names, so a name may contain a literal %.
     literal = referenced_path(folder, uri) if "%" in uri else None
     return literal if literal is not None and _is_file(literal) else path
 
@@ -103,7 +103,7 @@ def data_uri_bytes(element: Element, most: int | None = None) -> bytes:
 
 
 def _decoded(element: Element, text: str) -> bytes:
-    """Return base64 decoded that has white space, no padding, or the alphabet of URLs."""
+    """Decode base64 with white space, without padding, or with the URL-safe alphabet."""
     plain = unquote(text).translate(str.maketrans("-_", "+/", " \t\r\n="))
     try:
         return binascii.a2b_base64(plain + "=" * (-len(plain) % 4), strict_mode=True)

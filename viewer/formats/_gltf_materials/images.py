@@ -41,7 +41,7 @@ class DecodedImage:
 
 
 def decoded_images(document: Document, indices: Iterable[int]) -> dict[int, DecodedImage]:
-    """Return images of a document by index; warned of those that cannot be read.
+    """Return images of a document by index; images that cannot be read cause a warning.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 Read: all properties of the core specification, ``KHR_texture_transform``, ``KHR_materials_unlit``,
 ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived model
 ``KHR_materials_pbrSpecularGlossiness`` is approximated, see ``glossiness.py``. Other extensions
-are not drawn. Invalid members are ignored with a warning: the shape is still worth seeing.
+are not drawn. Invalid members are ignored with a warning, because the shape can still be shown.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
+from viewer.formats._gltf.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
 from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
-from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.rig.material import ALPHA_MODES, Material
 
@@ -57,12 +57,12 @@ _NEUTRAL: dict[str, dict[str, Any]] = {
 DEFAULT_MATERIAL = Material(
     base_color=_WHITE, metallic=1.0, roughness=1.0, double_sided=False, is_physical=True
 )
-"""The material of primitives that name none."""
+"""Material of primitives without a material."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stated:
-    """What a document states about one material: values, and textures by field of ``Material``."""
+    """Properties of one material in a document: values, and textures by field of ``Material``."""
 
     values: dict[str, Any]
     slots: dict[str, Slot]
@@ -75,7 +75,7 @@ def read_materials(document: Document) -> tuple[Material, ...]:
     Parameters
     ----------
     document : Document
-        The opened file, which is warned of everything that is invalid or not drawn.
+        The opened file, which records warnings about everything that is invalid or not drawn.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element) -> _Stated:
-    """Return what a material states."""
+    """Return the properties of a material."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
@@ -177,7 +177,7 @@ def _report(document: Document, elements: list[Element], stated: list[_Stated]) 
 
 
 def _not_drawn(element: Element) -> list[str]:
-    """Return the extensions of a material that have an effect which is not drawn."""
+    """Return the extensions of a material whose effect is not drawn."""
     extensions = lenient(element.source, lambda: element.part("extensions"), None)
     found = {} if extensions is None else extensions.values
     return [

@@ -11,8 +11,8 @@ import numpy as np
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
+from viewer.formats._gltf.lenient import bounded, lenient
 from viewer.formats._gltf_materials.images import DecodedImage
-from viewer.formats._gltf_materials.lenient import bounded, lenient
 from viewer.rig.arrays import Floats
 from viewer.rig.material import MINIFICATIONS, Texture
 
@@ -23,12 +23,12 @@ _NEAREST, _LINEAR = 9728, 9729
 _MINIFIED = dict(zip((9728, 9729, 9984, 9985, 9986, 9987), MINIFICATIONS, strict=True))
 _READABLE = "EXT_texture_webp"
 _UNREADABLE = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
-_LARGEST = 1e6  # offsets and scales beyond it have no texel left in single precision
+_LARGEST = 1e6  # offsets and scales beyond this cannot resolve a texel in single precision
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slot:
-    """A texture as a material refers to it.
+    """Reference of a material to a texture.
 
     Attributes
     ----------
@@ -49,12 +49,12 @@ class Slot:
 
 
 def read_slot(document: Document, parent: Element, name: str) -> Slot | None:
-    """Return the texture that a member of a material refers to; None without one.
+    """Return the texture to which a member of a material refers; None if there is none.
 
     Parameters
     ----------
     document : Document
-        The opened file, which is warned of invalid references.
+        The opened file, which records warnings about invalid references.
     parent : Element
         The material, or a part of it.
     name : str
@@ -107,7 +107,7 @@ def _sampled(document: Document, texture: Element) -> dict[str, Any]:
 
 
 def _constant(sampler: Element, name: str, meanings: dict[int, str], default: str) -> str:
-    """Return the meaning of an OpenGL constant; others have the default, with a warning."""
+    """Return the meaning of an OpenGL constant; the default, with a warning, if unknown."""
     if not sampler.has(name):
         return default
     value = lenient(sampler.source, lambda: sampler.whole(name), -1)

@@ -22,7 +22,7 @@ def filtered(data: Bytes, name: str, stride: int) -> Bytes:
     Parameters
     ----------
     data : (N,) uint8
-        Elements as they were decoded.
+        Decoded elements.
     name : str
         Entry of ``FILTERS``.
     stride : int
@@ -61,7 +61,7 @@ def _octahedral(rows: NDArray[np.signedinteger]) -> Bytes:
 
 
 def _quaternions(rows: NDArray[np.signedinteger]) -> Bytes:
-    """Return quaternions of which the largest component is not stored."""
+    """Return quaternions whose largest component is not stored."""
     one = (rows[:, 3] | 3).astype(np.float64)
     small = rows[:, :3] / one[:, None] * np.sqrt(0.5)
     large = np.sqrt(np.maximum(0.0, 1.0 - np.einsum("nc,nc->n", small, small)))

@@ -1,1 +1,1 @@
-"""Files that describe a tree of nodes, as glTF and FBX do: their contents, and figures of them."""
+"""Files that describe a tree of nodes (glTF, FBX): contents, and figures made from them."""

@@ -1,9 +1,9 @@
 """Inverse bind matrices: one per joint, for all skins and rigid meshes of a figure.
 
-A figure has one inverse bind matrix per joint, but each skin of a file has its own, and meshes that
-hang on a node have none. Their vertices are transformed into one binding space by a matrix A with
-IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a second time,
-through an auxiliary joint.
+A figure has one inverse bind matrix per joint, but each skin of a file has its own, and meshes
+attached to a node have none. Their vertices are transformed into one binding space by a matrix A
+with IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a second
+time, through an auxiliary joint.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Bindings:
     baked : dict of (4, 4)
         A of each skin: mesh space to binding space.
     rigid : dict of (int, (4, 4))
-        Joint of each node with a mesh that hangs on it, and its A.
+        Joint of each node with an attached mesh, and its A.
     """
 
     joints: Joints
@@ -85,7 +85,7 @@ def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
 
 
 def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
-    """Return the matrix A that most of a skin's joints agree on; else the identity."""
+    """Return the matrix A on which most of a skin's joints agree, or the identity."""
     known = bindings.matrices
     if not known:
         return np.eye(4)
@@ -125,7 +125,7 @@ def _quotient(known: Floats, wanted: Floats) -> Floats | None:
 
 
 def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
-    """Bind the meshes that hang on nodes, in binding space if the matrices can be inverted.
+    """Bind the meshes attached to nodes, in binding space if the matrices can be inverted.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _rigid_matrix(bindings: Bindings, joint: int, above: int) -> Floats | None:
 
 
 def _bound_ancestors(bindings: Bindings) -> list[int]:
-    """Return the nearest bound ancestor of each joint, else the first bound joint, else -1."""
+    """Return the nearest bound ancestor of each joint, or the first bound joint, or -1."""
     first = next(iter(bindings.matrices), -1)
     above: list[int] = []
     for joint, parent in enumerate(bindings.joints.parents):
@@ -218,7 +218,7 @@ def _inverse(matrices: Floats) -> Floats:
 
 
 def _is_regular(matrices: Floats) -> Bools:
-    """Return which affine matrices can be inverted without losing many digits."""
+    """Return whether affine matrices can be inverted without losing many digits."""
     scales = np.linalg.svd(matrices[..., :3, :3], compute_uv=False)
     regular: Bools = scales[..., 0] < _WORST_CONDITION * scales[..., 2]
     return regular

@@ -1,7 +1,7 @@
-"""Contents of a file of nodes, as its reader returns them, before figures are made of them.
+"""Contents of a file of nodes as returned by its reader, before figures are created.
 
 Nothing is converted: names, transforms, weights and keys are those of the file, in its unit and
-axes. Indices are valid, numbers are finite, and the parents form a forest: readers see to it.
+axes. Readers guarantee that indices are valid, numbers are finite, and the parents form a forest.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ __all__ = [
     "NodeAnimation",
     "NodeCamera",
     "NodeChannel",
+    "NodeExpression",
     "NodeFile",
     "NodeMesh",
     "NodeSkin",
@@ -41,8 +42,8 @@ class NodeTree:
     translations, rotations, scales : (N, 3), (N, 4), (N, 3)
         Local transform T R S; unit quaternions (x, y, z, w).
     matrices : dict of (4, 4)
-        Local matrices of the nodes that no T R S expresses, as they shear. Their rows in the
-        three arrays above are those of the identity.
+        Local matrices of nodes that shear and therefore cannot be expressed as T R S. Their rows in
+        the three arrays above are those of the identity.
     meshes, skins, cameras : (N,) int32
         Index of each node's mesh, skin and camera, -1 for none.
     shape_weights : dict of (S,)
@@ -72,7 +73,7 @@ class NodeTree:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
-    """Triangles with one material; the vertices are used by no other primitive.
+    """Triangles with one material; no other primitive uses the vertices.
 
     Attributes
     ----------
@@ -118,13 +119,13 @@ class NodeMesh:
     name : str
         As in the file.
     primitives : tuple of Primitive
-        In file order; empty if the file has points or lines only.
+        In file order; empty if the file has only points or lines.
     target_names : tuple of S str
         Names of the morph targets; empty strings without a name.
     shape_weights : (S,)
         Default weights of the morph targets.
     extras : Any
-        Application data, as parsed from JSON; None without.
+        Application data, as parsed from JSON; None if there is none.
     """
 
     name: str
@@ -147,7 +148,7 @@ class NodeSkin:
     inverse_bind : (M, 4, 4)
         Mesh-to-joint matrices at bind time; identities if the file has none.
     method : "lbs", "dqs" or "mix"
-        How the file wants its meshes to be deformed.
+        Skinning method requested by the file.
     """
 
     name: str
@@ -218,7 +219,7 @@ class NodeCamera:
     vertical_angle : float or None
         Vertical field of view in radians; None for an orthographic camera.
     aspect : float or None
-        Width divided by height, if the file says so.
+        Width divided by height, if the file specifies it.
     height : float
         Height of an orthographic camera's view, file units.
     """
@@ -227,6 +228,31 @@ class NodeCamera:
     vertical_angle: float | None
     aspect: float | None = None
     height: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NodeExpression:
+    """A facial expression: a weighted sum of morph targets; see ``viewer.rig.expressions``.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    binds : tuple of (int, int, float)
+        Node, morph target of its mesh, and the weight of that target at weight 1.
+    is_binary : bool
+        Whether it is either fully on or off.
+    kind : str
+        Key of ``PROCEDURAL``; empty for others.
+    overrides : dict of str
+        Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
+    """
+
+    name: str
+    binds: tuple[tuple[int, int, float], ...]
+    is_binary: bool = False
+    kind: str = ""
+    overrides: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -250,9 +276,15 @@ class NodeFile:
     extensions : dict
         Parsed JSON of the root's extensions, such as ``VRMC_vrm``.
     extras : Any
-        Application data of the root, as parsed from JSON; None without.
+        Application data of the root, as parsed from JSON; None if there is none.
     asset : dict
         Generator, copyright and the like.
+    humanoid : dict of int
+        Node of each human bone, by its name in VRM 1.0; empty if the file states none.
+    expressions : tuple of NodeExpression
+        Facial expressions.
+    facts : tuple of (str, str)
+        Further properties for ``viewer info``, each a heading and a text.
     """
 
     name: str
@@ -268,3 +300,6 @@ class NodeFile:
     extensions: Mapping[str, Any] = field(default_factory=dict)
     extras: Any = None
     asset: Mapping[str, Any] = field(default_factory=dict)
+    humanoid: Mapping[str, int] = field(default_factory=dict)
+    expressions: tuple[NodeExpression, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()

@@ -34,4 +34,4 @@ def facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]
     # Smaller deviations are float32 rounding.
     if sums > 1e-6:
         facts.append(("weight sums", f"within {sums:.2g} of 1, divided by their sum"))
-    return tuple(facts)
+    return (*facts, *file.facts)

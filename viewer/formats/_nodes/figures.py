@@ -1,4 +1,4 @@
-"""Figures made of the contents of a file of nodes."""
+"""Figures made from the contents of a file of nodes."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _MOST_VERTICES = 1 << 27
 def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     """Return the figures and cameras of a file of nodes.
 
-    Figure space is the space of the file's scene. Every node that matters is a ball joint about
-    its rest; see ``group_nodes`` for the division into figures.
+    Figure space is the space of the file's scene. Every relevant node is a ball joint about its
+    rest pose; see ``group_nodes`` for the division into figures.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
 
 
 def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Figure, list[Piece]]:
-    """Return one figure, and the primitives that it consists of."""
+    """Return one figure, and the primitives of which it consists."""
     joints = make_joints(file.tree, members.nodes)
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
@@ -66,7 +66,7 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Fi
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
-        skeleton=skeleton_of(joints),
+        skeleton=skeleton_of(joints, file.humanoid),
         skin=skin_of(pieces, inverse_binds(bindings)) if pieces else None,
         up=file.up,
         unit=file.unit,

@@ -30,7 +30,7 @@ def flat_shaded(positions: Floats, triangles: Ints) -> tuple[Ints, Ints, Floats,
     Returns
     -------
     sources : (R,) int32
-        Vertex that each split vertex is a copy of; vertices without triangles are kept.
+        Vertex of which each split vertex is a copy; vertices without triangles are kept.
     triangles : (T, 3) int32
         Indices into the split vertices.
     normals : (R, 3)

@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bools, Ints
 
 __all__ = ["Members", "group_nodes", "is_skinned", "scene_order"]
 
-_MOST_TREES = 16  # root trees of rigid meshes that are figures of their own
+_MOST_TREES = 16  # maximum number of root trees of rigid meshes that are separate figures
 _MOST_COPIES = 4  # times the number of nodes: joints of all figures that share ancestors
 
 
@@ -25,7 +25,7 @@ class Members:
     nodes : list of int
         Nodes that become joints, parents first.
     skins : list of int
-        Its skins, those of meshes first, in the order of their meshes.
+        Skins of the figure; those of meshes come first, in the order of the meshes.
     meshes : list of int
         Nodes whose meshes are parts of the figure, in tree order.
     name : str
@@ -39,7 +39,7 @@ class Members:
 
 
 def is_skinned(mesh: NodeMesh, skin: int) -> bool:
-    """Return whether a skin moves all primitives of a mesh, so that its node does not matter."""
+    """Return whether a skin moves all primitives of a mesh, so that its node has no effect."""
     return skin >= 0 and all(p.joints is not None for p in mesh.primitives)
 
 
@@ -48,7 +48,7 @@ def group_nodes(file: NodeFile) -> list[Members]:
 
     Skins that share a joint, or of which one has a joint below a joint of another, belong to one
     figure. Meshes without a skin belong to the figure that has their node or an ancestor as a
-    joint; the others form one figure per root tree, or together one if the file has no skins.
+    joint; the others form one figure per root tree, or a single figure if the file has no skins.
     A file without meshes and skins is one figure of its animated nodes, or of all its nodes.
 
     Parameters
@@ -78,7 +78,8 @@ class _Grouping:
         self.parents: list[int] = file.tree.parents.tolist()
         self.roots = _roots(file.tree)
         self.is_identity = _identities(file.tree)
-        self.moved = set().union(*(animation.nodes for animation in file.animations))
+        self.moved = set(file.humanoid.values())
+        self.moved.update(*(animation.nodes for animation in file.animations))
         self.drawn = _drawn_meshes(file)
         self.order = self._order()
         self.place = {node: place for place, node in enumerate(self.order)}
@@ -162,7 +163,7 @@ class _Grouping:
             wanted.add(node)
 
     def _key(self, node: int) -> tuple[str, int]:
-        """Return the key of the figure that a node without a skin belongs to."""
+        """Return the key of the figure to which a node without a skin belongs."""
         if node in self.owners:
             return "skin", self._find(self.owners[node])
         return ("root", int(self.roots[node])) if self.skins else ("all", 0)
@@ -229,7 +230,7 @@ class _Grouping:
         return sorted(found, key=self.place.__getitem__)
 
     def _trimmed(self, nodes: list[int], wanted: set[int]) -> list[int]:
-        """Return the nodes without those above everything else that change nothing."""
+        """Return the nodes without topmost ones that have no effect."""
         children: dict[int, int] = {}
         for node in nodes:
             above = self.parents[node]

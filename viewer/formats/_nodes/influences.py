@@ -27,7 +27,7 @@ class Influences:
     deviation : float
         Largest deviation of a sum from 1 before the division.
     n_deviating : int
-        Number of sums further from 1 than the rounding of 8-bit weights.
+        Number of sums farther from 1 than the rounding of 8-bit weights.
     n_unbound : int
         Number of vertices without any weight.
     """
@@ -61,7 +61,7 @@ def divided(primitive: Primitive, slots: Ints) -> Influences:
     Returns
     -------
     Influences
-        Without the slots whose weight is 0.
+        Influences without the slots whose weight is 0.
     """
     assert primitive.joints is not None and primitive.weights is not None
     weights = primitive.weights.astype(np.float64)

@@ -1,7 +1,8 @@
-"""Joints made of nodes, with auxiliary joints where a node shears or has a second binding."""
+"""Joints made from nodes, with auxiliary joints for nodes that shear or have a second binding."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from viewer.formats._nodes.content import NodeTree
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skeleton import Skeleton
 
@@ -19,7 +21,7 @@ _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
 
 @dataclass(slots=True, eq=False)
 class Joints:
-    """The joints of a figure while its skeleton is made.
+    """The joints of a figure whose skeleton is under construction.
 
     Attributes
     ----------
@@ -144,8 +146,15 @@ def rest_worlds(joints: Joints) -> Floats:
     return forward_kinematics(np.array(joints.parents, dtype=np.int32), local)
 
 
-def skeleton_of(joints: Joints) -> Skeleton:
+def skeleton_of(joints: Joints, humanoid: Mapping[str, int] | None = None) -> Skeleton:
     """Return the skeleton: every joint of the file is a ball joint about its rest, without limits.
+
+    Parameters
+    ----------
+    joints : Joints
+        The joints.
+    humanoid : mapping of str to int, optional
+        Node of each human bone; those that are no joints of this figure are ignored.
 
     Returns
     -------
@@ -155,6 +164,8 @@ def skeleton_of(joints: Joints) -> Skeleton:
     is_auxiliary = np.array(joints.nodes) < 0
     balls = np.flatnonzero(~is_auxiliary).astype(np.int32)
     count = 3 * len(balls)
+    given = (humanoid or {}).items()
+    bones = {bone: joints.own[node] for bone, node in given if node in joints.own}
     return Skeleton(
         names=tuple(joints.names),
         parents=np.array(joints.parents, dtype=np.int32),
@@ -166,4 +177,5 @@ def skeleton_of(joints: Joints) -> Skeleton:
         rest_dofs=np.zeros(count),
         dof_limits=np.tile([-np.inf, np.inf], (count, 1)),
         auxiliary=is_auxiliary if is_auxiliary.any() else None,
+        humanoid=Humanoid(bones) if bones else None,
     )

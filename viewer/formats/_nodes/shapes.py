@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.formats._nodes.content import NodeFile, NodeMesh
+from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
 from viewer.formats._nodes.surfaces import Piece, part_name
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
 
 __all__ = ["blend_shapes_of", "shape_columns"]
 
@@ -66,7 +67,7 @@ def _defaults(file: NodeFile, node: int) -> Floats:
 def blend_shapes_of(
     file: NodeFile, columns: dict[int, Ints], pieces: list[Piece]
 ) -> BlendShapes | None:
-    """Return the blend shapes of a figure; offsets are put together when first used.
+    """Return the blend shapes of a figure; offsets are assembled on first use.
 
     Parameters
     ----------
@@ -86,17 +87,59 @@ def blend_shapes_of(
     targets = [_target(file, columns, column, node) for column, node in sorted(owners.items())]
     counts = Counter(target.name for target in targets)
     count = sum(piece.n_vertices for piece in pieces)
-    shape = len(targets), count, 3
+    mixed, sums = _expressions(file, columns, len(targets))
+    shape = len(targets) + len(mixed), count, 3
+
+    def offsets(of_normals: bool) -> Deferred:
+        return Deferred(
+            shape, np.float64, lambda: _offsets(columns, pieces, count, of_normals, sums)
+        )
+
     has_normals = any(piece.shading == "file" for piece in pieces)
+    names = (t.name if counts[t.name] == 1 else t.full_name for t in targets)
     return BlendShapes(
-        names=tuple(t.name if counts[t.name] == 1 else t.full_name for t in targets),
-        offsets=Deferred(shape, np.float64, lambda: _offsets(columns, pieces, shape, False)),
-        groups=("morph",) * len(targets),
-        # glTF keeps normals that a target does not move; flat ones follow the surface.
-        normal_offsets=Deferred(shape, np.float64, lambda: _offsets(columns, pieces, shape, True))
-        if has_normals
-        else None,
-        rest_weights=np.array([target.weight for target in targets]),
+        names=(*names, *(each.name for each in mixed)),
+        offsets=offsets(of_normals=False),
+        groups=("morph",) * shape[0],
+        # In glTF, a target without normals keeps them; flat normals follow the surface.
+        normal_offsets=offsets(of_normals=True) if has_normals else None,
+        rest_weights=np.array([*(target.weight for target in targets), *(0.0 for _ in mixed)]),
+        rules=_rules(mixed, len(targets)) if mixed else None,
+    )
+
+
+def _expressions(
+    file: NodeFile, columns: dict[int, Ints], n_targets: int
+) -> tuple[list[NodeExpression], Floats]:
+    """Return the expressions of this figure, and each as a sum of its S morph targets: (E, S)."""
+    found: list[NodeExpression] = []
+    sums: list[Floats] = []
+    for each in file.expressions:
+        row = np.zeros(n_targets)
+        for node, index, weight in each.binds:
+            if node in columns:
+                # Nodes that share a target are bound one by one.
+                column = columns[node][index]
+                row[column] = max(row[column], weight, key=abs)
+        if row.any():
+            found.append(each)
+            sums.append(row)
+    return found, np.array(sums).reshape(len(found), n_targets)
+
+
+def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
+    """Return the rules of expressions that follow ``first`` morph targets."""
+    kinds = [*PROCEDURAL]
+    return ExpressionRules(
+        rows=np.arange(first, first + len(mixed), dtype=np.int32),
+        is_binary=np.array([each.is_binary for each in mixed]),
+        kinds=np.array([kinds.index(each.kind) if each.kind else -1 for each in mixed]),
+        overrides=np.array(
+            [
+                [OVERRIDES.index(each.overrides.get(kind, "none")) for kind in kinds]
+                for each in mixed
+            ]
+        ),
     )
 
 
@@ -117,10 +160,13 @@ def _target(file: NodeFile, columns: dict[int, Ints], column: int, node: int) ->
 
 
 def _offsets(
-    columns: dict[int, Ints], pieces: list[Piece], shape: tuple[int, ...], of_normals: bool
+    columns: dict[int, Ints], pieces: list[Piece], count: int, of_normals: bool, sums: Floats
 ) -> Floats:
-    """Return the offsets of all vertices, or of their normals, in binding space: (S, V, 3)."""
-    offsets = np.zeros(shape)
+    """Return the offsets of all vertices, or of their normals, in binding space: (S + E, V, 3).
+
+    ``sums`` (E, S): the expressions, which follow the S morph targets.
+    """
+    offsets = np.zeros((sums.shape[1], count, 3))
     first = 0
     for piece in pieces:
         rows = slice(first, first + piece.n_vertices)
@@ -132,4 +178,6 @@ def _offsets(
         linear = piece.baked[:3, :3]
         matrix = np.linalg.inv(linear) if of_normals else linear.T
         offsets[own, rows] = targets[:, piece.sources] @ matrix
-    return offsets
+    if not len(sums):
+        return offsets
+    return np.concatenate([offsets, np.einsum("es,sva->eva", sums, offsets)])

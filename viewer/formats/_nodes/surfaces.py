@@ -1,4 +1,4 @@
-"""One mesh and skin made of all meshes of a figure, in its binding space."""
+"""One mesh and skin made from all meshes of a figure, in its binding space."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Piece:
     influences : Influences
         Of the V vertices.
     sources : (V,) int32
-        Vertex of the primitive that each vertex is a copy of: flat shading splits vertices.
+        Vertex of the primitive of which each vertex is a copy: flat shading splits vertices.
     triangles : (T, 3) int32
         Of the piece's vertices, counter-clockwise from outside in binding space.
     normals : (V, 3)
@@ -111,7 +111,7 @@ def _counted_as(split: Influences, whole: Influences) -> Influences:
 
 
 def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
-    """Return the mesh of a figure; what only some primitives have is filled with neutral values.
+    """Return the mesh of a figure; attributes of only some primitives get neutral values elsewhere.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
 
 
 def part_name(file: NodeFile, node: int) -> str:
-    """Return the name of a node's part: that of the node, else of its mesh."""
+    """Return the name of a node's part: that of the node, or of its mesh."""
     return file.tree.names[node] or file.meshes[int(file.tree.meshes[node])].name
 
 
@@ -171,7 +171,7 @@ def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
 def _filled(
     pieces: list[Piece], values_of: Callable[[Primitive], Floats | None], neutral: Floats
 ) -> Floats | None:
-    """Return values per vertex, neutral where a primitive has none; None if none has any."""
+    """Return values per vertex, neutral for primitives without any; None if all lack them."""
     given = [values_of(piece.primitive) for piece in pieces]
     if all(values is None for values in given):
         return None

@@ -49,8 +49,8 @@ class FaceRows:
     counts : (F,)
         Corners of each face, 3 or more.
     corners : (C, 3)
-        0-based vertex, texture coordinate and normal of each; -1 if missing. Their range can be
-        checked only when the whole file has been read.
+        0-based vertex, texture coordinate and normal of each corner; -1 if missing. The range can
+        be checked only when the whole file has been read.
     offsets : (F,)
         Offset of each face in the file.
     faults : tuple of CornerFault
@@ -103,7 +103,7 @@ def _corner_numbers(rows: Rows, begins: Places) -> Places | None:
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
-        # The second most common kind of file has vertices alone.
+        # The second most common kind of file has only vertices.
         return _spread(values, np.ones(len(begins), np.int64), None)
     fits, n_numbers, has_gap = fits_corner(rows, begins)
     if not fits.all():
@@ -123,14 +123,14 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
     rows : Rows
         Rows of faces.
     begins : (C,)
-        Start of each corner in their body.
+        Start of each corner in the body of the rows.
 
     Returns
     -------
     fits : (C,) bool
         True for v, v/vt, v//vn and v/vt/vn; the numbers are not checked.
     n_numbers : (C,)
-        Number of values of each.
+        Number of values of each corner.
     has_gap : (C,) bool
         True for v//vn.
     """
@@ -150,7 +150,7 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
 
 
 def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Places | None:
-    """Arrange the numbers of corners in rows of three; with a gap the second becomes the third."""
+    """Arrange the numbers of corners in rows of three; with a gap, the second becomes the third."""
     whole = np.clip(values, -(2.0**40), 2.0**40).astype(np.int64)
     if (whole != values).any():
         return None

@@ -16,7 +16,7 @@ from viewer.rig.arrays import Bools
 __all__ = ["checked_corners", "faulty_faces", "faulty_rows"]
 
 _LOST = -(2**40)
-"""Represents an unknown vertex; no file has this many."""
+"""Represents an unknown vertex; no file has this many vertices."""
 
 
 def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: int) -> NumberRows:
@@ -38,7 +38,8 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     Returns
     -------
     table, counts, values, rows
-        As ``number_rows``, with NaN for words that are not numbers and in rows that are too short.
+        As for ``number_rows``, with NaN for words that are not numbers and in rows that are too
+        short.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
@@ -50,7 +51,7 @@ def faulty_rows(source: Source, lines: Lines, keyword: str, width: int, first: i
     part: Part = "positions" if keyword == "v" else ""
     bad = words.bad
     is_used = bad - firsts[owners[bad]] < width
-    parts: tuple[Part, Part] = (part, "")  # the checks use no other numbers
+    parts: tuple[Part, Part] = (part, "")  # only these numbers are checked
     for chosen, whose in zip((is_used, ~is_used), parts, strict=True):
         owned = owners[bad[chosen]] + first
         refuse_words(
@@ -158,7 +159,7 @@ def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
 
 
 def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int]) -> Places:
-    """Return the corners of all faces, with each invalid one replaced by another of its face.
+    """Return the corners of all faces, with invalid corners replaced by others of their face.
 
     Parameters
     ----------

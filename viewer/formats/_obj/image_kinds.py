@@ -1,4 +1,4 @@
-"""Kinds of images in material libraries, told by their pixels where statements do not."""
+"""Kinds of images in material libraries, detected from their pixels if not stated."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _SOLID = 16, 239  # below and above, opacity counts as 0 and 1
 
 
 def is_normal_map(image: Bytes) -> bool:
-    """Return whether an image, (H, W, 4) uint8, holds unit normals in tangent space.
+    """Return whether an image, (H, W, 4) uint8, contains unit normals in tangent space.
 
-    Blender, Substance and others write normal maps as ``map_Bump``, which stands for heights.
+    Blender, Substance and others write normal maps as ``map_Bump``, which is meant for heights.
     """
     normals = _sampled(image)[..., :3].reshape(-1, 3) / 127.5 - 1.0
     is_unit = np.abs(np.linalg.norm(normals, axis=1) - 1.0) < _ERROR

@@ -1,7 +1,7 @@
-"""Lines of an ``.obj`` grouped by keyword, in pieces of some hundred thousand bytes.
+"""Lines of an ``.obj``, grouped by keyword, in pieces of a few hundred thousand bytes.
 
 All lines with the same keyword are parsed at once. Pieces that fit into the processor's cache make
-this several times faster than parsing the whole file in one go.
+this several times faster than parsing the whole file at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ KEYWORDS = ("v", "vt", "vn", "f")
 _PIECE = 1 << 18  # bytes
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _LINE_END = re.compile(rb"[\r\n]")
-_PAD = b"\n\n\n"  # padding, so that three letters can be read at the start of every line
+_PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,9 +174,9 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     values : (N,)
         All values, one line after the other.
     rows : Rows
-        The text that they were parsed from.
+        The text from which they were parsed.
 
-    None instead of all if a line has too few numbers, or a word is not a number.
+    None is returned instead if a line has too few numbers, or a word is not a number.
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)

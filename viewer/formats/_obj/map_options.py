@@ -1,4 +1,4 @@
-"""Options of the maps of a material library, before the name of the image."""
+"""Options of maps in a material library, before the name of the image."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _CHANNELS = {"r": 0, "g": 1, "b": 2, "m": 3, "l": 0, "z": 0}
 
 @dataclass(frozen=True, slots=True)
 class MapOptions:
-    """A map's image, and how it is placed.
+    """A map's image and its placement.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def _first_word(text: str) -> tuple[str, str]:
 
 
 def _vector(found: dict[str, list[str]], option: str) -> tuple[float, float]:
-    """Return the first two values of an option; omitted ones have their default."""
+    """Return the first two values of an option; omitted values have their defaults."""
     default = _VECTORS[option]
     values = [_number(word, default) for word in found.get(option, [])[:2]]
     u, v = [*values, default, default][:2]

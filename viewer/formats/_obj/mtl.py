@@ -4,7 +4,7 @@
 
     mtl   = line*
     line  = "newmtl" name | color r (g b)? | number x | map option* file | anything else
-    color = "Kd" | "Ke"                     linear; one number stands for three
+    color = "Kd" | "Ke"                     linear; one number is used for all three
     number = "Pr" | "Pm" | "d" | "Tr"       roughness, metallic, opacity, 1 - opacity
     map   = "map_Kd" | "map_Ka" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d"
           | "norm" | "map_Kn" | "map_Bump" | "bump"
@@ -82,7 +82,7 @@ class _Statements:
 def read_libraries(
     source: Source, libraries: list[tuple[bytes, int]], names: list[str]
 ) -> tuple[Material, ...]:
-    """Return materials by name, with their images where these can be read.
+    """Return materials by name, with their images if these can be read.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def read_libraries(
 
 
 def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
-    """Return the libraries of one ``mtllib``: one whose name may contain spaces, or several."""
+    """Return the libraries of one ``mtllib``: a file whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     folder = source.path.parent
     names = whole.split() if " " in whole and name_here(folder, whole) is None else [whole]
@@ -286,7 +286,7 @@ def _emissive(color: tuple[float, ...] | None, has_texture: bool) -> tuple[float
 
 
 def _opacity(numbers: dict[str, tuple[float, ...]]) -> float:
-    """Return d, or 1 - Tr without it."""
+    """Return d, or 1 - Tr if there is no d."""
     if "opacity" in numbers:
         return numbers["opacity"][0]
     # Some exporters write d as Tr: Tr 1 then means an opaque surface.

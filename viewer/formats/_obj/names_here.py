@@ -1,4 +1,4 @@
-"""Names of referenced files in this folder, where a library has those of another computer."""
+"""Names of referenced files in this folder, if a library contains names from another computer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["name_here"]
 def name_here(folder: Path, written: str) -> str | None:
     """Return the name under which a referenced file exists in a folder, None if it does not.
 
-    Tried in turn, each also in another case, as Windows ignores it: the name without quotes, and
+    The following are tried in turn, ignoring case as Windows does: the name without quotes, and
     its last part, since many programs write the path that the file had when it was exported.
 
     Parameters
@@ -34,7 +34,7 @@ def name_here(folder: Path, written: str) -> str | None:
 
 
 def _in_any_case(folder: Path, name: str) -> str | None:
-    """Return the only file whose path differs from a name by upper and lower case alone."""
+    """Return the only file whose path differs from a name only by case."""
     here, parts = folder, []
     for part in PurePosixPath(name).parts:
         try:

@@ -28,17 +28,17 @@ class ObjParts:
     Attributes
     ----------
     positions, normals : (V, 3), (N, 3)
-        As listed.
+        Vectors as listed in the file.
     uvs : (U, 2)
-        As listed, v = 0 at the bottom row.
+        Texture coordinates as listed, v = 0 at the bottom row.
     counts : (F,)
         Corners of each face.
     corners : (C, 3)
-        Vertex, texture coordinate and normal of each; -1 if missing.
+        Vertex, texture coordinate and normal of each corner; -1 if missing.
     offsets : (F,)
         Offset of each face in the file.
     runs : dict of bytes to list of (int, str)
-        For ``usemtl``, ``g`` and ``o`` the names, and the index of the first face after each.
+        For ``usemtl``, ``g`` and ``o``: the names, and the index of the first face after each.
     libraries : list of (bytes, int)
         Text after each ``mtllib``, and its offset.
     """

@@ -1,8 +1,8 @@
 """State of the pickle machine: the bytes, a stack with marks, the memo, and a budget.
 
 A pickle is a program for a stack machine. The opcodes are implemented in ``steps.py``; this module
-holds the state that they share. Nothing is recursive, no length is trusted before the bytes are
-known to exist, and the budget bounds time and memory for any sequence of opcodes.
+contains the state that they share. Nothing is recursive, no length is trusted before the bytes are
+known to exist, and the budget limits time and memory for any sequence of opcodes.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Machine:
     at : int
         Offset of the next byte.
     stack : list
-        Values; those below the last mark cannot be reached at the moment.
+        Values; those below the last mark are currently inaccessible.
     memo : dict
         Values by index; a dict, so that a large index takes no memory.
     """
@@ -60,7 +60,7 @@ class Machine:
         return self.data[self.at - 1]
 
     def spend(self, count: int) -> None:
-        """Deduct a number of items from the budget; refuse a pickle that exceeds it."""
+        """Deduct a number of items from the budget; reject a pickle that exceeds it."""
         self._budget -= count
         if self._budget < 0:
             raise self.fail(Phrase("pickle-steps", most=_MAX_STEPS))
@@ -73,7 +73,7 @@ class Machine:
         return int.from_bytes(self.data[start : self.at], "little", signed=is_signed)
 
     def skip(self, size: int) -> int:
-        """Skip bytes that must exist, and return the offset of the first."""
+        """Skip bytes, which must exist, and return the offset of the first."""
         start = self.at
         if size < 0 or size > len(self.data) - start:
             raise self.cut_short(size, len(self.data) - start)

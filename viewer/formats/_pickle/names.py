@@ -1,4 +1,4 @@
-"""Allowlist of the names that a pickle may use, and of their uses.
+"""Allowlist of the names that a pickle may use, and of their permitted uses.
 
 ``find`` looks up a pair of module and name in a literal table. It imports nothing and returns a
 stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy and Python
@@ -61,7 +61,7 @@ _LONGEST_NAME = 200
 _LONGEST_KEY = 1 << 16
 _LARGEST_KEY = 1 << 60
 _MOST_ARGUMENTS = 6
-_WRONG = object()  # returned by a call for unusual arguments
+_WRONG = object()  # returned for a call with unusual arguments
 
 
 def find(module: str, name: str) -> StandIn:
@@ -80,7 +80,7 @@ def find(module: str, name: str) -> StandIn:
 
 
 def call(function: object, arguments: object) -> tuple[object, int]:
-    """Return the result of a function for its arguments, and the number of copied items.
+    """Return the result of a function call, and the number of copied items.
 
     Parameters
     ----------
@@ -129,8 +129,8 @@ def as_key(value: object) -> str | bytes | int:
     Raises
     ------
     MisfitError
-        If it has another type. Objects are refused so that their hashes are never computed,
-        large numbers because they can be chosen so that all their hashes collide.
+        If it has another type. Objects are refused so that their hashes are never computed; large
+        numbers are refused because they could be chosen so that all hashes collide.
     """
     if isinstance(value, str | bytes):
         return value

@@ -1,13 +1,13 @@
-"""Reader of pickles of arrays and plain data, without Python's unpickler and without running code.
+"""Reader of pickles with arrays and plain data, which neither unpickles nor runs code.
 
 ::
 
     reading.py this file: the pickle must be a dict of named values
     steps.py        the opcodes of protocols 0 to 5
     machine.py      bytes, stack, memo and budget of the machine that executes them
-    names.py        the names that are allowed, and the arguments that they take
-    values.py       inert values that represent these names
-    resolving.py    conversion of values to arrays, sparse matrices and plain data, key by key
+    names.py        the allowed names and their arguments values.py       inert values that
+    represent these names resolving.py    conversion of values to arrays, sparse matrices and plain
+    data, key by key
 
 Arrays are views of the file's bytes. They are often unaligned, so an array that is used in a loop
 should be copied first.
@@ -32,7 +32,7 @@ def open_pickle(source: Source) -> Archive:
     Parameters
     ----------
     source : Source
-        Its bytes stay in memory as long as any of the arrays exists.
+        Pickle, whose bytes stay in memory as long as any of the arrays exists.
     """
     machine = Machine(source)
     whole = run(machine)

@@ -31,7 +31,7 @@ _NUMBERS = "biuf"
 
 
 class _EndlessError(Exception):
-    """A value that contains itself, or repeats itself far beyond the size of its file."""
+    """A value that contains itself, or expands far beyond the size of its file."""
 
 
 def resolve(path: Path, size: int, key: str, value: object) -> Value:
@@ -42,7 +42,7 @@ def resolve(path: Path, size: int, key: str, value: object) -> Value:
     path : Path
         The file, for messages.
     size : int
-        Its length in bytes; without shared values, no value can have more items.
+        Length of the file in bytes; without shared values, no value can have more items.
     key : str
         The name of the value, for messages.
     value : object
@@ -124,7 +124,7 @@ class _Resolver:
         return later.values()
 
     def expression(self, value: Instance, depth: int) -> Deferred | Opaque:
-        """Return the array that a chumpy object represents, if it is known without computing."""
+        """Return the array that a chumpy object represents, if it is known without evaluation."""
         state = value.state or {}
         name = value.of.name
         if depth > _DEEPEST_EXPRESSION:

@@ -1,6 +1,6 @@
 r"""Opcodes of pickles, protocols 0 to 5.
 
-They are named as in Python's ``pickletools``. Those that reach outside the file are refused:
+They are named as in Python's ``pickletools``. Opcodes that reach outside the file are refused:
 persistent ids, extension codes and out-of-band buffers. Names are resolved in ``names.py``.
 """
 
@@ -51,7 +51,7 @@ def run(machine: Machine) -> object:
 
 
 def _guarded(machine: Machine, action: Callable[[], Result]) -> Result:
-    """Convert refusals of names, arguments and strings to errors that name the file."""
+    """Convert refusals of names, arguments and strings to errors that give the file."""
     try:
         return action()
     except UnicodeError:

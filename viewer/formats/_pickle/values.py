@@ -25,7 +25,7 @@ __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
 
 _MOST_AXES = 32
 _PIECE = 1 << 20  # bytes converted at a time
-_LONGEST_SIDE = 1 << 62  # bounds products of sizes, so that they can be printed
+_LONGEST_SIDE = 1 << 62  # limits products of sizes, so that they can be printed
 
 
 class Span:
@@ -139,7 +139,7 @@ class Array:
     shape : tuple of int
         Shape of the stored values.
     dtype : dtype or None
-        None if the array is not evaluated; then ``what`` says why.
+        Element type; None if the array is not evaluated, with the reason in ``what``.
     axes : tuple of int, optional
         Order of the stored axes in the array.
     """

@@ -1,4 +1,4 @@
-"""Names missing from the PIG model's files: joints and keypoints, from its authors' figures."""
+"""Joint and keypoint names missing in the PIG model's files, from its authors' figures."""
 
 from __future__ import annotations
 
@@ -36,4 +36,4 @@ KEYPOINTS = (
     ("tail", "v", 7903),
     ("centre", "j", 2),
 )
-"""The 19 of the authors' 23 keypoints that are defined: name, vertex or joint, index."""
+"""The 19 defined keypoints of the authors' 23: name, vertex or joint, index."""

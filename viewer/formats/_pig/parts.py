@@ -72,7 +72,7 @@ class Part:
     offset_of: Callable[[int], int] | None = None
 
     def offset(self, row: int) -> int | None:
-        """Return the offset of a row in the file, None for archives."""
+        """Return the offset of a row in the file; None for archives."""
         return None if self.offset_of is None else self.offset_of(row)
 
     def item(self, row: int | None = None) -> Phrase | str:
@@ -87,7 +87,7 @@ class Part:
         return self.offset(min(wanted, len(self.values) - 1))
 
     def remember(self, kind: str, row_of: Callable[[int], int]) -> None:
-        """Register a function that finds the row of an element, see ``Source.remember``."""
+        """Register a function that finds the row of an element; see ``Source.remember``."""
         offset_of = self.offset_of
         if offset_of is not None:
             self.source.remember(kind, lambda index: offset_of(row_of(index)))
@@ -108,7 +108,7 @@ def open_parts(source: Source) -> PigFiles:
     Raises
     ------
     FormatError
-        If a required array is missing; the message names all missing ones.
+        If a required array is missing; the message lists all missing arrays.
     """
     return _from_folder(source) if source.is_folder else _from_archive(source)
 
@@ -173,7 +173,7 @@ def _archive_part(source: Source, name: str, columns: int) -> Part:
 
 
 def _entries(archive: Archive, name: str) -> tuple[NDArray[Any], NDArray[Any], Floats]:
-    """Return joint, vertex and weight of each entry of a J x V matrix, or a V x J one."""
+    """Return joint, vertex and weight of each entry of a J x V or V x J matrix."""
     n_joints, n_vertices = _rows(archive, "t_pose_joints"), _rows(archive, "vertices")
     is_turned = getattr(archive.get(name), "shape", ()) == (n_vertices, n_joints) != (n_joints,) * 2
     sides = (n_vertices, n_joints) if is_turned else (n_joints, n_vertices)

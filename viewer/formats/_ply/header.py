@@ -54,7 +54,7 @@ class Header:
     Attributes
     ----------
     order : "", "<" or ">"
-        Empty for text, else the byte order.
+        Byte order; empty for text.
     elements : list of Element
         In file order.
     comments : list of (str, int)
@@ -75,7 +75,7 @@ def read_header(source: Source) -> Header:
     Raises
     ------
     FormatError
-        If a line is invalid; gives the line.
+        If a line is invalid; the error has the line.
     """
     header = Header()
     position, number, has_format = 0, 0, False
@@ -107,7 +107,7 @@ def _no_ply(source: Source, line: bytes) -> FormatError:
 
 
 def _behind(data: bytes, match: re.Match[bytes]) -> int:
-    """Return the offset of the data, whose first byte may look like the LF of a CR LF."""
+    """Return the offset of the data, whose first byte may resemble the LF of a CR LF."""
     if match[2] == b"\r\n" and not data.startswith((b"ply\r\n", b"ply \r\n")):
         return match.end() - 1
     return match.end()

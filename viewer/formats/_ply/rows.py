@@ -29,7 +29,7 @@ class Table:
     Attributes
     ----------
     element : Element
-        Its declaration in the header.
+        Declaration of the element in the header.
     columns : dict of str to (N,)
         Properties of the element that are not lists.
     lists : dict of str to ((N,), (M,))
@@ -37,7 +37,7 @@ class Table:
     offsets : (N,) or None
         Offset of each row; None in a binary file.
     is_first : bool
-        Whether it is the first element of its name; further ones are read and dropped.
+        Whether it is the first element with its name; later ones are read and discarded.
     """
 
     element: Element
@@ -192,7 +192,7 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn of lines after those of the last element."""
+        """Warn about lines after those of the last element."""
         left = len(self.firsts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)
@@ -229,7 +229,7 @@ class _Binary:
         self.data, self.position = source.data, header.end
 
     def begin(self, element: Element) -> Places:
-        """Return the offset of each row: at once if all have one size, else by following counts."""
+        """Return the offset of each row; rows of different sizes are followed by their counts."""
         sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
         sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
         left = len(self.data) - self.position
@@ -283,7 +283,7 @@ class _Binary:
     def _walked(self, element: Element) -> Places:
         """Return the starts of rows, followed one by one because their lists differ in length.
 
-        One iteration per face; files with triangles only never need this.
+        This takes one iteration per face; files that contain only triangles never need it.
         """
         starts = np.empty(element.count, dtype=np.int64)
         place, end = self.position, len(self.data)
@@ -303,7 +303,7 @@ class _Binary:
         size = int(kind[1])
         if len(cursor) == 0:
             return np.zeros(0, dtype=kind), cursor
-        # A window the size of a number at every byte, as rows need not be aligned.
+        # There is a window of the size of a number at every byte, as rows need not be aligned.
         windows = np.ndarray(
             len(self.data) - size + 1, dtype=self.order + kind, buffer=self.data, strides=(1,)
         )
@@ -330,7 +330,7 @@ class _Binary:
             self.position = int(cursor[-1])
 
     def finish(self) -> None:
-        """Warn of bytes after those of the last element."""
+        """Warn about bytes after those of the last element."""
         left = len(self.data) - self.position
         if left:
             self.source.warn("F006.ply-bytes", n=left)

@@ -26,8 +26,8 @@ from viewer.rig.arrays import Deferred, Floats
 
 __all__ = ["NamedValues", "described", "parse_json"]
 
-_DEEPEST = 500  # nesting level at which a text too deeply nested for Python is reported
-_MOST_DIGITS = 18  # digits of integers that certainly fit 64 bits; longer ones are read as floats
+_DEEPEST = 500  # nesting level at which a text that is nested too deeply for Python is reported
+_MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class NamedValues:
     def offset(self, *path: str | int) -> int | None:
         """Return the offset of a value by the keys and indices that lead to it.
 
-        If the value is missing, this is the offset of the nearest container; None for archives.
+        If the value is missing, return the offset of the nearest container; None for archives.
         """
         if self.text is None:
             return None
@@ -82,7 +82,7 @@ class NamedValues:
         Raises
         ------
         FormatError
-            If a value is of a different kind; gives the line of the first.
+            If a value is of a different kind; the error has the line of the first.
         """
         value = self.values.get(key)
         try:
@@ -114,7 +114,8 @@ def parse_json(source: Source) -> NamedValues:
     Raises
     ------
     FormatError
-        If the JSON is invalid or contains NaN, an infinity or a repeated key; gives the line.
+        If the JSON is invalid or contains NaN, an infinity or a repeated key; the error has the
+        line.
     """
     text = source.data.decode("utf-8", "surrogateescape")
     odd: set[str] = set()  # accepted by Python but not by JSON
@@ -145,8 +146,8 @@ def parse_json(source: Source) -> NamedValues:
 
 
 def _whole(digits: str) -> int | float:
-    # Python refuses to convert very long integers. As infinite floats they are reported with a
-    # line.
+    # Python refuses to convert very long integers. Converted to infinite floats, they are reported
+    # with a line.
     return int(digits) if len(digits) <= _MOST_DIGITS else float(digits)
 
 
@@ -169,7 +170,7 @@ def _byte_offset(text: str, place: int) -> int:
 def _odd_value(value: Any, kinds: str) -> tuple[tuple[int, ...] | None, Any]:
     """Return the indices of the first value of a different kind in nested lists, and the value.
 
-    The indices are None if there is no such value, so that the lists are ragged.
+    The indices are None if there is no such value, which means that the lists are ragged.
     """
     if not isinstance(value, list | tuple):
         return (), value

@@ -27,12 +27,12 @@ KEYS = (
 """Keys that are read; all are ignored if the first is missing."""
 
 _UPS = ("y", "z")
-_SHORTEST = 1e-6  # length of a quaternion; a shorter one defines no reliable rotation
+_SHORTEST = 1e-6  # length of a quaternion; a shorter quaternion defines no reliable rotation
 _LONGEST_WORD = 200  # characters
 
 
 def read_rotations(named: NamedValues) -> JointRotations | None:
-    """Return the joint rotations in a pose file, None if there are none.
+    """Return the joint rotations in a pose file, or None.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def read_rotations(named: NamedValues) -> JointRotations | None:
     Raises
     ------
     FormatError
-        If they are incomplete or not quaternions.
+        If the rotations are incomplete or not quaternions.
     """
     values = named.values
     if values.get("joint_turns") is None:
@@ -65,7 +65,7 @@ def read_rotations(named: NamedValues) -> JointRotations | None:
 
 
 def named_rotations(rotations: JointRotations) -> dict[str, Any]:
-    """Return joint rotations by their keys in files; transforms at rest are omitted."""
+    """Return joint rotations by their keys in files; rest transforms are omitted."""
     named: dict[str, Any] = {
         "figure": printable(rotations.figure, _LONGEST_WORD),
         "up": rotations.up,

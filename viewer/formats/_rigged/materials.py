@@ -3,8 +3,8 @@
 ::
 
     material_names (M,)   material_textures (M,)   image_0 (H, W, 4) …            base colours
-    material_records (M,): JSON, the other fields of each material that are not at their default
-    picture_0 (H, W, 4) …                          images of the other textures, each once
+    material_records (M,): JSON, other fields of each material that differ from the default
+    picture_0 (H, W, 4) …                          images of the other textures, without duplicates
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _RECORDS = "material_records"
 
 
 def material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    """Return the arrays that hold a mesh's materials; none if it has no material."""
+    """Return the arrays that describe a mesh's materials; none if it has no material."""
     if not mesh.materials:
         return {}
     arrays: dict[str, NDArray[Any]] = {
@@ -50,7 +50,7 @@ def material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
 
 
 def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[str, Any]:
-    """Return the fields that are not at their default, as plain data."""
+    """Return the fields that differ from their defaults, as plain data."""
     record: dict[str, Any] = {}
     for name in _NUMBERS:
         if getattr(material, name) != getattr(_PLAIN_MATERIAL, name):

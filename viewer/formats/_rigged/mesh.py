@@ -3,7 +3,7 @@
 ::
 
     positions (V, 3)   triangles (T, 3)   uvs (U, 2)   uv_triangles (T, 3)            at rest
-    second_uvs (U, 2)   uvs_2 (U, 2) …                           further texture coordinates
+    second_uvs (U, 2)   uvs_2 (U, 2) …                           other texture coordinates
     colors (V, 4)   part_names (P,)   triangle_parts (T,)
     triangle_materials (T,)   and the materials, see ``materials.py``
 """
@@ -28,7 +28,7 @@ __all__ = ["mesh_arrays", "read_mesh"]
 
 
 def mesh_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    """Return the arrays that hold a mesh with its materials; normals are not stored."""
+    """Return the arrays of a mesh with its materials; normals are not stored."""
     arrays: dict[str, NDArray[Any] | None] = {
         "positions": mesh.positions,
         "triangles": mesh.triangles,
@@ -90,5 +90,5 @@ def _finite(archive: Archive, key: str, shape: tuple[int | None, ...], part: Par
 
 
 def _optional(archive: Archive, key: str, shape: tuple[int | None, ...]) -> NDArray[Any] | None:
-    """Return an array, None if the archive does not have it."""
+    """Return an array; None if the archive does not have it."""
     return archive.array(key, shape).values() if archive.has(key) else None

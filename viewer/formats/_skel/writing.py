@@ -36,7 +36,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     figure : Figure
         Figure with a skeleton in depth-first order, with rotation DOFs and without rest rotations.
     path : str or Path
-        Replaced only when the whole text has been written.
+        File, replaced only when the whole text has been written.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def _lines(skeleton: Skeleton) -> list[str]:
 
 
 def _indent(open_joints: list[int]) -> str:
-    # A chain of n joints indented in full would take n^2 bytes.
+    # A fully indented chain of n joints would take n^2 bytes.
     return "\t" * min(len(open_joints), _DEEPEST)
 
 

@@ -27,7 +27,7 @@ Word = re.Match[bytes]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Range of a section's numbers, from which errors determine the line of a word.
+    """Range of a section's numbers, from which the line of an error is determined.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Block:
 def find_block(source: Source, name: str, header: Word, position: int) -> Block:
     """Return the range of a section's numbers; only weights may omit the opening brace.
 
-    ``position`` is the offset after the section's count, or after its keyword without a count.
+    ``position`` is the offset after the section's count, or after its keyword if there is no count.
     """
     stated = position - 1
     brace = source.next_word(position)
@@ -101,14 +101,14 @@ def words_of(source: Source, block: Block) -> Words:
 
 
 def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> FormatError:
-    """Return the error for a block interrupted by ``found``; None is the end of the file."""
+    """Return the error for a block interrupted by ``found``, or by the end of the file if None."""
     line = source.line(block.header)
     return source.fault("F002.unclosed", offset, section=block.name, line=line, found=found)
 
 
 def to_whole(values: Floats) -> tuple[Ints, int]:
-    """Return numbers as int32, and the index of the first one changed by this, -1 for none."""
+    """Return numbers as int32, and the index of the first number that this changed, or -1."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
-    whole.flags.writeable = False  # so that it need not be copied
+    whole.flags.writeable = False  # a read-only array need not be copied
     return whole, int(differs.argmax()) if differs.any() else -1

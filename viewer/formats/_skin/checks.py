@@ -24,7 +24,7 @@ __all__ = [
     "unbound_skin",
 ]
 
-WEIGHT_TOLERANCE = 0.01  # tolerance of the format; sums further from 1 cause a warning
+WEIGHT_TOLERANCE = 0.01  # tolerance of the format; sums farther from 1 cause a warning
 _SINGULAR = 1e-12  # determinant relative to the product of the column lengths
 _NEARLY_SINGULAR = 1e6  # condition number
 _FAR = 1e6  # a vertex this many times the median distance away is stray
@@ -33,7 +33,7 @@ _FAR = 1e6  # a vertex this many times the median distance away is stray
 def even_counts(source: Source, sections: Sections) -> None:
     """Refuse sections whose number of vertices differs from that of the positions.
 
-    If all other sections agree, the positions are wrong.
+    If all other sections agree, the positions are assumed to be wrong.
     """
     tables = sections.tables
     counts = {name: len(table) for name, table in tables.items()}
@@ -83,7 +83,7 @@ def even_counts(source: Source, sections: Sections) -> None:
 
 def _fit_weights(sections: Sections, count: int) -> None:
     """Drop the influences of surplus vertices, and add missing vertices without influences."""
-    assert sections.starts is not None  # the caller checked it
+    assert sections.starts is not None  # checked by the caller
     starts = sections.starts[: count + 1]
     sections.starts = np.pad(starts, (0, count + 1 - len(starts)), mode="edge")
     sections.joints = sections.joints[: starts[-1]]
@@ -92,7 +92,7 @@ def _fit_weights(sections: Sections, count: int) -> None:
 
 def unbound_skin(sections: Sections) -> Skin:
     """Return the skin of a file without bindings, with the joints bound at their rest positions."""
-    assert sections.starts is not None  # the caller checked it
+    assert sections.starts is not None  # checked by the caller
     fits = sections.joints >= 0
     joints = np.where(fits, sections.joints, 0).astype(np.int32)
     count = int(joints.max(initial=0)) + 1
@@ -109,7 +109,7 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
         source.warn("F005.skin-texture", sections.offsets["material"])
     # A sample of a few thousand vertices is enough to locate the figure.
     some = mesh.positions[:: max(1, mesh.n_vertices // 4096)]
-    # The middle value instead of np.median, whose import of numpy.ma takes 14 ms at start-up.
+    # The middle value replaces np.median, whose import of numpy.ma takes 14 ms at start-up.
     middle = len(some) // 2
     center = np.partition(some, middle, axis=0)[middle]
     typical = float(np.partition(np.abs(some - center).max(axis=1), middle)[middle])
@@ -155,8 +155,8 @@ def checked_triangles(source: Source, sections: Sections, n_vertices: int) -> In
 
 
 def invert_bindings(source: Source, sections: Sections) -> Floats:
-    """Return the inverse bind matrices, (J, 4, 4); refuse bindings not invertible in float32."""
-    assert sections.bindings is not None  # the caller checked it
+    """Return the inverse bind matrices, (J, 4, 4); refuse bindings that are singular in float32."""
+    assert sections.bindings is not None  # checked by the caller
     linear = sections.bindings[:, :3, :3]
     lengths = np.linalg.norm(linear, axis=1).prod(axis=1)
     determinants = np.linalg.det(linear)
@@ -201,7 +201,7 @@ def checked_influences(source: Source, sections: Sections, n_joints: int) -> tup
     fits = (joints >= 0) & (joints < n_joints)
     if fits.all():
         return joints, weights
-    assert sections.starts is not None  # the caller checked it
+    assert sections.starts is not None  # checked by the caller
     wrong = np.flatnonzero(~fits)
     vertices = np.searchsorted(sections.starts, wrong, side="right") - 1
     vertex = int(vertices[0])

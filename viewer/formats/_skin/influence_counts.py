@@ -19,12 +19,13 @@ def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
     """Return the positions of the vertices' counts, (V,); None if they do not fill the block.
 
     Each count determines the position of the next, so they form a linked list. Composing the map
-    from each position to the next with itself four times lets each step of the loop skip 16.
+    from each position to the next with itself four times lets each step of the loop skip 16
+    vertices.
     """
     size = len(values)
     if count == 0:
         return None if size else np.zeros(0, np.int32)
-    # Two extra positions, the end of the block and one beyond it; both map to the latter.
+    # There are two extra positions, the end of the block and one beyond it; both map to the latter.
     kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
     after = np.full(size + 2, size + 1, dtype=kind)
     counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)

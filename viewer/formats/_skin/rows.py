@@ -2,7 +2,7 @@
 
 A valid block is parsed at once. Otherwise every word is examined: each error is recorded and the
 value replaced by NaN. Line breaks have no meaning in the format, but most files have one vertex or
-triangle per line. If so, a line of a wrong length does not affect the others.
+triangle per line. In this case, a line of the wrong length does not affect the others.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def read_rows(
     block : Block
         Range of the numbers.
     count : int
-        Number of rows declared by the file; the actual number has precedence.
+        Number of rows declared by the file; the actual number takes precedence.
     width : int
         Numbers per row.
     first : int
@@ -60,18 +60,18 @@ def read_rows(
     Returns
     -------
     rows : (N, width)
-        NaN for words that are not numbers, and in rows with more or fewer numbers.
+        Values; NaN for words that are not numbers, and in rows with more or fewer numbers.
     offset_of : callable
         Returns the offset of a row.
 
     Raises
     ------
     FormatError
-        If it is unknown where the rows begin.
+        If the start of the rows is unknown.
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
-        values.flags.writeable = False  # lets the mesh use it without a copy
+        values.flags.writeable = False  # the mesh can use a read-only array without a copy
         begin, end = block.start, block.end
         return values.reshape(count, width), lambda row: source.number_offset(
             begin, end, width * row
@@ -150,14 +150,14 @@ def _no_rows(source: Source, block: Block, total: int, count: int, width: int) -
 
 
 def whole_corners(source: Source, rows: Floats, offset_of: OffsetOf, first: int) -> Ints:
-    """Return triangles as integers, ``LOST`` for corners that are not: (T, 3).
+    """Return triangles as integers, ``LOST`` for corners that are not integers: (T, 3).
 
     Parameters
     ----------
     source : Source
         The file, which records the errors.
     rows, offset_of : (T, 3), callable
-        Results of ``read_rows``, which has recorded the errors it found.
+        Results of ``read_rows``, which has recorded its errors.
     first : int
         Index of the first triangle, for messages.
     """

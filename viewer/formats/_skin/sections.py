@@ -76,7 +76,7 @@ def read_sections(source: Source) -> Sections:
     Raises
     ------
     FormatError
-        With file and line, if the text breaks the grammar.
+        If the text violates the grammar; the error has the file and line.
     """
     sections = Sections()
     extra_braces = 0

@@ -1,12 +1,12 @@
 """Parser for long blocks of decimal numbers, in numpy, exact as ``float()`` above 5e-324.
 
-Eight characters are treated as one 64-bit word ("SIMD within a register"). A number with at
-most 15 digits is an integer below 2^53 divided by a power of ten not above 10^22, both exact
-in float64, so the quotient is the correctly rounded value (Clinger 1990). Words that are
-longer or have an exponent go through ``float()``, one by one.
+Eight characters are treated as one 64-bit word ("SIMD within a register"). A number with at most 15
+digits is an integer below 2^53 divided by a power of ten of at most 10^22, both exact in float64,
+so the quotient is the correctly rounded value (Clinger 1990). Words that are longer or have an
+exponent are converted by ``float()``, one by one.
 
-Grammar of a number: ``[+-]? (digits [. digits?] | . digits) ([eE] [+-]? digits)? [fF]?``. That is
-stricter than ``float()``, which takes ``nan``, ``1_000`` and digits of other scripts.
+Grammar of a number: ``[+-]? (digits [. digits?] | . digits) ([eE] [+-]? digits)? [fF]?``. This is
+stricter than ``float()``, which accepts ``nan``, ``1_000`` and digits of other scripts.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ _NOT_FINITE = re.compile(
     rb"[+-]?(?:nan(?:\(\w*\))?|inf(?:inity)?|1\.?#(?:q?nan|snan|ind|inf)\w*)", re.IGNORECASE
 )
 _NOT_ZERO = re.compile(rb"[+-]?[0.]*[1-9]")
-_SMALLEST = float(np.nextafter(0.0, 1.0))  # smallest float64 above 0
+_SMALLEST = float(np.nextafter(0.0, 1.0))  # smallest positive float64
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
-_CHUNK = 1 << 17  # bytes; temporaries stay inside the processor's cache
+_CHUNK = 1 << 17  # bytes; temporary arrays stay in the processor's cache
 _PAD = 16  # bytes before a chunk, so that the first words can be read as 16 characters
 _MANTISSA_DIGITS = 15
 
@@ -71,7 +71,7 @@ def is_number(word: bytes) -> bool:
 def to_number(word: bytes) -> float | None:
     """Return a word's value, or None if it is not a finite number that a float32 can represent.
 
-    A number other than 0 stays different from 0, however small.
+    A nonzero number never becomes 0, however small it is.
 
     >>> to_number(b"2.5f"), to_number(b"1e-400")
     (2.5, 5e-324)
@@ -111,7 +111,7 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     data : bytes
         The file.
     start, end : int
-        The part of it to parse.
+        The part of the data to parse.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def parse_words(data: bytes, start: int, end: int) -> Floats:
     data : bytes
         The file.
     start, end : int
-        The part of it to parse.
+        The part of the data to parse.
 
     Returns
     -------
@@ -253,7 +253,7 @@ def _parse_long(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Parse unsigned words of 9 to 16 characters.
 
-    If a word has several points, one is left over and is then found not to be a digit.
+    If a word has several points, one remains and is then rejected as a digit.
     """
     low = windows.take(ends - 8).view("<u8")
     high = _digits_only(windows.take(ends - 16).view("<u8"), np.minimum(lengths - 8, 8))

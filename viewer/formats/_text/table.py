@@ -42,7 +42,7 @@ def read_table(
     Raises
     ------
     FormatError
-        For a row with more or fewer numbers, or a word that is not a number; gives its line.
+        If a row has more or fewer numbers, or a word is not a number; the error has the line.
     """
     values, bad = parse_numbers(source.data, 0, len(source.data))
     if bad < 0 and len(values) and _is_regular(source, columns, len(values)):
@@ -57,7 +57,7 @@ def read_numbers(source: Source) -> Floats:
     Raises
     ------
     FormatError
-        For a word that is not a number; gives its line.
+        If a word is not a number; the error has the line.
     """
     data = source.data
     values, bad = parse_numbers(data, 0, len(data))
@@ -76,7 +76,7 @@ def _is_regular(source: Source, columns: int, count: int) -> bool:
     letters = np.frombuffer(source.data, dtype=np.uint8)
     is_space = letters <= 32  # control characters have been refused with the numbers
     begins = np.flatnonzero(~is_space & np.concatenate([[True], is_space[:-1]]))
-    # Each run of `columns` words must lie on a line of its own.
+    # Each run of `columns` words must be on a separate line.
     ends = np.flatnonzero((letters == 10) | (letters == 13))
     rows = np.searchsorted(ends, begins).reshape(-1, columns)
     return bool((rows[:, 0] == rows[:, -1]).all() and (rows[1:, 0] > rows[:-1, -1]).all())

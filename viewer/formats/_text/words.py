@@ -30,11 +30,11 @@ class Words:
     data : bytes
         The file.
     values : (N,)
-        Their numbers; NaN for a word that is not a number.
+        Values; NaN for a word that is not a number.
     offsets : (N,)
         Position of each word in the file, in bytes.
     lines : (N,)
-        Index of each word's line: equal for words of one line, otherwise increasing.
+        Index of each word's line: equal for words on the same line, otherwise increasing.
     """
 
     data: bytes
@@ -86,11 +86,11 @@ def refuse_words(
     bad : (N,)
         Indices of the invalid words.
     named : callable
-        Returns the item of the file that the word with a given index belongs to.
+        Returns the item of the file to which the word with a given index belongs.
     part : str
         Part of the figure, see ``Diagnostic``.
     places : (N,)
-        Index of the vertex, triangle, joint or frame that each belongs to.
+        Index of the vertex, triangle, joint or frame to which each word belongs.
     """
     infinite = [is_infinite(words.word(index)) for index in bad.tolist()]
     for is_chosen in (True, False):

@@ -15,7 +15,7 @@ __all__ = ["Accumulation"]
 class Accumulation:
     """Adds images and draws their average.
 
-    Colours are premultiplied by alpha, so the average of the pixels is that of the coverage.
+    Colours are premultiplied by alpha, so averaging pixels averages their coverage.
 
     Parameters
     ----------

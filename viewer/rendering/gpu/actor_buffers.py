@@ -46,7 +46,7 @@ class ActorBuffers:
     programs : Programs
         Provides the skinning programs.
     cube : moderngl.Buffer
-        Vertices of the cube that boxes are instances of.
+        Vertices of the cube, of which boxes are instances.
     notes : list of str
         Receives messages about limitations of the driver.
     forget : callable

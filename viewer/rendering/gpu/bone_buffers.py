@@ -1,4 +1,4 @@
-"""Instances of the shapes that a skeleton is drawn with, moved by its joint matrices."""
+"""Instances of the shapes of a skeleton, moved by its joint matrices."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class BoneBuffers:
     context : moderngl.Context
         The context in use.
     skeleton : Skeleton
-        In its rest pose, which determines directions and sizes of ends without a child.
+        Skeleton in its rest pose, which determines directions and sizes of ends without a child.
     style : str
         ``"octahedra"``, ``"sticks"`` or ``"axes"``.
     """

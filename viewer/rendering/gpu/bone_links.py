@@ -15,7 +15,7 @@ from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
 
 __all__ = ["BoneLinks", "bone_links"]
 
-_END = 0.4  # length of an end, relative to the bone before it
+_END = 0.4  # length of an end, relative to the previous bone
 _END_LIMITS = 0.01, 0.07  # minimum and maximum, relative to the figure's size
 _AXIS = 0.4  # length of axes, relative to the shortest bone at the joint
 _AXIS_LIMITS = 0.008, 0.06  # minimum and maximum, relative to the figure's size
@@ -32,7 +32,7 @@ class BoneLinks:
     joints : (K,) int32
         Joints that are drawn.
     ids : (N, 3) int32
-        Joint; its child, -1 for an end; the joint's axis that lies most across the bone.
+        Joint; its child, -1 for an end; the joint's axis that is most perpendicular to the bone.
     ends : (N, 4)
         For an end, its direction in joint space and its length in figure units; otherwise 0.
     longest : (J,)
@@ -40,7 +40,7 @@ class BoneLinks:
     axis_lengths : (J,)
         Length of the axes drawn at each joint, figure units.
     size : float
-        Size that widths are derived from, figure units.
+        Size from which widths are derived, figure units.
     """
 
     joints: Ints
@@ -54,9 +54,9 @@ class BoneLinks:
 def bone_links(skeleton: Skeleton) -> BoneLinks:
     """Return the links of a skeleton.
 
-    A joint with several children has a bone to each. One without children has a short end in the
-    direction of the bone before it if it can rotate, so that its rotation is visible. Bones between
-    coincident joints have length 0.
+    A joint with several children has a bone to each. A joint without children has a short end in
+    the direction of the previous bone if it can rotate, so that its rotation is visible. Bones
+    between coincident joints have length 0.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
 
 
 def _size(points: Floats, lengths: Floats) -> float:
-    """Return the size of a figure, without a root that is far from everything else."""
+    """Return the size of a figure, excluding a root that is far from everything else."""
     whole = box_size(bounding_box(points))
     long = float(np.quantile(lengths, 0.9)) if len(lengths) else 0.0
     return (min(whole, _REACH * long) if long > 0.0 else whole) or 1.0

@@ -1,4 +1,4 @@
-"""Shapes that skeletons are drawn with: octahedron, stick, arrow and ball, as triangles."""
+"""Shapes of drawn skeletons: octahedron, stick, arrow and ball, as triangles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["arrow", "ball", "octahedron", "stick"]
 _Point: TypeAlias = tuple[float, float, float]
 
 _WIDEST = 0.12  # where an octahedron is widest: fraction of the length from the joint
-_FLATNESS = 0.7  # thickness over width, so that a quarter turn about the length is visible
+_FLATNESS = 0.7  # thickness over width, so that a 90-degree rotation about the length is visible
 _SIDES = 8  # of sticks and arrows
 _TIP = 0.72  # where the tip of an arrow begins, as a fraction of the length
 _TIP_WIDTH = 2.4  # in widths of its shaft
@@ -28,8 +28,8 @@ def octahedron() -> Floats:
     Returns
     -------
     (N, 7)
-        Corners of triangles: x and z in half-widths, y in lengths; their normals, which are 0 where
-        triangles are flat; the tint, 1 for the ridge, which shows the roll.
+        Corners of triangles: x and z in half-widths, y in lengths; normals, 0 for flat triangles;
+        tint, 1 for the ridge, which shows the roll.
     """
     ring = [(1.0, _WIDEST, 0.0), (0.0, _WIDEST, _FLATNESS)]
     ring += [(-1.0, _WIDEST, 0.0), (0.0, _WIDEST, -_FLATNESS)]
@@ -41,17 +41,17 @@ def octahedron() -> Floats:
 
 
 def stick() -> Floats:
-    """Return a prism from a joint to its child, with a ridge; rows as those of ``octahedron``."""
+    """Return a prism from a joint to its child, with a ridge; rows as in ``octahedron``."""
     return np.concatenate([_tube([(0.0, 1.0), (1.0, 1.0)], 0.0), _ridge(0.9, 0.4, 2.3, 0.95)])
 
 
 def arrow() -> Floats:
-    """Return an arrow in the colour of its axis; rows as those of ``octahedron``."""
+    """Return an arrow in the colour of its axis; rows as in ``octahedron``."""
     return _tube([(0.0, 1.0), (_TIP, 1.0), (_TIP, _TIP_WIDTH), (1.0, 0.0)], 1.0)
 
 
 def ball() -> Floats:
-    """Return a ball of radius 1 with smooth normals; rows as those of ``octahedron``."""
+    """Return a ball of radius 1 with smooth normals; rows as in ``octahedron``."""
     corners = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     points = np.array(corners, dtype=np.float64)
     faces = [(0, 2, 4), (4, 2, 1), (1, 2, 5), (5, 2, 0), (4, 3, 0), (1, 3, 4), (5, 3, 1), (0, 3, 5)]

@@ -17,7 +17,7 @@ from viewer.rig.mesh import bounding_box
 __all__ = ["BoxBuffers", "joint_colors"]
 
 _GOLDEN = 0.618033988749895
-_MANY = 1000  # minimum number of boxes for which coincident ones are searched
+_MANY = 1000  # minimum number of boxes for which coincident boxes are searched
 
 
 def joint_colors(n_joints: int) -> Floats:
@@ -42,7 +42,7 @@ class BoxBuffers:
     cube : moderngl.Buffer
         Corners and normals of a cube from 0 to 1, shared by all boxes.
     boxes : (N, 2, 3)
-        Lower and upper corner of each.
+        Lower and upper corner of each box.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class BoxBuffers:
     def move(self, matrices: Floats, hides: bool = True) -> None:
         """Upload the boxes' matrices, (N, 4, 4) box to figure space; modified in place.
 
-        Of many coincident boxes only one is drawn if ``hides``.
+        If ``hides`` is true, only one of many coincident boxes is drawn.
         """
         self.center = bounding_box(matrices[:, :3, 3]).mean(axis=0)
         matrices[:, :3, 3] -= self.center

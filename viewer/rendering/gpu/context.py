@@ -1,4 +1,4 @@
-"""Headless OpenGL contexts, and explanations of every known failure."""
+"""Headless OpenGL contexts, and explanations of all known failures."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _EGL_ERRORS = {
     "0x3002": "EGL was denied access to the graphics device",
     "0x3003": "the driver is out of memory",
     "0x3008": "EGL does not accept this display",
-    "0x3009": "OpenGL 3.3 is needed and the driver does not offer it",
+    "0x3009": "OpenGL 3.3 is needed, but the driver does not offer it",
 }
 
 
@@ -49,14 +49,14 @@ def headless_context(device: int | None = None) -> moderngl.Context:
     Returns
     -------
     moderngl.Context
-        OpenGL 3.3 core or newer, current in this thread; the caller releases it.
+        OpenGL 3.3 core or newer, current in this thread; the caller must release it.
 
     Raises
     ------
     RenderError
-        With the cause and a remedy.
+        If there is no usable OpenGL; the message gives the cause and a remedy.
     ViewerError
-        If there are devices, but none of this index.
+        If there are devices, but none with this index.
     """
     if not sys.platform.startswith("linux"):
         return _create({})
@@ -79,7 +79,7 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     if sys.platform.startswith("linux"):
         # Explicit names avoid a search that starts other programs and takes 60 ms.
         settings |= {"backend": "egl", "libegl": _LIBEGL, "libgl": _LIBGL}
-        # Mesa would print its own messages before the useful one.
+        # Mesa would print its own messages before the useful message.
         os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
         with deferred():
@@ -91,12 +91,12 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
 
 
 def check_device(device: int) -> None:
-    """Raise for an index without a device; any is accepted if devices cannot be enumerated.
+    """Raise for an index without a device; any index is accepted if devices cannot be listed.
 
     Raises
     ------
     ViewerError
-        With the valid numbers.
+        If the index is invalid; the message gives the valid numbers.
     """
     count = device_count() if sys.platform.startswith("linux") else 0
     if device < 0 or (count and device >= count):
@@ -141,7 +141,7 @@ def explain(text: str) -> str:
         return f"{library} was not found ({_INSTALL}) [{text}]"
     if devices and int(devices.group(2)) == 0:
         return (
-            "EGL found 0 devices: in a container start it with NVIDIA_DRIVER_CAPABILITIES=all, "
+            "EGL found 0 devices: start containers with NVIDIA_DRIVER_CAPABILITIES=all, "
             f"or install Mesa for software rendering ({_INSTALL})"
         )
     if devices:
@@ -157,7 +157,7 @@ def explain(text: str) -> str:
     if "version" in text.lower():
         return f"OpenGL 3.3 is needed: {text}"
     if re.match(r"(GLX|WGL|NSGL|EGL): ", text):
-        return f"OpenGL 3.3 is needed and this display's driver does not offer it [{text}]"
+        return f"OpenGL 3.3 is needed, but this display's driver does not offer it [{text}]"
     return f"no OpenGL context: {text} ({_INSTALL})"
 
 
@@ -187,7 +187,7 @@ def check_errors(context: moderngl.Context, doing: str) -> None:
     Raises
     ------
     RenderError
-        With the renderer's name.
+        If there is an error; the message gives the renderer's name.
     """
     error = context.error
     if error == "GL_NO_ERROR":

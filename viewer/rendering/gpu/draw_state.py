@@ -1,4 +1,4 @@
-"""OpenGL state that is set for a block of draws and restored afterwards."""
+"""OpenGL state that is set for a block of draw calls and restored afterwards."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["opacities", "sides", "without_colors", "without_depth_test", "withou
 
 @contextmanager
 def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
-    """Draw without writing depth, so that later draws are not hidden."""
+    """Draw without writing depth, so that later draw calls are not hidden."""
     target = context.fbo
     target.depth_mask = False
     target.use()  # moderngl applies masks to OpenGL only when a framebuffer is bound
@@ -38,7 +38,7 @@ def without_colors(context: moderngl.Context) -> Iterator[None]:
 
 @contextmanager
 def without_depth_test(context: moderngl.Context) -> Iterator[None]:
-    """Draw regardless of depth, over previous draws."""
+    """Draw regardless of depth, over previous draw calls."""
     context.disable(moderngl.DEPTH_TEST)
     try:
         yield
@@ -54,14 +54,14 @@ def sides(
     blended: bool,
     is_mirrored: bool = False,
 ) -> Iterator[tuple[str, ...]]:
-    """Cull faces for some draws: yield the culled side of each.
+    """Cull faces for several draw calls: yield the culled side of each.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
     culled : bool
-        Whether back faces are left out of all surfaces.
+        Whether the back faces of all surfaces are culled.
     double_sided : bool
         Whether this surface has two sides.
     blended : bool
@@ -84,7 +84,7 @@ def sides(
 
 
 def opacities(context: moderngl.Context, hidden: float | None) -> Iterator[float]:
-    """Yield the opacity of each draw, first for hidden parts, then for visible ones.
+    """Yield the opacity of each draw call, first for hidden parts, then for visible ones.
 
     ``hidden`` is the opacity of hidden parts; None draws once, over everything.
     """

@@ -1,8 +1,8 @@
 """Index buffers of the drawn triangles, in an order that keeps neighbours together.
 
-GPUs cache the results of recent vertices, at most a few hundred. Files often list triangles
-in an order that misses this cache, so that every vertex is shaded three to five times; in the
-order of a space-filling curve it is shaded once or twice (``tests/bench/bench_instances.py``).
+GPUs cache the results of recent vertices, at most a few hundred. Files often list triangles in an
+order that does not benefit from this cache, so that every vertex is shaded three to five times; in
+the order of a space-filling curve, it is shaded once or twice (``tests/bench/bench_instances.py``).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """GPU buffers for an instanced draw of several actors with the same figure and shape.
 
 No posed vertices are stored: the vertex shader skins each instance with its own row of matrices.
-With software rendering this is faster than writing posed vertices and reading them back
+With software rendering, this is faster than writing posed vertices and reading them back
 (``tests/bench/bench_instances.py``). Every draw repeats the skinning, so views that draw a mesh
 several times use the posed buffers of single actors instead.
 """
@@ -106,7 +106,7 @@ class InstanceBuffers:
         Parameters
         ----------
         poses : sequence of A Pose
-            All with the same shape.
+            Poses, all with the same shape.
         how : Skinning
             Method and influences.
 
@@ -122,7 +122,7 @@ class InstanceBuffers:
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
         self._how, self._skinning_key, self.count = how, skinning_key, len(poses)
         if changed:
-            self._keys = []  # after an error everything is uploaded again
+            self._keys = []  # after an error, everything is uploaded again
             self._reserve(len(poses))
             # Sums of pose correctives differ between actors and are uploaded separately.
             self._rest.update(figure, poses[0], replace(how, correctives=False))
@@ -131,7 +131,7 @@ class InstanceBuffers:
         self._keys = keys
 
     def _reserve(self, count: int) -> None:
-        """Reserve space; textures grow by half, so that adding actors seldom reallocates."""
+        """Reserve space; textures grow by half, so that adding actors rarely reallocates."""
         if self._palette is not None and count <= len(self._rows):
             return
         room = max(count, len(self._rows) * 3 // 2)
@@ -178,7 +178,7 @@ class InstanceBuffers:
 
         Products are formed in float64: large translations cancel before the conversion to float32.
         """
-        assert self._instances is not None  # updated before
+        assert self._instances is not None  # guaranteed by update
         poses = [actor.pose for actor in actors if actor.pose is not None]
         model = view.matrix @ np.stack([actor.placement for actor in actors]) @ placements(poses)
         self.is_mirrored = bool(np.linalg.det(model[0, :3, :3]) < 0.0)
@@ -226,7 +226,7 @@ class InstanceBuffers:
     def array(
         self, program: moderngl.Program, indices: IndexSet | None = None
     ) -> moderngl.VertexArray:
-        """Return the vertex array for a program; without indices it draws single vertices."""
+        """Return the vertex array for a program; without indices, it draws single vertices."""
         mesh, skin = self.mesh, self.mesh.skin(self._how)
         listed = None if indices is None else indices.indices
         key = (id(listed), id(skin), id(self._rest.positions))

@@ -26,16 +26,16 @@ _MOST_VISIBLE = 64  # combinations of hidden parts whose runs are kept
 class MeshBuffers:
     """Rest vertices, triangle indices, influences and textures of one figure.
 
-    Along texture seams a vertex is uploaded once per texture coordinate, as several split vertices.
-    Positions are stored relative to the centre of the mesh, so that float32 keeps its precision
-    however far the mesh is from the origin.
+    Along texture seams, a vertex is uploaded once per texture coordinate, as several split
+    vertices. Positions are stored relative to the centre of the mesh, so that float32 keeps its
+    precision even if the mesh is far from the origin.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use; ``release`` frees all buffers.
     figure : Figure
-        A figure with a mesh.
+        Figure with a mesh.
     notes : list of str
         Receives messages about limitations of the driver.
 
@@ -48,9 +48,9 @@ class MeshBuffers:
     copies : (V,) int32
         One split vertex for each vertex of the figure.
     surfaces : list of Surface
-        Of each material.
+        Surface of each material.
     has_materials : bool
-        Whether any of these has more than a base colour texture.
+        Whether any surface has more than a base colour texture.
     """
 
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
@@ -95,7 +95,7 @@ class MeshBuffers:
         self.skin(Skinning())
 
     def upload(self, rows: Floats) -> moderngl.Buffer:
-        """Return a buffer with the row of its vertex, from (V, 3), for every split vertex."""
+        """Return a buffer with a row per split vertex, copied from rows (V, 3) per vertex."""
         return self._owner.keep(buffer(self.context, rows[self.sources], "f4"))
 
     def index_set(
@@ -163,7 +163,7 @@ class MeshBuffers:
 
     @property
     def is_physical(self) -> bool:
-        """Whether a material is described by metallic and roughness."""
+        """Whether a material is described by metalness and roughness."""
         return any(surface.is_physical for surface in self.surfaces)
 
     @property

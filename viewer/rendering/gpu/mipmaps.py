@@ -1,7 +1,7 @@
 """Mipmaps of textures, computed by numpy for software rendering.
 
-Mesa compiles two programs for ``glGenerateMipmap``, which takes 60 ms, a fifth of the time from
-the start to the first image.
+Mesa compiles two programs for ``glGenerateMipmap``, which takes 60 ms: a fifth of the time from
+start-up to the first image.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["add_mipmaps", "halved_pictures"]
 
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x1908, 0x1401, 0x0DE1
-_STEPS = 1 << 14  # steps of linear light; the sum of four values still fits 16 bits
+_STEPS = 1 << 14  # steps of linear light; the sum of four values still fits into 16 bits
 
 
 def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = False) -> None:
@@ -30,11 +30,11 @@ def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = Fals
     Parameters
     ----------
     texture : moderngl.Texture
-        RGBA; its context must be current.
+        An RGBA texture, whose context must be current.
     pixels : (H, W, 4) uint8
-        Its contents, first row at v = 0.
+        Contents of the texture, first row at v = 0.
     is_linear : bool
-        Whether they are linear data, not sRGB colours.
+        Whether the pixels are linear data, not sRGB colours.
     """
     upload = _upload_function() if is_software(texture.ctx) else None
     if upload is None:
@@ -54,7 +54,7 @@ def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
     Parameters
     ----------
     pixels : (H, W, 4) uint8
-        sRGB unless ``is_linear``; alpha is treated like a colour.
+        Pixels in sRGB unless ``is_linear``; alpha is treated like a colour.
     is_linear : bool
         Whether the pixels are linear data.
 

@@ -15,7 +15,7 @@ __all__ = ["Offer", "headless_offer", "offer_of", "offer_text"]
 
 _VERSION, _RENDERER, _LANGUAGE = 0x1F02, 0x1F01, 0x8B8C
 _NEEDED, _NEEDED_LANGUAGE = (3, 3), (3, 30)
-_TRIED = (320, 310, 210, 100)  # the newest first; from 3.1 on they are core profiles
+_TRIED = (320, 310, 210, 100)  # newest first; from 3.1 on, they are core profiles
 _OVERRIDES = ("MESA_GL_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE")
 
 
@@ -75,14 +75,14 @@ def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str
     offer : Offer
         Version strings of a context with an older version.
     environment : mapping of str to str
-        Contains the variables that limit the version offered by Mesa.
+        Environment variables, which may limit the version offered by Mesa.
     """
     asked = [f"{name}={environment[name]}" for name in _OVERRIDES if environment.get(name)]
     where = ", ".join([f"renderer {offer.renderer}", *(f"{one} is set" for one in asked)])
     version, language = _numbers(offer.version), _numbers(offer.language)
     forced = re.match(r"(\d)(\d\d)", environment.get(_OVERRIDES[1], ""))
     if forced:
-        # The override applies to core profiles only, and the driver may have none.
+        # The override applies only to core profiles, and the driver may have none.
         language = min(language, (int(forced[1]), int(forced[2])))
     if version < _NEEDED:
         beside = f" with GLSL {_dotted(language, 2)}" if language < _NEEDED_LANGUAGE else ""

@@ -36,12 +36,12 @@ _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
 def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
-    """Set uniforms by name; those that the compiler dropped as unused are skipped.
+    """Set uniforms by name; uniforms that the compiler dropped as unused are skipped.
 
     Parameters
     ----------
     program : moderngl.Program
-        The program.
+        Program that has the uniforms.
     values : mapping
         Numbers, tuples of numbers, or ``bytes`` laid out as GLSL stores them.
     """
@@ -87,7 +87,7 @@ class Programs:
         name : str
             Name of the vertex shader, without suffix.
         chunk : str
-            A key of ``SHADING``, for fragment shaders that take one.
+            A key of ``SHADING``, for fragment shaders with a chunk.
         fragment : str
             Name of the fragment shader; the same name if omitted.
         skin : str
@@ -97,14 +97,14 @@ class Programs:
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
         materials : bool
-            Surfaces have more than a base colour texture, see ``include/surface.glsl``.
+            Whether surfaces have more than a base colour texture, see ``include/surface.glsl``.
         effects : tuple of str
             Macros of the fragment shader, see ``viewer.rendering.effects``.
 
         Raises
         ------
         RenderError
-            If the driver rejects a shader; the message names the file and its line.
+            If the driver rejects a shader; the message gives the file and line.
         """
         files = name, skin, fragment or name, chunk, geometry
         return self._get((*files, affine, materials, *effects), ())
@@ -132,7 +132,8 @@ class Programs:
             )
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
-                # Both stages output the fragment shader's inputs: the vertex shader's are renamed.
+                # Both stages output the fragment shader's inputs: those of the vertex shader are
+                # renamed.
                 vertex = re.sub(r"\bv_(\w+)", r"v_vertex_\1", vertex)
             try:
                 # moderngl 5.13 calls Python functions to list a program's members. It crashes if
@@ -204,7 +205,7 @@ def _included(name: str, files: list[str]) -> str:
 
 
 def _chunk(folder: str, chunk: str, files: list[str]) -> str:
-    """Return a chunk's text after the chunks it needs, whose functions get a suffix: their name."""
+    """Return a chunk's text after required chunks, whose functions get their name as a suffix."""
     inner = resource("shaders", folder, f"{chunk}.glsl").read_text("utf-8")
     needs = _NEEDS.match(inner)
     parts = [_included(name, files) for name in _INCLUDES.findall(inner)]

@@ -1,6 +1,6 @@
-"""Rest vertices of one actor: those of its figure, or a copy with shape and correctives applied.
+"""Rest vertices of one actor: those of the figure, or a copy with shape and correctives applied.
 
-Pose correctives are summed in one of two ways. On a graphics card the vertex shader sums them
+Pose correctives are summed in one of two ways. On a graphics card, the vertex shader sums them
 from a texture, and a frame uploads only the weights. Software drivers are several times faster
 with one matrix-vector product per changed pose (``tests/bench`` prints both).
 """
@@ -34,7 +34,7 @@ class RestBuffers:
     context : moderngl.Context
         The context in use.
     mesh : MeshBuffers
-        Used unchanged while shape and correctives are 0.
+        Mesh that is used unchanged while shape and correctives are 0.
     way : str
         One of ``WAYS``; chosen by the driver if empty.
 

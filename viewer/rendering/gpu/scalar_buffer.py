@@ -33,7 +33,7 @@ class ScalarBuffer:
     numbers : (V,)
         The same values per vertex of the figure.
     range : (float, float)
-        Lowest and highest value, in the unit that ``SCALARS`` names.
+        Lowest and highest value, in the unit given in ``SCALARS``.
     span : (float, float)
         The same, or the typical range of a quantity with a robust range.
     name : str
@@ -89,7 +89,7 @@ class ScalarBuffer:
         self.version += 1
 
     def show(self, look: ScalarLook | None) -> None:
-        """Set the colours of the values; None for no colours."""
+        """Set the colours of the values; None removes them."""
         self.is_shown = True
         if look is not None and (self._colors is None or not self._has(look)):
             if self._colors is not None:

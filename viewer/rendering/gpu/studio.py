@@ -12,7 +12,7 @@ from viewer.resources import resource
 __all__ = ["STUDIO_SAMPLERS", "Matcaps", "Studio"]
 
 STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
-"""Texture units besides those of materials and effects; no program uses both of the last two."""
+"""More texture units than those of materials and effects; no program uses both of the last two."""
 
 _SRGB8 = 0x8C41
 
@@ -53,7 +53,7 @@ class Studio:
 
 
 class Matcaps:
-    """Matcaps: images of lit spheres, each uploaded on first use.
+    """Images of lit spheres (matcaps), each uploaded on first use.
 
     Parameters
     ----------

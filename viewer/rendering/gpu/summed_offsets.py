@@ -23,8 +23,8 @@ __all__ = ["SummedOffsets"]
 class SummedOffsets:
     """Offsets that ``include/skinning.glsl`` adds to the vertices of each instance.
 
-    If the shader sums the offsets, a list holds the weights of all instances. If the CPU sums them,
-    one matrix product computes a row of offsets for every instance.
+    If the shader sums the offsets, a list contains the weights of all instances. If the CPU sums
+    them, one matrix product computes a row of offsets for every instance.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class SummedOffsets:
     n_listed : int
         Length of each instance's list; 0 if there are no correctives.
     n_summed : int
-        1 if there is a row of sums for each instance, else 0.
+        1 if there is a row of sums for each instance, otherwise 0.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str) -> None:

@@ -26,7 +26,7 @@ SAMPLERS = {
     "u_occlusion_map": 11,
     "u_emissive_map": 12,
 }
-"""Texture unit of each entry of ``TEXTURES``; lower ones are the skinning shader's."""
+"""Texture unit of each entry of ``TEXTURES``; the skinning shader uses lower units."""
 
 _UNITS = tuple(SAMPLERS.values())
 _MOST_SETS = 3  # sets of texture coordinates that one figure's textures may use
@@ -43,7 +43,7 @@ _UNTEXTURED: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """How the triangles of one material are drawn.
+    """Drawing properties of the triangles of one material.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Surface:
     untextured : dict
         Uniforms that differ while textures are off.
     textures : tuple of (unit, texture)
-        Bound before the triangles are drawn.
+        Textures to bind before the triangles are drawn.
     is_physical : bool
         Whether the material has its own metallic and roughness values.
     is_blended : bool
@@ -154,7 +154,7 @@ def upload_surfaces(
 def _upload(
     context: moderngl.Context, texture: Texture, is_linear: bool, notes: list[str]
 ) -> moderngl.Texture:
-    assert texture.image is not None  # the caller looked
+    assert texture.image is not None  # checked by the caller
     made = picture_texture(context, _mirrored(texture.image, texture.wrap), notes, is_linear)
     made.repeat_x, made.repeat_y = (side != "clamp" for side in texture.wrap)
     usual = "linear_mipmap_linear" if texture.is_smooth else "nearest_mipmap_linear"
@@ -164,7 +164,7 @@ def _upload(
 
 
 def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
-    """Return an image next to its mirror image: moderngl lacks the mirrored repeat mode."""
+    """Return an image joined with its mirror image: moderngl lacks the mirrored repeat mode."""
     if wrap[0] == "mirror":
         image = np.concatenate([image, image[:, ::-1]], axis=1)
     if wrap[1] == "mirror":

@@ -1,4 +1,4 @@
-"""Render targets: a multisampled framebuffer and the single-sample one it is resolved to."""
+"""Render targets: a multisampled framebuffer, resolved to a single-sample framebuffer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "im
     Raises
     ------
     ViewerError
-        With the size and the limit.
+        If the size is not supported; the message gives the limit.
     """
     limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
     if not all(1 <= side <= limit for side in size):
@@ -30,7 +30,7 @@ def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "im
 
 
 def target_bytes(size: tuple[int, int], samples: int) -> int:
-    """Return the memory in bytes that OpenGL needs for an image while it is drawn.
+    """Return the memory in bytes that OpenGL needs to draw an image.
 
     Colour and depth of every sample, 4 bytes each, plus the resolved image; without
     multisampling, the image and its depth.
@@ -54,7 +54,7 @@ def _gigabytes(count: int) -> str:
 
 
 class Target:
-    """Framebuffers of an image while it is drawn.
+    """Framebuffers of an image that is being drawn.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Target:
             check_errors(context, f"an image of {size[0]} x {size[1]} pixels")
         except (moderngl.Error, RenderError):
             self.release()
-            context.clear_errors()  # the error of the failed allocation
+            context.clear_errors()  # clears the error of the failed allocation
             raise self._no_room() from None
 
     def _allocate(self) -> None:
@@ -159,7 +159,7 @@ def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
     Parameters
     ----------
     data : bytes
-        Last row first.
+        Pixels, last row first.
     size : (int, int)
         Width and height.
     """

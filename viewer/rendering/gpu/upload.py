@@ -34,7 +34,7 @@ __all__ = [
 
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 
-# Fixed texture widths, which the shaders rely on: every OpenGL 3.3 driver allows at least 1024.
+# Fixed texture widths, on which the shaders rely: every OpenGL 3.3 driver allows at least 1024.
 _MATRICES_PER_ROW = 256  # three texels each
 _PAIRS_PER_ROW = 1024
 _OFFSETS_PER_ROW = 4096
@@ -128,9 +128,9 @@ def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moder
 
 
 def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
-    """Upload (index, weight) pairs into a texture that holds at least as many."""
+    """Upload (index, weight) pairs into a texture with room for at least as many."""
     pairs = np.zeros((texture.width * texture.height, 2), "f4")
-    # float32 holds every index below 2^24 exactly.
+    # float32 represents every index below 2^24 exactly.
     pairs[: len(indices), 0] = indices
     pairs[: len(indices), 1] = weights
     texture.write(pairs.tobytes())
@@ -154,15 +154,15 @@ def picture_texture(
 ) -> moderngl.Texture:
     """Return a mip-mapped texture, clamped at its edges, v = 0 at the image's last row.
 
-    Pixels are sRGB unless ``is_linear``. An image above the driver's limit is reduced by an
+    Pixels are sRGB unless ``is_linear``. An image that exceeds the driver's limit is reduced by an
     integer factor, with a message in ``notes``.
     """
     limit = context.info["GL_MAX_TEXTURE_SIZE"]
     factor = -(-max(pixels.shape[:2]) // limit)
     if factor > 1:
         notes.append(
-            f"a texture of {pixels.shape[1]} x {pixels.shape[0]} pixels is above this driver's "
-            f"limit of {limit} and was reduced by {factor}"
+            f"a texture of {pixels.shape[1]} x {pixels.shape[0]} pixels exceeds this "
+            f"driver's limit of {limit} and was reduced by {factor}"
         )
         pixels = pixels[::factor, ::factor]
     flipped = np.ascontiguousarray(pixels[::-1])
@@ -173,7 +173,7 @@ def picture_texture(
     add_mipmaps(texture, flipped, is_linear)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     if not is_software(context):
-        texture.anisotropy = 8.0  # doubles the drawing time in software
+        texture.anisotropy = 8.0  # would double the drawing time in software
     return checked(context, texture, f"a texture of {size[0]} x {size[1]} pixels")
 
 

@@ -35,7 +35,7 @@ class VertexArrays:
         Parameters
         ----------
         program : moderngl.Program
-            Cached by ``Programs``, so its id is unique.
+            Program cached by ``Programs``, so its id is unique.
         content : callable
             Returns buffers, layouts and attribute names; called only to create the array.
         indices : moderngl.Buffer, optional

@@ -1,9 +1,9 @@
 """Waiting for the driver without holding Python's lock, so that other threads can run.
 
 moderngl holds the global interpreter lock during every call. Reading an image that is still being
-drawn blocks until the drawing is finished, and no other thread can run Python meanwhile: an
-encoder thread that needs the lock five times per frame would be delayed by five frames. ``ctypes``
-releases the lock during a call, so two OpenGL functions are called through it.
+drawn blocks until the drawing is finished, and meanwhile no other thread can run Python: an encoder
+thread that needs the lock five times per frame would be delayed by five frames. ``ctypes`` releases
+the lock during a call, so two OpenGL functions are called through it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Waiter:
 
 
 def _function(context: moderngl.Context, name: str) -> Callable[[], None] | None:
-    """Return an OpenGL function without arguments, None if its address is unknown."""
+    """Return an OpenGL function without arguments; None if its address is unknown."""
     loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
     address = loader(name) if loader is not None else 0
     return ctypes.CFUNCTYPE(None)(address) if address else None

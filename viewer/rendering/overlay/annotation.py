@@ -28,7 +28,7 @@ __all__ = [
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default label colour, sRGB."""
 
-_LETTERS = 13.0  # height, pixels, in an image of standard height
+_LETTERS = 13.0  # height in an image of standard height, pixels
 _GAP = 7.0  # pixels between a point and its label
 _LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
 _RIM = 5.0  # pixels between a point and the start of its leader line
@@ -46,8 +46,8 @@ class Labels:
     points : (N, 3)
         Labelled points, scene space.
     ranks : (N,) int
-        Labels of lower rank take precedence if there is no room for all, also across
-        annotations; among equal ranks, those of nearer points do.
+        Labels with lower ranks take precedence if there is no room for all, even across
+        annotations; among equal ranks, labels of nearer points do.
     colors : (N, 3)
         Colours of the text, sRGB, 0 to 1.
     """
@@ -65,7 +65,7 @@ class Annotation:
     Attributes
     ----------
     segments : Segments
-        In drawing order.
+        Segments in drawing order.
     style : SegmentStyle
         Style of the segments.
     labels : Labels or None
@@ -92,13 +92,13 @@ class PlacedLabels:
     points : (M, 3)
         Labelled points, scene space.
     ends : (M, 2)
-        Point on each label that is nearest to the labelled point, pixels.
+        Point of each label that is nearest to the labelled point, pixels.
     has_line : (M,) bool
         Whether a leader line is needed.
     owners : (M,)
-        Indices of the ``Labels`` that they belong to.
+        Index of the ``Labels`` to which each label belongs.
     n_seen : tuple of int
-        Number of points within the image, for each ``Labels``.
+        Number of points within the image for each ``Labels``.
     """
 
     texts: tuple[str, ...]
@@ -112,7 +112,7 @@ class PlacedLabels:
 
     @property
     def n_left_out(self) -> tuple[int, ...]:
-        """Number of labels omitted for lack of room, for each ``Labels``."""
+        """Number of labels omitted for lack of room for each ``Labels``."""
         drawn = np.bincount(self.owners, minlength=len(self.n_seen)).tolist()
         return tuple(seen - count for seen, count in zip(self.n_seen, drawn, strict=True))
 
@@ -182,7 +182,7 @@ def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Seg
     led, scale = placed.has_line, picture_scale(size)
     points, to = placed.points[led], placed.ends[led]
     pixels = project(view, size, points).pixels
-    # Keep the point's own dot clear.
+    # The point's own dot must not be covered.
     pixels = pixels + scale * _RIM * unit(to - pixels)
     starts, ends = (unproject(view, size, points, places) for places in (pixels, to))
     colors = np.hstack([placed.colors[led], np.ones((len(starts), 1))])

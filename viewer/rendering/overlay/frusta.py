@@ -71,7 +71,7 @@ def frusta_annotation(
     cameras : sequence of CameraView
         At least one.
     box : (2, 3)
-        Bounds of the scene, which give the frusta's size.
+        Bounds of the scene, which determine the size of the frusta.
     size : (int, int)
         Width and height of the image, pixels.
     """
@@ -80,7 +80,7 @@ def frusta_annotation(
     ends: list[Floats] = []
     for camera, center in zip(cameras, centers, strict=True):
         corners = frustum_corners(camera, depth)
-        # A mark on the upper side shows which way is up.
+        # A mark on the upper side shows the up direction.
         above = 0.5 * (corners[0] + corners[1]) + _TICK * (corners[0] - corners[3])
         starts += [*corners, *corners, corners[0], corners[1]]
         ends += [*np.roll(corners, -1, axis=0), *[center] * 4, above, above]

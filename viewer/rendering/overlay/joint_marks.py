@@ -1,4 +1,4 @@
-"""Joint marks drawn over the image: X-ray bones and axes; and the joint at a pixel."""
+"""Joint marks drawn over the image (X-ray bones and axes), and the joint at a pixel."""
 
 from __future__ import annotations
 
@@ -189,14 +189,14 @@ def joint_at(
     size : (int, int)
         Width and height of the image, pixels.
     pixel : (float, float)
-        From the image's left and upper edge.
+        Position from the image's left and upper edges.
     with_bones : bool
         Whether bones are drawn; a bone belongs to the joint that rotates it.
 
     Returns
     -------
     (actor, joint, point) or None
-        Indices, and its position: (3,), scene space.
+        Indices, and the position (3,) in scene space.
     """
     best: tuple[float, float, int, int, Floats] | None = None
     for one in marks:
@@ -216,7 +216,7 @@ def _away(
     pixel: tuple[float, float],
     with_bones: bool,
 ) -> tuple[Floats, Ints, Floats]:
-    """Return distances from a pixel, 0..1 for dots and 1..2 for bones, their joints and depths."""
+    """Return distances from a pixel (0..1 for dots, 1..2 for bones), with joints and depths."""
     scale, seen = picture_scale(size), project(view, size, marks.points)
     away = np.linalg.norm(seen.pixels - pixel, axis=1) / (scale * _DOT_REACH)
     away[~seen.seen | (away > 1.0)] = np.inf

@@ -18,7 +18,7 @@ _LATE = 1000  # rank of unselected joints, so that other labels take precedence
 
 
 def name_labels(marks: Sequence[JointMarks], selected: tuple[int, int]) -> Labels:
-    """Return the joints' names: the selected joint's first, then nearer ones.
+    """Return the joints' names: the selected joint first, then nearer joints.
 
     Parameters
     ----------

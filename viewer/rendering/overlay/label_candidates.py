@@ -32,7 +32,7 @@ _WAYS = np.array(
 _REACHES = (1.0, 3.0, 5.0)
 """Distances of labels from their points, in gaps; all but the first have a leader line."""
 
-_ALIKE = 1.0  # pixels; labels of points nearer than this are allowed at the same place
+_ALIKE = 1.0  # pixels; labels of points closer than this may have the same place
 # Minimum distance of a label from other points: times its distance from its own point, or in gaps
 # for a label with a leader line.
 _CLEARER = 1.5
@@ -47,7 +47,7 @@ class Places:
     Attributes
     ----------
     labels : (M,)
-        Index of the label that each place belongs to.
+        Index of the label to which each place belongs.
     ranks : (M,)
         Preference of the place, lower is better.
     anchors : (M, 2)
@@ -116,7 +116,7 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
 
 
 def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
-    """Return a mask of places certainly too close to other points or covering their own: (M,).
+    """Return a mask of places certainly too close to other points, or over their own: (M,).
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
     pixels : (M, S, 2)
         Column and row of the pixels, starting from the point.
     are_part : (M, S) bool
-        Which of them belong to the line; places without a line have none.
+        Whether each pixel belongs to the line; places without a line have none.
     """
     start, length = places.anchors[:, None], places.own[:, None]
     steps = np.arange(0.5 * gap, places.own.max(initial=0.0))
@@ -163,12 +163,12 @@ def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
 
 
 def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap: float) -> Bools:
-    """Return a mask of lines that certainly pass too near to other points: (M,).
+    """Return a mask of lines that certainly pass too close to other points: (M,).
 
     Parameters
     ----------
     places : Places
-        Places that the lines lead to.
+        Places to which the lines lead.
     pixels, are_part : (M, S, 2), (M, S) bool
         Result of ``line_pixels``.
     dots : Dots
@@ -179,8 +179,8 @@ def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap
     diagonal = math.sqrt(2.0) * dots.cells.side
     if diagonal > _BESIDE_LINE * gap:
         return np.zeros(len(pixels), dtype=np.bool_)
-    # A dot in a cell that the line crosses is nearer to the line than the cell's diagonal. Skip
-    # the start of the line, where the cells may contain its own point or coincident ones.
+    # A dot in a cell that the line crosses is closer to the line than the cell's diagonal. The
+    # start of the line is skipped, where the cells may contain its own point or coincident points.
     across, down = np.moveaxis(np.abs(pixels + 0.5 - places.anchors[:, None]), 2, 0)
     is_away = are_part & (np.maximum(across, down) > _ALIKE + dots.cells.side + 0.5)
     return np.asarray((is_away & (dots.count_at(pixels) > 0)).any(axis=1))

@@ -74,7 +74,7 @@ def sums_within(sums: Ints, first: Ints, after: Ints) -> Ints:
     sums : (rows + 1, columns + 1)
         Result of ``summed``.
     first, after : (..., 2)
-        Column and row of the first cell and one past the last; empty where they are equal.
+        Column and row of the first cell and the cell after the last; empty if they are equal.
     """
     flat, width = sums.ravel(), sums.shape[1]
     low, high = first[..., 1] * width, after[..., 1] * width
@@ -112,7 +112,7 @@ class Dots:
 
     @property
     def n_layers(self) -> int:
-        """Number of layers; the first one holds few dots, enough to reject most crowded places."""
+        """Number of layers; the few dots of the first are enough to reject most crowded places."""
         return len(self._layers)
 
     def _starts(self, places: Ints) -> Ints:
@@ -164,7 +164,7 @@ class Dots:
 
 
 def _levels(places: Ints) -> Ints:
-    """Return layers of dots: 0 for one dot per block, 1 for one per cell, 2 for the rest; (N,)."""
+    """Return layers of dots, (N,): 0 for one dot per block, 1 for one per cell, 2 for the rest."""
     firsts = _firsts(places // _BLOCK)
     if len(places) < _DENSE * len(firsts):
         return np.zeros(len(places), dtype=np.int32)

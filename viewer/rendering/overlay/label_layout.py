@@ -21,7 +21,7 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Layout", "lay_out"]
 
-_FEWEST, _MOST = 256, 1024  # labels per batch: the first batch, and the limit of later ones
+_FEWEST, _MOST = 256, 1024  # labels per batch: the first batch, and the limit of later batches
 _CELL = 0.5  # side length of a cell in gaps, unless this gives too many cells
 _CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000  # more cells cost more than they save
 _SAMPLES = 5  # columns of a label that are tested first; they detect most overlaps
@@ -58,9 +58,9 @@ def lay_out(
 ) -> Layout:
     """Place labels next to their points in order, and omit those without room.
 
-    A label is placed right or left of its point, diagonally, above or below, where there is most
-    room; otherwise a little away from it with a leader line. It is never nearer to another point
-    than to its own; distances are accurate to a quarter of a pixel.
+    A label is placed right or left of its point, diagonally, above or below, where there is the
+    most room; otherwise at a distance, with a leader line. It is never closer to another point than
+    to its own; distances are accurate to a quarter of a pixel.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _portions(order: Ints) -> Iterator[Ints]:
 
 
 def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> Ints:
-    """Return the places that need no leader line or have a clear path for it: (M,), indices."""
+    """Return the indices of places that need no leader line or have a clear path for it: (M,)."""
     rows = np.flatnonzero(places.has_line)
     led = places.take(rows)
     pixels, are_part = line_pixels(led, gap)
@@ -118,7 +118,7 @@ def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> I
 
 
 def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
-    """Choose the first open place of each label: (M,), indices of places."""
+    """Choose the first open place of each label; return indices of places: (M,)."""
     found: list[int] = []
     settled = -1  # the most recently placed label
     closed: set[tuple[int, ...]] = set()  # occupied places, shared by labels of coincident points
@@ -147,12 +147,13 @@ class _Taken:
 
     def __init__(self, picture: tuple[int, int], gap: float) -> None:
         self._pixels = np.zeros(picture[::-1], dtype=np.bool_)
-        # Keep half a gap free at both sides, so that adjacent labels do not read as one.
+        # Half a gap is kept free on both sides, so that adjacent labels do not read as one.
         self._apart = round(0.5 * gap)
 
     def may_be_open(self, low: Ints, high: Ints) -> Bools:
         """Return a mask of rectangles that may be free: (M,); all others are certainly occupied."""
-        # Labels have equal heights, so an overlap always covers a pixel of the upper or lower edge.
+        # Labels have the same height, so an overlap always covers a pixel of the upper or lower
+        # edge.
         left = np.maximum(low[:, :1] - self._apart, 0)
         right = np.minimum(high[:, :1] + self._apart, self._pixels.shape[1]) - 1
         columns = left + (right - left) * np.arange(_SAMPLES) // (_SAMPLES - 1)

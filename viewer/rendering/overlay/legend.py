@@ -35,7 +35,7 @@ _SAME = 1e-9  # relative tolerance for equal numbers
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """A number next to the bar: position, 0 at the left end to 1 at the right, and text."""
+    """A number next to the bar: position, from 0 at the left end to 1 at the right, and text."""
 
     place: float
     text: str
@@ -66,7 +66,7 @@ class Legend:
     lines : tuple of float
         Positions of isolines on the bar.
     note : str
-        Line below the bar: the range of the values, or why there is nothing to show.
+        Line below the bar: the range of the values, or the reason why there is nothing to show.
     """
 
     title: str
@@ -112,7 +112,7 @@ def legend_of(
     name : str
         Name of the quantity.
     having : sequence of Shown
-        The drawn figures that have the quantity; the first one gives title and unit.
+        The drawn figures that have the quantity; the first figure provides title and unit.
     skinning : Skinning
         Skinning of the figures.
     figures : sequence of Figure

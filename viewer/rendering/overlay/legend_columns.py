@@ -28,7 +28,7 @@ class LegendColumns:
 
     @property
     def rows(self) -> int:
-        """Lines of the longest column, including the one that counts the omitted items."""
+        """Number of lines of the longest column, including the line about omitted items."""
         last = self.counts[-1] + (self.left_out > 0) if self.counts else 0
         return max((*self.counts, last), default=0)
 
@@ -43,13 +43,13 @@ def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendCo
     rows : int
         Maximum number of lines per column, 1 or more.
     width : float
-        Maximum width of all columns together, in the same unit. The first one is kept even if it
-        is wider.
+        Maximum total width of all columns, in the same unit. The first column is kept even if it is
+        wider.
 
     Returns
     -------
     LegendColumns
-        Columns of about equal length if all items fit, otherwise full ones.
+        Columns of about equal length if all items fit, otherwise full columns.
 
     >>> legend_columns([10.0] * 5, 4, 30.0).counts
     (3, 2)

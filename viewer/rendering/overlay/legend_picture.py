@@ -33,7 +33,7 @@ _PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 19
 def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
     """Return a legend's pixels, sized for an image.
 
-    Many named items are set in several columns, then in smaller text, then in wider columns; those
+    Many named items are set in several columns, then in smaller text, then in wider columns; items
     that still do not fit are counted.
 
     Parameters
@@ -130,7 +130,7 @@ class _Drawing:
             self._draw_entry(draw, left - self.columns.widths[-1], y, None, self._more())
 
     def _draw_bar(self, draw: ImageDraw.ImageDraw, left: float, top: float, width: int) -> None:
-        """Draw the colours, the isolines, and the numbers beneath, which stay within the panel."""
+        """Draw the colours, the isolines, and the numbers below, which stay within the panel."""
         colors, bottom = self.legend.colors, top + self.letters
         # Room for half a number on both sides.
         margin = max((self._width(tick.text) for tick in self.legend.ticks), default=0) // 2

@@ -13,7 +13,7 @@ __all__ = ["Lettering", "shelves"]
 _RIM = 2  # width of the outline, pixels
 _WIDEST = 2048  # pixels; longer strings are truncated
 _MOST = 4000  # maximum number of cached strings
-_DARK = 205  # opacity of the rim, of 255
+_DARK = 205  # opacity of the outline, 0 to 255
 
 
 class Lettering:

@@ -30,7 +30,7 @@ class Marks:
     radii : (N,)
         Radii of the points, pixels.
     lines : (M, 2, 3)
-        Both ends of each, scene space.
+        Both ends of each line, scene space.
     """
 
     points: Floats = field(default_factory=lambda: np.zeros((0, 3)))

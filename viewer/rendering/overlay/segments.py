@@ -48,14 +48,14 @@ class SegmentStyle:
     Attributes
     ----------
     on_top : bool
-        Whether they are drawn over everything before them.
+        Whether they are drawn over everything drawn before.
     hidden : float
         Opacity of hidden parts, 0 to 1.
     lift : float
         Fraction of the distance to the eye by which segments are moved forward, so that segments
         on a surface are visible.
     border : float
-        Width of the border around each, pixels.
+        Width of the border around each segment, pixels.
     border_color : (r, g, b)
         sRGB, 0 to 1.
     """
@@ -128,7 +128,7 @@ class SegmentPass:
         """
         if not len(segments.widths):
             return
-        # Relative to their centre, to keep precision in float32.
+        # Positions are relative to their centre, to keep precision in float32.
         center = 0.5 * (segments.starts.min(axis=0) + segments.starts.max(axis=0))
         places = segments.starts - center, segments.ends - center
         self._rows.write(np.hstack([*places, segments.colors, segments.widths[:, None]]))

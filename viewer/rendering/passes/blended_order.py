@@ -1,8 +1,8 @@
 """Order of blended triangles: runs and the triangles within each, from the farthest to the nearest.
 
-The place of a triangle is its posed centroid. So the order is right for everything but triangles
-that intersect or overlap cyclically, and for materials that interleave, which are drawn one after
-the other. The posed vertices are read back when the pose changes, and sorted when the view does.
+The place of a triangle is its posed centroid. The order is therefore correct except for triangles
+that intersect or overlap cyclically, and for interleaved materials, which are drawn one after the
+other. The posed vertices are read back when the pose changes, and sorted when the view does.
 """
 
 from __future__ import annotations

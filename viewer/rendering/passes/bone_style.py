@@ -1,4 +1,4 @@
-"""Style of a skeleton as it is drawn, and its opacity over a skin."""
+"""Style of a drawn skeleton, and its opacity over a skin."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["bone_style", "skeleton_opacity"]
 
 
 def bone_style(skeleton: Skeleton, options: DisplayOptions) -> str:
-    """Return how a skeleton is drawn, a key of ``BONES`` other than ``"auto"``."""
+    """Return the style of a drawn skeleton, a key of ``BONES`` other than ``"auto"``."""
     if options.bones != "auto":
         return options.bones
     return "octahedra" if skeleton.boxes is None else "boxes"

@@ -21,7 +21,7 @@ _UNIT = 0
 
 
 class CameraImagePass:
-    """Draws images without their lens distortion; the last one of each camera stays uploaded.
+    """Draws images without their lens distortion; the last image of each camera stays uploaded.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ class CameraImagePass:
     def draw_behind(
         self, camera: CameraView, image: CameraImage, size: tuple[int, int], brightness: float
     ) -> None:
-        """Draw the image of the camera that the scene is seen through, behind everything.
+        """Draw the image of the camera through which the scene is seen, behind everything.
 
         Parameters
         ----------
         camera : CameraView
             The camera.
         image : CameraImage
-            Its image.
+            Image of the camera.
         size : (int, int)
             Width and height of the image, pixels.
         brightness : float
@@ -55,7 +55,7 @@ class CameraImagePass:
         """
         width, height = picture_size(camera)
         own, aspect = width / height, size[0] / size[1]
-        # As in pinhole_projection: the whole image in the middle.
+        # As in pinhole_projection, the whole image is in the middle.
         across, down = min(own / aspect, 1.0), min(aspect / own, 1.0)
         corner = np.array([-across, down, 0.0, 1.0])
         steps = np.array([[2.0 * across, 0.0, 0.0, 0.0], [0.0, -2.0 * down, 0.0, 0.0]])

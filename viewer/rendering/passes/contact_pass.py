@@ -1,6 +1,7 @@
 """Soft contact shadows: a blurred field of the heights of figures above the ground.
 
-They need no light: they represent the ambient light that figures block from the ground below them.
+They need no light source: they represent the ambient light that figures block from the ground below
+them.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class Contact:
     Attributes
     ----------
     texture : moderngl.Texture
-        Red is darkness by contact, green by occluders farther above, 0 to 1.
+        Red is darkness caused by contact, green by occluders farther above, 0 to 1.
     low, high : (2,)
         Opposite corners of the field, along the ground's axes.
     """
@@ -77,7 +78,7 @@ class ContactPass:
         axes: Floats,
         height: float,
     ) -> Contact | None:
-        """Draw the contact shadows of figures; None if all are far above the ground.
+        """Draw and return the contact shadows of figures; None if all are far above the ground.
 
         Parameters
         ----------
@@ -86,7 +87,7 @@ class ContactPass:
         spheres : (N, 4)
             Bounds of the figures: centres and radii, scene space.
         size : float
-            Size of a figure, scene units: determines the softness.
+            Size of a figure in scene units, which determines the softness.
         axes : (3, 3)
             The ground's two axes and the up axis as rows.
         height : float

@@ -35,7 +35,7 @@ class Ghost:
     Attributes
     ----------
     figure : Figure
-        A figure with a mesh, which is drawn unposed.
+        Figure with a mesh, which is drawn unposed.
     placement : (4, 4)
         Matrix from figure space to scene space.
     style : str
@@ -105,7 +105,7 @@ class GhostPass:
     def _uploaded(self, figure: Figure) -> PosedMesh:
         if self._posed is None or figure is not self._figure:
             self.release()
-            notes: list[str] = []  # stays empty: a bare mesh has no textures to reduce
+            notes: list[str] = []  # stays empty: a mesh without materials has no textures to reduce
             with self._owner.guard():
                 buffers = self._owner.keep(MeshBuffers(self.context, figure, notes))
                 posed = self._owner.keep(PosedMesh(self.context, self.programs, buffers))

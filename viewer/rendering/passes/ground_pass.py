@@ -43,7 +43,7 @@ def parse_color(text: str) -> tuple[float, float, float]:
     Raises
     ------
     ViewerError
-        If the text is not a colour of this form.
+        If the text does not have this form.
 
     >>> parse_color("#ff0000")
     (1.0, 0.0, 0.0)
@@ -93,15 +93,16 @@ class GroundPass:
         view : View
             The camera's matrices.
         box : (2, 3)
-            Bounds of the objects on the ground, scene space; they define height, step and extent.
+            Bounds of the objects on the ground, scene space, which define height, step and extent.
         background : str
-            Background of the image; lines are light on a dark one.
+            Background of the image; lines are light on a dark background.
         """
         program = self.programs.drawing("ground")
         step, extent = grid_step(box), _EXTENT * (box_size(box) or 1.0)
         axes = ground_axes(view.camera.up)
         center = box.mean(axis=0)
-        # The square is centred on a line crossing near the box, so that float32 keeps precision.
+        # The square is centred on a crossing of lines near the box, so that float32 keeps its
+        # precision.
         cells = np.round(axes[:2] @ center / step)
         height = (axes[2] @ box.T).min()
         placement = np.eye(4)

@@ -1,4 +1,4 @@
-"""Shadows on the ground: the key light's, and contact shadows."""
+"""Shadows on the ground: those of the key light, and contact shadows."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _CONTACT_OPACITIES = 0.55, 0.38
 _GRAZING = (
     0.06,
     0.22,
-)  # sine of the light's elevation: its shadow appears, and is full
+)  # sine of the light's elevation at which its shadow appears and has full strength
 _FIELD_UNIT = 0
 
 
 class GroundShadowPass:
-    """Draws black patches on the ground, whose opacity is the shadow.
+    """Draws black patches on the ground, whose opacity represents the shadow.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class GroundShadowPass:
     def draw_contact(
         self, contact: Contact, view: View, axes: Floats, height: float, strength: float
     ) -> None:
-        """Draw contact shadows; ``axes`` are the ground's two and the up axis as rows."""
+        """Draw contact shadows; the rows of ``axes`` are the ground's two axes and the up axis."""
         program = self.programs.drawing("patch", fragment="ground_contact")
         opacities = tuple(strength * opacity for opacity in _CONTACT_OPACITIES)
         set_uniforms(program, {"u_field": _FIELD_UNIT, "u_opacity": opacities})
@@ -93,7 +93,7 @@ class GroundShadowPass:
     def _draw(
         self, program: moderngl.Program, view: View, origin: Floats, first: Floats, second: Floats
     ) -> None:
-        """Draw the parallelogram of two sides from a corner, scene space."""
+        """Draw the parallelogram given by a corner and two sides, scene space."""
         placement = np.eye(4)
         placement[:3, 0], placement[:3, 1] = first, second
         placement[:3, 2] = np.cross(first, second)

@@ -85,7 +85,7 @@ def draw_instances(
     instances : InstanceBuffers
         Updated buffers.
     actors : sequence of Actor
-        The actors that the buffers were updated with, in that order.
+        The actors with which the buffers were updated, in that order.
     view : View
         The camera's matrices.
     options : DisplayOptions

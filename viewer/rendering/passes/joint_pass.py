@@ -46,7 +46,7 @@ class SkeletonBuffers:
         self._key: tuple[NumberKey, bool] | None = None
 
     def style(self, options: DisplayOptions) -> str:
-        """Return how the skeleton is drawn, as ``bone_style``."""
+        """Return the style of the drawn skeleton, as ``bone_style``."""
         return bone_style(self.figure.require_skeleton(), options)
 
     def opacity(self, options: DisplayOptions) -> float:
@@ -54,7 +54,7 @@ class SkeletonBuffers:
         return skeleton_opacity(self.figure.require_skeleton(), options)
 
     def bones(self, style: str) -> BoneBuffers:
-        """Return the shapes of a style other than boxes, made on first use."""
+        """Return the shapes of a style other than boxes, created on first use."""
         if style not in self._bones:
             from viewer.rendering.gpu.bone_buffers import BoneBuffers
 
@@ -81,7 +81,7 @@ class SkeletonBuffers:
         skeleton = shaped(self.figure, pose.shape_weights).skeleton
         assert skeleton is not None  # applying a shape keeps the skeleton
         are_boxes = self.style(options) == "boxes"
-        # Bones need the matrices of all joints, as they reach from one to another.
+        # Bones need the matrices of all joints, as they reach from one joint to another.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)
         self._key = pose.skinning_key, are_boxes
 
@@ -134,12 +134,12 @@ class JointPass:
         selected : int
             The joint to highlight, -1 for none.
         opacity : float
-            Below 1 the skeleton is one translucent layer.
+            Below 1, the skeleton is one translucent layer.
         color : (r, g, b), optional
             Colour of all joints, linear; one colour per joint if omitted.
         overlays : bool
-            Draw a translucent skeleton over everything drawn before: boxes often enclose the skin,
-            which would hide them.
+            Draw a translucent skeleton over everything drawn before: otherwise boxes that enclose
+            the skin would hide it.
         """
         overlays = overlays and opacity < 1.0
         view = in_front(view) if overlays else view
@@ -149,7 +149,7 @@ class JointPass:
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_joints, program, skeleton, *how)
         if opacity < 1.0:
-            # Only the nearest parts are drawn: others would show through them.
+            # Only the nearest parts are drawn: the others would show through.
             draw_nearest(self.context, draw)
         else:
             draw()
@@ -167,7 +167,7 @@ def joint_program(
     fragment: str = "mesh",
     effects: tuple[str, ...] = (),
 ) -> moderngl.Program:
-    """Return the program that draws a skeleton in its style; for ``draw_joints``."""
+    """Return the program for ``draw_joints`` that draws a skeleton in its style."""
     name = "joint" if skeleton.style(options) == "boxes" else "bone"
     return programs.drawing(name, chunk, fragment=fragment, effects=effects)
 
@@ -183,7 +183,7 @@ def draw_joints(
     color: Color | None = None,
     only: int = -1,
 ) -> None:
-    """Draw a skeleton in its style; ``only`` leaves out all but one joint."""
+    """Draw a skeleton in its style; with ``only``, draw a single joint."""
     style, boxes = skeleton.style(options), skeleton.boxes
     _set_up(program, boxes, placement, view, options, selected, opacity, color)
     set_uniforms(program, {"u_only": only})

@@ -1,4 +1,4 @@
-"""Pass that draws a figure's keypoints as small cubes, visible through the surface."""
+"""Pass that draws a figure's keypoints as small cubes that are visible through the surface."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class KeypointBuffers:
     context : moderngl.Context
         The context in use.
     figure : Figure
-        A figure with keypoints and a mesh.
+        Figure with keypoints and a mesh.
     cube : moderngl.Buffer
         Vertices of a cube, shared by all boxes.
     """

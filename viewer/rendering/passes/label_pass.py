@@ -17,7 +17,7 @@ from viewer.rig.arrays import Floats, Ints
 __all__ = ["LabelPass"]
 
 _WIDTH, _TALLEST = 2048, 4096  # pixels of the texture; every OpenGL 3.3 driver supports this size
-_MOST = 1000  # texts up to which unused ones are kept in the texture
+_MOST = 1000  # number of texts up to which unused texts are kept in the texture
 
 
 class LabelPass:
@@ -78,7 +78,7 @@ class LabelPass:
             self._rows.draw()
 
     def _fill(self, texts: Sequence[str], lettering: Lettering) -> None:
-        """Create a new texture of the given texts, and of the previous ones if they are few."""
+        """Create a new texture with the given texts, and the previous ones if there are few."""
         wanted = dict.fromkeys(texts)
         if self._letters == lettering.letters and len(self._places) < _MOST:
             wanted |= dict.fromkeys(self._places)

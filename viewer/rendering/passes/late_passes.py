@@ -48,7 +48,7 @@ __all__ = ["LatePasses"]
 
 
 class LatePasses:
-    """Passes that many scenes do not need, each created once on demand.
+    """Passes that many scenes do not need, each created on demand.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class LatePasses:
         return backdrop
 
     def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
-        """Bind the textures that the shading of these meshes needs in addition to their own."""
+        """Bind the textures that the shading of meshes needs in addition to the meshes' own."""
         if options.shading == "matcap":
             self.matcaps.use(options.matcap)
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):

@@ -45,7 +45,7 @@ class LegendPass:
         Returns
         -------
         bool
-            Whether there was room for it.
+            Whether there was room for the legend.
         """
         if self._drawn is None or self._drawn[0] is not legend or self._drawn[1] != size:
             self._prepare(legend, size)

@@ -29,7 +29,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)
 
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
-_NORMAL_LENGTH = 0.02  # of the figure's size
+_NORMAL_LENGTH = 0.02  # relative to the figure's size
 _COLORMAP_UNIT = 6
 
 
@@ -228,7 +228,7 @@ class MeshPass:
 def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
     """Return the shading of a mesh, a key of ``SHADING``.
 
-    ``"auto"`` follows the materials, and so does ``"scalar"`` where there are no values.
+    ``"auto"`` follows the materials, as does ``"scalar"`` if there are no values.
     """
     if options.shading not in ("auto", "scalar"):
         return options.shading

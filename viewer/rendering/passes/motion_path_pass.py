@@ -65,7 +65,7 @@ class MotionPathBuffers:
         self._key: tuple[object, ...] | None = None
 
     def update(self, actor: Actor, joints: tuple[int, ...], min_confidence: float) -> None:
-        """Recompute the paths if clip, joints or the part of the pose outside the clip changed."""
+        """Recompute the paths if clip, joints or the pose outside the clip have changed."""
         key = (id(actor.clip), joints, min_confidence, actor.offset, *_still(actor))
         if key == self._key or actor.clip is None:
             return
@@ -100,7 +100,7 @@ class MotionPathBuffers:
 
 
 def _still(actor: Actor) -> tuple[object, ...]:
-    """Return the parts of a pose that the paths depend on but the clip does not animate."""
+    """Return the parts of a pose that affect the paths but are not animated by the clip."""
     pose, clip, skeleton = actor.pose, actor.clip, actor.figure.skeleton
     if pose is None or skeleton is None or clip is None or isinstance(clip, PointClip):
         return ()

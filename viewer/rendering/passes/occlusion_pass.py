@@ -72,7 +72,7 @@ class OcclusionPass:
         view : View
             The camera's matrices.
         size : float
-            Size of a figure, scene units: determines the radius.
+            Size of a figure in scene units, which determines the radius.
         phase : float
             Phase of the direction pattern, 0 to 1: different for each pass of an image.
         strength : float

@@ -31,7 +31,7 @@ _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
 """Outline colours of selected and hovered parts, sRGB."""
 _WIDTH = 2.0  # line width, pixels in an image of standard height
 _POINT = 9.0  # diameter of a point, likewise
-_TILE, _LEVEL = 16, 4  # side of tile.vert's tiles, pixels; mipmaps with texels of that size
+_TILE, _LEVEL = 16, 4  # side of the tiles of tile.vert, pixels; mipmaps with texels of that size
 _MOST = 12  # search radius around a mask, pixels
 
 
@@ -46,7 +46,7 @@ class OutlineTools:
 
 
 class OutlinePass:
-    """Draws outlines over everything, whatever lies in front of the outlined parts.
+    """Draws outlines over everything, including objects in front of the outlined parts.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class OutlinePass:
         outlined : sequence of Outlined
             Parts of the scene.
         scene : Scene
-            The scene as drawn.
+            The drawn scene.
         view : View
             The camera's matrices.
         options : DisplayOptions
@@ -89,7 +89,7 @@ class OutlinePass:
         target : Target
             The image.
         is_layer : bool
-            Replace the target's colours where there are lines, with straight instead of
+            Whether to replace the target's colours where there are lines, with straight instead of
             premultiplied alpha.
 
         Raises
@@ -98,7 +98,7 @@ class OutlinePass:
             If the driver has no room for the masks.
         """
         self._make(target.size, options.samples)
-        assert self._mask is not None  # made above
+        assert self._mask is not None  # created above
         mask = self._mask
         mask.framebuffer.use()
         self.context.viewport = (0, 0, *target.size)

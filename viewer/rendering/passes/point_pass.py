@@ -1,7 +1,7 @@
 """Pass that draws captured keypoints as spheres, with limbs between them, coloured by side.
 
-Limbs are drawn whatever their length. Some viewers omit limbs longer than two metres, but files do
-not state their unit, and an implausibly long limb reveals an outlier.
+Limbs are drawn regardless of their length. Some viewers omit limbs longer than two metres, but
+files do not state their unit, and an implausibly long limb reveals an outlier.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _SMALLEST = 0.0015  # minimum of this radius: coincident points stay visible
 _SPACING = 0.3  # maximum radius relative to the distance of the nearest point, for fingers
 _LIMB = 0.5  # radius of a limb relative to its thinner end
 _SAMPLES = 32  # frames of a clip that determine the radii
-_CERTAIN = 0.999  # confidence from which a point is drawn opaque
+_CERTAIN = 0.999  # confidence above which a point is drawn opaque
 _SIDES, _RINGS = 12, 3  # subdivisions of a capsule: around, and from equator to pole
 _FLOATS = 11  # numbers of an instance
 
@@ -45,7 +45,7 @@ def point_radii(points: Floats) -> Floats:
     """Return the drawn radius of each point, derived from the distances between points.
 
     Files do not state their unit, so radii are relative to the size of the point set, and smaller
-    where points are close together, as on hands and faces.
+    if points are close together, as on hands and faces.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class PointBuffers:
         view : View
             The camera's matrices.
         min_confidence : float
-            Points below this confidence, and limbs that end at one, are omitted.
+            Points below this confidence, and limbs that end at such points, are omitted.
         """
         points = actor.points
         assert points is not None  # checked by the caller
@@ -166,7 +166,8 @@ class PointBuffers:
         radii = self._measured[1][ends].min(axis=1)
         radii[ends[:, 0] != ends[:, 1]] *= _LIMB
         sides = self.layout.sides[ends]
-        # A limb from the middle to a side has the side's colour; one between the sides has neither.
+        # A limb from the middle to a side has the side's colour; a limb between the sides has
+        # neither.
         side = np.sign(sides.sum(axis=1)) + 1
         palette = np.array([RIGHT, actor.color or MIDDLE, LEFT])
         places = (points[ends, :3] - self.center).reshape(-1, 6)

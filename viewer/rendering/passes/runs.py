@@ -1,4 +1,4 @@
-"""Runs of triangles with one material, drawn with their colours or as shapes alone."""
+"""Runs of triangles with one material, drawn with their colours or only as shapes."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def surface_opacity(options: DisplayOptions) -> float:
 def draw_layer(
     context: moderngl.Context, options: DisplayOptions, draw: Callable[[], object]
 ) -> None:
-    """Draw surfaces, only the nearest layer if they are translucent.
+    """Draw surfaces; only the nearest layer if they are translucent.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def draw_layer(
 
 
 def draw_nearest(context: moderngl.Context, draw: Callable[[], object]) -> None:
-    """Draw the nearest layer of something translucent: first its depth, then its colours."""
+    """Draw the nearest layer of a translucent object: first its depth, then its colours."""
     with without_colors(context):
         draw()
     context.depth_func = "<="

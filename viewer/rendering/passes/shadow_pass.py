@@ -19,7 +19,7 @@ __all__ = ["ShadowPass", "light_view", "map_side", "parallel_view"]
 
 _SIDES = 256, 2048  # texels on each side of a shadow map
 _MARGIN = FILTER_RADIUS + 2.0  # texels without shadow around all casters
-_STEP = 2.0**0.25  # factor on the map's extent, so that moving figures keep its resolution
+_STEP = 2.0**0.25  # step of the map's extent, so that its resolution is constant while figures move
 _TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1.0]])
 
 
@@ -60,7 +60,7 @@ class ShadowPass:
         spheres : (N, 4)
             Bounds of the casters: centres and radii, scene space; at least one.
         direction : (3,)
-            Towards the light, unit length, scene space.
+            Unit vector towards the light, scene space.
         strength : float
             0 to 1: fraction of the light that a shadow removes.
         """
@@ -101,7 +101,7 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
     spheres : (N, 4)
         Centres and radii, scene space.
     direction : (3,)
-        Towards the light, unit length.
+        Unit vector towards the light.
     side : int
         Texels on each side of the map.
     """
@@ -112,7 +112,7 @@ def light_view(spheres: Floats, direction: Floats, side: int) -> tuple[View, flo
     centers, radii = spheres[:, :3] @ axes.T, spheres[:, 3:]
     low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
     half = 0.5 * max(high[0] - low[0], high[1] - low[1])
-    # Half a texel of snapping, and room for the filter.
+    # This leaves half a texel for snapping, and room for the filter.
     half /= 1.0 - 2.0 * (_MARGIN + 1.0) / side
     extent = _STEP ** np.ceil(np.log(max(half, 1e-30)) / np.log(_STEP))
     texel = 2.0 * extent / side

@@ -58,7 +58,7 @@ class PosedMesh:
     Attributes
     ----------
     posed : moderngl.Buffer
-        A row of position (relative to ``center``) and unit normal for every split vertex.
+        A row for every split vertex: position (relative to ``center``) and unit normal.
     center : (3,)
         Origin of the positions in figure space; part of the model matrix.
     scalars : ScalarBuffer
@@ -102,9 +102,9 @@ class PosedMesh:
         Parameters
         ----------
         pose : Pose or None
-            None leaves the mesh in its bind pose.
+            Pose; None leaves the mesh in its bind pose.
         skinning : Skinning or str
-            Skinning settings, or just a key of ``viewer.rig.skinning.METHODS``.
+            Skinning settings, or a key of ``viewer.rig.skinning.METHODS``.
         """
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
@@ -173,7 +173,7 @@ class PosedMesh:
             write_rigid(self._rigid, *split_palette(palette, centers))
 
     def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
-        # Rigid joints, by far the most common, get a cheaper program without scale and shear.
+        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
         affine = attached and self._is_affine
         program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
         key = (id(skin), attached and id(self._rest.positions))

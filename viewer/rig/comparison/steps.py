@@ -89,7 +89,7 @@ def steps_of(first: Actor, second: Actor, n_poses: int, frames: FrameRange | Non
     Parameters
     ----------
     first, second : Actor
-        Not changed.
+        Not modified.
     n_poses : int
         Test poses for figures without motion.
     frames : (int or None, int or None), optional

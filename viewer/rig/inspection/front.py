@@ -19,6 +19,7 @@ from viewer.rig.inspection.front_evidence import (
 )
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
 
@@ -123,9 +124,11 @@ def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
     if figure.skeleton is None or actor.pose is None or figure.skeleton.n_joints > _MOST_JOINTS:
         return nothing
     joints = joint_matrices(figure, actor.pose)[:, :3, 3]
+    skeleton = figure.skeleton
     return (
-        figure.skeleton.names,
-        figure.skeleton.parents,
+        # What the file states about its joints is more certain than their names.
+        joint_meanings(skeleton) if skeleton.humanoid is not None else skeleton.names,
+        skeleton.parents,
         apply_transform(actor.placement, joints),
     )
 

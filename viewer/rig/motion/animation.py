@@ -12,7 +12,7 @@ __all__ = ["Animation"]
 
 
 class Animation:
-    """One of the animations that a figure brings along.
+    """One of the animations of a figure.
 
     Parameters
     ----------

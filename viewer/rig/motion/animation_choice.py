@@ -44,7 +44,7 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
     Parameters
     ----------
     figures : sequence of Figure
-        With animations. Numbers count those of the figure that has the most.
+        Figures with animations; numbers refer to the figure that has the most.
     wanted : str
         A name or label, compared exactly and then without case; a number from 1; ``NONE``; or
         empty for the first animation.

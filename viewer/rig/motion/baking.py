@@ -1,4 +1,4 @@
-"""Keyed transforms baked to frames, for whatever works on local rotations at a fixed rate."""
+"""Keyed transforms baked to frames, for operations on local rotations at a fixed rate."""
 
 from __future__ import annotations
 

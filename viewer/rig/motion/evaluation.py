@@ -22,14 +22,14 @@ from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip, SampledRows, sample_rows
 from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.transform_posing import apply_transforms
-from viewer.rig.motion.transform_rate import key_rate
-from viewer.rig.motion.transform_sampling import sample_transforms
 from viewer.rig.pose import Pose, dof_rotations, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Motion, figure_pose
 from viewer.rig.shape import joint_directions, moved_rest_translations, rest_joints
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.posing import apply_transforms
+from viewer.rig.transforms.rate import key_rate
+from viewer.rig.transforms.sampling import sample_transforms
 
 __all__ = [
     "Frames",

@@ -23,14 +23,14 @@ from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.evaluation import place_pose, pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.transform_posing import apply_placements, apply_transforms
-from viewer.rig.motion.transform_sampling import sample_transforms
 from viewer.rig.pose import Pose, dof_rotations
 from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton, clamp_dofs
+from viewer.rig.transforms.posing import apply_placements, apply_transforms
+from viewer.rig.transforms.sampling import sample_transforms
 
 __all__ = [
     "local_rotations",

@@ -104,7 +104,7 @@ class TransformClip:
     name : str
         Display name.
     channels : tuple of TransformChannel
-        At most one per joint and path. What has no channel keeps its value in the pose.
+        At most one per joint and path; properties without a channel keep their values in the pose.
     start, end : float
         Playback range in seconds.
     """

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
-from viewer.rig.retargeting.joint_names import canonical_names, plain_names
+from viewer.rig.retargeting.joint_names import joint_meanings, plain_names
 from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
@@ -64,7 +64,7 @@ def match_joints(
         If too few joints match, or the mapping names a missing joint.
     """
     plain = _lower(source.names), _lower(target.names)
-    meanings = tuple(canonical_names(s.names, s.parents) for s in (source, target))
+    meanings = tuple(joint_meanings(s) for s in (source, target))
     is_hierarchy = not mapping and _has_same_hierarchy(source, target, plain)
     partners = np.full(target.n_joints, -1, dtype=np.int32)
     if is_hierarchy:

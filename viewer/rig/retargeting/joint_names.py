@@ -15,8 +15,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from viewer.rig.arrays import Ints
+from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
+from viewer.rig.skeleton import Skeleton
 
-__all__ = ["canonical_names", "plain_names", "sided_words"]
+__all__ = ["canonical_names", "joint_meanings", "plain_names", "sided_words"]
 
 _WORDS = {
     "pelvis": "pelvis hips",
@@ -114,6 +116,33 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
     """
     return _keys(names)
+
+
+def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
+    """Return the SMPL family's name for each joint, as its file states it or its name implies.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Its humanoid, if it has one, takes precedence over its names.
+
+    Returns
+    -------
+    tuple of J str
+        As ``canonical_names``.
+    """
+    if skeleton.humanoid is not None:
+        return _stated(skeleton.humanoid, skeleton.n_joints)
+    return canonical_names(skeleton.names, skeleton.parents)
+
+
+def _stated(humanoid: Humanoid, n_joints: int) -> tuple[str, ...]:
+    """Return the SMPL family's name for each joint of a humanoid."""
+    joints = humanoid.joints
+    spine = [joints[bone] for bone in SPINE_BONES if bone in joints]
+    named = {joint: HUMAN_BONES[bone] for bone, joint in joints.items() if bone in HUMAN_BONES}
+    named |= dict(zip(*_numbered(spine), strict=True))
+    return tuple(named.get(joint, "") for joint in range(n_joints))
 
 
 def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:

@@ -96,7 +96,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     figure : Figure
         Figure with a symmetric skeleton.
     pose : Pose
-        Not changed.
+        Not modified.
 
     Returns
     -------

@@ -17,7 +17,7 @@ _known: Memo[TransformClip, float] = Memo()
 
 
 def key_rate(clip: TransformClip) -> float:
-    """Return the frames per second that a clip's keys are at.
+    """Return the frame rate of a clip's keys.
 
     Parameters
     ----------

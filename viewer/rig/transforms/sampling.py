@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.motion.transform_clip import TransformClip, TransformPath
-from viewer.rig.motion.transform_table import (
+from viewer.rig.transforms.table import (
     Arcs,
     Curves,
     Timelines,
@@ -137,7 +137,7 @@ def _cubics(curves: Curves, timelines: Timelines, spans: Ints, fractions: Floats
     u = fractions[:, curves.timelines]
     start, rise = curves.values[rows], curves.values[following] - curves.values[rows]
     leaving, arriving = curves.outgoing[rows], curves.incoming[following]
-    # The basis functions of both keys add up to 1, so p0 is exact at u = 0.
+    # The basis functions of both keys sum to 1, so p0 is exact at u = 0.
     bend = (u - 1.0) * (u - 1.0) * leaving + u * (u - 1.0) * arriving
     return start + u * u * (3.0 - 2.0 * u) * rise + durations * u * bend
 

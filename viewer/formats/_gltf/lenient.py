@@ -1,4 +1,4 @@
-"""Members whose faults are warnings: a file with an invalid material still shows its shape."""
+"""Members whose errors are only warnings: a file with an invalid material can still be shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Content = TypeVar("Content")
 
 
 def lenient(source: Source, read: Callable[[], Content], default: Content) -> Content:
-    """Return what a function reads; after an error, a default with a warning."""
+    """Return the result of a function; after an error, a default with a warning."""
     try:
         return read()
     except FormatError as problem:

@@ -8,8 +8,8 @@ from rig.animated import HALF, about, channel, clip_of, plain_value
 from viewer.errors import RigError
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.transform_rate import key_rate
-from viewer.rig.motion.transform_sampling import sample_transforms
+from viewer.rig.transforms.rate import key_rate
+from viewer.rig.transforms.sampling import sample_transforms
 
 EXACT = 1e-14  # a few roundings of numbers near 1
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
-from viewer.rig.motion.transform_sampling import TransformSamples
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.sampling import TransformSamples
 
 __all__ = ["apply_placements", "apply_transforms", "set_joint_translations"]
 

@@ -147,7 +147,7 @@ def transform_table(channels: Sequence[TransformChannel]) -> TransformTable:
 
 
 def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
-    """Return the different lists of times, and the index of each channel's."""
+    """Return the different lists of times, and the index of the list of each channel."""
     known: dict[bytes, int] = {}
     of_channel = [known.setdefault(times.tobytes(), len(known)) for times in every]
     parts = [np.frombuffer(raw, dtype=np.float64) for raw in known]

@@ -55,8 +55,9 @@ def right_half() -> Figure:
     figure = painted("mask")
     mesh = figure.require_mesh()
     kept = mesh.positions[mesh.triangles, 0].mean(axis=1) > 0.0
-    mesh = replace(mesh, triangles=mesh.triangles[kept], triangle_materials=None)
-    return replace(figure, mesh=replace(mesh, triangle_materials=mesh.material_indices * 0))
+    number = np.zeros(kept.sum(), np.int32)
+    changes = {"triangles": mesh.triangles[kept], "triangle_materials": number}
+    return replace(figure, mesh=replace(mesh, **changes, triangle_parts=None))
 
 
 def behind() -> Figure:

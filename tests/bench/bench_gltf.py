@@ -1,0 +1,121 @@
+"""Reading a GLB with many animations, against reading its bytes and parsing its JSON."""
+
+from __future__ import annotations
+
+import json
+import struct
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from measure import interleaved, report
+
+from viewer.formats import Source
+from viewer.formats._gltf.node_file import read_nodes
+
+N_ANIMATIONS, N_JOINTS, N_KEYS, N_SIDE = 60, 70, 70, 120
+PATHS = (("translation", 3), ("rotation", 4), ("scale", 3))
+
+
+class Glb:
+    """A binary file under construction."""
+
+    def __init__(self) -> None:
+        self.root: dict[str, list[object]] = {"accessors": [], "bufferViews": []}
+        self.chunks: list[bytes] = []
+        self.size = 0
+
+    def accessor(self, array: np.ndarray, code: int, **members: object) -> int:
+        """Append an array and return the index of its accessor."""
+        data = array.tobytes()
+        view = {"buffer": 0, "byteOffset": self.size, "byteLength": len(data)}
+        self.root["bufferViews"].append(view)
+        self.chunks.append(data)
+        self.size += len(data)
+        kinds = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+        place = {"bufferView": len(self.root["bufferViews"]) - 1, "componentType": code}
+        kind = {"count": len(array), "type": kinds[array.shape[1]]}
+        self.root["accessors"].append({**place, **kind, **members})
+        return len(self.root["accessors"]) - 1
+
+    def data(self) -> bytes:
+        """Return the file."""
+        root = {"asset": {"version": "2.0"}, **self.root, "buffers": [{"byteLength": self.size}]}
+        text = json.dumps(root).encode()
+        text += b" " * (-len(text) % 4)
+        body = struct.pack("<I4s", len(text), b"JSON") + text
+        body += struct.pack("<I4s", self.size, b"BIN\0") + b"".join(self.chunks)
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def character(has_own_times: bool) -> bytes:
+    """Return a skinned grid with 60 animations of 70 joints.
+
+    Parameters
+    ----------
+    has_own_times : bool
+        Whether each channel has an accessor of its own for its times, as some exporters write.
+    """
+    rng = np.random.default_rng(0)
+    glb = Glb()
+    x, y = (part.ravel() for part in np.mgrid[:N_SIDE, :N_SIDE])
+    positions = np.stack([x, y, 0 * x], axis=1).astype("<f4")
+    corner = (np.arange(N_SIDE - 1)[:, None] * N_SIDE + np.arange(N_SIDE - 1)).ravel()
+    square = corner[:, None] + [0, N_SIDE, 1, 1, N_SIDE, N_SIDE + 1]
+    weights = np.zeros((len(x), 4), dtype="<f4")
+    weights[:, 0] = 1.0
+    attributes = {
+        "POSITION": glb.accessor(positions, 5126),
+        "JOINTS_0": glb.accessor(rng.integers(N_JOINTS, size=(len(x), 4)).astype("u1"), 5121),
+        "WEIGHTS_0": glb.accessor(weights, 5126),
+    }
+    indices = glb.accessor(square.astype("<u4").reshape(-1, 1), 5125)
+    glb.root["meshes"] = [{"primitives": [{"attributes": attributes, "indices": indices}]}]
+    chain = [{"children": [joint + 1]} for joint in range(1, N_JOINTS)]
+    glb.root["nodes"] = [{"mesh": 0, "skin": 0}, *chain, {}]
+    glb.root["skins"] = [{"joints": list(range(1, N_JOINTS + 1))}]
+    glb.root["animations"] = [animation(glb, rng, has_own_times) for _ in range(N_ANIMATIONS)]
+    return glb.data()
+
+
+def animation(glb: Glb, rng: np.random.Generator, has_own_times: bool) -> dict[str, object]:
+    """Return an animation of all joints."""
+    times = (np.arange(N_KEYS, dtype="<f4") / 30.0)[:, None]
+    limits = {"min": [0.0], "max": [float(times[-1, 0])]}
+    shared = glb.accessor(times, 5126, **limits)
+    samplers, channels = [], []
+    for joint in range(1, N_JOINTS + 1):
+        for path, width in PATHS:
+            values = glb.accessor(rng.normal(size=(N_KEYS, width)).astype("<f4"), 5126)
+            used = glb.accessor(times, 5126, **limits) if has_own_times else shared
+            target = {"node": joint, "path": path}
+            channels.append({"sampler": len(samplers), "target": target})
+            samplers.append({"input": used, "output": values, "interpolation": "LINEAR"})
+    return {"name": "walk", "channels": channels, "samplers": samplers}
+
+
+def parsed(path: Path) -> object:
+    """Read the bytes of a binary file and parse its JSON."""
+    data = path.read_bytes()
+    size = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20 : 20 + size])
+
+
+def main(rounds: int = 9) -> None:
+    """Print the ratios."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "large.glb"
+        for has_own_times in (False, True):
+            path.write_bytes(character(has_own_times))
+            work: dict[str, Callable[[], object]] = {
+                "viewer": lambda: read_nodes(Source.open(path)),
+                "bytes and json.loads": lambda: parsed(path),
+            }
+            title = f"a GLB of {path.stat().st_size / 1e6:.0f} MB with {N_ANIMATIONS} animations"
+            title += ", times for each channel" if has_own_times else ""
+            report(title, interleaved(work, rounds), ("viewer", "bytes and json.loads"), 1.5)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""Hundreds of broken documents: each is read, or refused with one line that names the file."""
+
+from collections.abc import Iterable
+
+import pytest
+from formats.gltf.broken import changed, complete, truncated
+from formats.gltf.files import source_of, warned
+
+from viewer.diagnostics import Collector
+from viewer.errors import FormatError, ViewerError
+from viewer.formats import Source, read
+from viewer.formats._gltf.node_file import read_nodes
+
+
+def refusals(files: Iterable[bytes]) -> list[str]:
+    """Read files, with and without keeping errors, and return the messages of those refused."""
+    found = []
+    for data in files:
+        kept = Source("a.gltf", data, diagnostics=Collector(keeps_errors=True))
+        try:
+            # Errors that are kept do not prevent others from being found.
+            read_nodes(kept)
+        except FormatError as problem:
+            kept.diagnostics.add(problem.diagnostic)
+        try:
+            content = read_nodes(source_of(data))
+            for animation in content.animations:
+                animation.read()
+        except FormatError as problem:
+            found.append(str(problem))
+            assert kept.diagnostics.errors
+    return found
+
+
+def test_the_whole_document_is_valid() -> None:
+    assert warned(complete()) == []
+    assert len(read(source_of(complete())).figures) == 2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_changed_values(seed: int) -> None:
+    found = refusals(changed(seed, 80))
+    assert 20 < len(found) < 80
+    for line in found:
+        assert "\n" not in line and ("a.gltf#/" in line or "a.gltf" not in line)
+        assert len(line) < 400
+
+
+def test_truncated_files() -> None:
+    for line in refusals(truncated()):
+        assert line.startswith("a.gltf") and "\n" not in line
+
+
+def test_figures_of_changed_documents() -> None:
+    for data in changed(9, 60):
+        try:
+            group = read(source_of(data))
+        except ViewerError as problem:
+            assert "\n" not in str(problem)
+        else:
+            assert group.figures

@@ -1,0 +1,128 @@
+"""Humanoids, expressions and permissions of VRM files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from formats.gltf.files import File
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.front import guess_front
+from viewer.rig.pose import rest_pose
+from viewer.rig.retargeting.joint_names import joint_meanings
+from viewer.rig.shape import shaped
+
+BONES = {"hips": 0, "spine": 1, "chest": 2, "head": 3, "leftUpperArm": 4, "rightUpperArm": 5}
+PARENTS = {1: 0, 2: 1, 3: 2, 4: 2, 5: 2}
+
+
+def _file(**extensions: Any) -> File:
+    """Return a character of six joints without telling names, and a mesh with two targets."""
+    # The left arm is at -x, as in a figure that faces -z.
+    places = [[0, 1, 0], [0, 0.2, 0], [0, 0.2, 0], [0, 0.3, 0], [-0.3, 0, 0], [0.3, 0, 0]]
+    file = File(extensionsUsed=[*extensions], extensions=extensions)
+    for node, place in enumerate(places):
+        children = [child for child, parent in PARENTS.items() if parent == node]
+        item = {"name": f"n{node}", "translation": place}
+        file.add("nodes", item | ({"children": children} if children else {}))
+    mesh = file.mesh()
+    targets = [[[1, 0, 0]] * 3, [[0, 2, 0]] * 3]
+    file.primitive["targets"] = [{"POSITION": file.accessor(each)} for each in targets]
+    file.add("nodes", {"name": "face", "mesh": mesh})
+    file.root["nodes"][3]["children"] = [6]
+    return file
+
+
+def _loaded(file: File, folder: Path) -> tuple[viewer.Scene, Figure]:
+    path = folder / "a.vrm"
+    path.write_bytes(file.glb())
+    scene = viewer.load(path)
+    return scene, scene.actors[0].figure
+
+
+def _modern(expressions: dict[str, Any]) -> dict[str, Any]:
+    bones = {bone: {"node": node} for bone, node in BONES.items()}
+    told = {"specVersion": "1.0", "humanoid": {"humanBones": bones}}
+    meta = {"name": "Ada", "authors": ["A", "B"], "allowRedistribution": False}
+    return {**told, "meta": meta, "expressions": {"preset": expressions}}
+
+
+def test_bones_give_joints_their_meaning_whatever_they_are_called(tmp_path: Path) -> None:
+    scene, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
+    skeleton = figure.require_skeleton()
+    meanings = dict(zip(skeleton.names, joint_meanings(skeleton), strict=True))
+    assert meanings["n0"] == "pelvis" and meanings["n4"] == "left_shoulder"
+    assert [meanings[name] for name in ("n1", "n2")] == ["spine1", "spine3"]
+    assert guess_front(scene) == "-z"
+
+
+def test_bones_of_version_0_are_a_list_with_other_thumbs(tmp_path: Path) -> None:
+    bones = [{"bone": bone, "node": node} for bone, node in BONES.items()]
+    bones += [{"bone": "leftThumbProximal", "node": 6}]
+    _, figure = _loaded(_file(VRM={"humanoid": {"humanBones": bones}}), tmp_path)
+    skeleton = figure.require_skeleton()
+    assert skeleton.humanoid is not None
+    thumb = skeleton.humanoid.joints["leftThumbMetacarpal"]
+    assert skeleton.names[thumb] == "face"
+    assert joint_meanings(skeleton)[thumb] == "left_thumb1"
+
+
+def test_expressions_are_sums_of_morph_targets(tmp_path: Path) -> None:
+    binds = [{"node": 6, "index": 0, "weight": 0.5}, {"node": 6, "index": 1, "weight": 1.0}]
+    expressions = {
+        "happy": {"morphTargetBinds": binds, "overrideBlink": "block"},
+        "blink": {"morphTargetBinds": binds[:1]},
+    }
+    _, figure = _loaded(_file(VRMC_vrm=_modern(expressions)), tmp_path)
+    assert figure.blend_shapes is not None
+    assert figure.blend_shapes.names[2:] == ("happy", "blink")
+    rest = figure.require_mesh().positions
+
+    def moved(*weights: float) -> np.ndarray:
+        return shaped(figure, np.array(weights)).require_mesh().positions - rest
+
+    assert_allclose(moved(0, 0, 0.5, 0), np.tile([0.25, 1.0, 0.0], (3, 1)))
+    assert_allclose(moved(0, 0, 0, 1.0), np.tile([0.5, 0.0, 0.0], (3, 1)))
+    # The smile suppresses the blink.
+    assert_allclose(moved(0, 0, 0.5, 1.0), np.tile([0.25, 1.0, 0.0], (3, 1)))
+
+
+def test_expressions_of_version_0_are_percentages_of_meshes(tmp_path: Path) -> None:
+    group = {"name": "Joy", "binds": [{"mesh": 0, "index": 1, "weight": 50}], "isBinary": True}
+    told = {"blendShapeMaster": {"blendShapeGroups": [group]}}
+    _, figure = _loaded(_file(VRM=told), tmp_path)
+    assert figure.blend_shapes is not None and figure.blend_shapes.names[-1] == "Joy"
+    rest = figure.require_mesh().positions
+    for weight, expected in ((0.4, 0.0), (0.6, 1.0)):
+        found = shaped(figure, np.array([0.0, 0.0, weight])).require_mesh().positions - rest
+        assert_allclose(found, np.tile([0.0, expected, 0.0], (3, 1)))
+
+
+def test_permissions_are_facts(tmp_path: Path) -> None:
+    _, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
+    facts = dict(figure.facts)
+    assert facts["VRM"] == "1.0" and facts["title"] == "Ada" and facts["authors"] == "A, B"
+    assert facts["redistribution"] == "not allowed"
+
+
+def test_faulty_bones_and_binds_are_ignored_and_named(tmp_path: Path) -> None:
+    told = _modern({"happy": {"morphTargetBinds": [{"node": 6, "index": 9, "weight": 1.0}]}})
+    told["humanoid"]["humanBones"] |= {"head": {"node": 99}, "tail": {"node": 1}}
+    scene, figure = _loaded(_file(VRMC_vrm=told), tmp_path)
+    keys = [found.key for found in scene.diagnostics]
+    assert {"G006.bone", "G006.bone-node", "G006.bind"} <= set(keys)
+    assert figure.blend_shapes is not None and figure.blend_shapes.n_shapes == 2
+    humanoid = figure.require_skeleton().humanoid
+    assert humanoid is not None and set(humanoid.joints) == set(BONES) - {"head"}
+
+
+def test_a_character_file_of_another_program_opens(shared_data: Path) -> None:
+    scene = viewer.load(shared_data / "gltf" / "vrm0_sphere.vrm")
+    skeleton = scene.actors[0].figure.require_skeleton()
+    assert skeleton.humanoid is not None and len(skeleton.humanoid.joints) == 22
+    assert rest_pose(skeleton).dofs.any() == np.False_
+    assert guess_front(scene) == "-z"

@@ -1,0 +1,193 @@
+"""Humanoid bones, expressions and permissions of a VRM file.
+
+Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0. Version 0
+names the joints of a thumb differently, gives the weights of expressions in percent, and binds
+them to meshes instead of nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from viewer.formats._nodes.content import NodeExpression, NodeFile
+from viewer.formats._source import Source
+from viewer.rig.expressions import OVERRIDES, PROCEDURAL
+from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
+
+__all__ = ["with_vrm"]
+
+_PERCENT = 100.0
+_OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
+_OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
+# Heading for each property, under its names in versions 1.0 and 0.x.
+_META = {
+    "title": ("name", "title"),
+    "authors": ("authors", "author"),
+    "model version": ("version",),
+    "copyright": ("copyrightInformation",),
+    "contact": ("contactInformation",),
+    "licence": ("licenseUrl", "licenseName"),
+    "other licence": ("otherLicenseUrl",),
+    "may be used by": ("avatarPermission", "allowedUserName"),
+    "commercial use": ("commercialUsage", "commercialUssageName"),
+    "credit": ("creditNotation",),
+    "redistribution": ("allowRedistribution",),
+    "modification": ("modification",),
+    "violent use": ("allowExcessivelyViolentUsage", "violentUssageName"),
+    "sexual use": ("allowExcessivelySexualUsage", "sexualUssageName"),
+    "political or religious use": ("allowPoliticalOrReligiousUsage",),
+    "antisocial use": ("allowAntisocialOrHateUsage",),
+}
+_LONGEST = 200  # characters of a property
+
+
+def with_vrm(file: NodeFile, source: Source) -> NodeFile:
+    """Return a file with the humanoid, expressions and facts of its VRM extension, if any."""
+    for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
+        told = file.extensions.get(key)
+        if isinstance(told, dict):
+            pointer = f"/extensions/{key}"
+            return replace(
+                file,
+                humanoid=_humanoid(source, file, told, version, pointer),
+                expressions=_expressions(source, file, told, version, pointer),
+                facts=_facts(told),
+            )
+    return file
+
+
+def _part(told: Mapping[str, Any], *names: str) -> Any:
+    """Return a nested property; None if it is missing or something else on the way."""
+    value: Any = told
+    for name in names:
+        value = value.get(name) if isinstance(value, dict) else None
+    return value
+
+
+def _humanoid(
+    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+) -> dict[str, int]:
+    """Return the node of each human bone, by its name in VRM 1.0."""
+    bones = _part(told, "humanoid", "humanBones")
+    given: list[tuple[Any, Any]] = []
+    if version == 0 and isinstance(bones, list):
+        given = [(_part(each, "bone"), _part(each, "node")) for each in bones]
+        given = [(_modern(bone), node) for bone, node in given if isinstance(bone, str)]
+    elif isinstance(bones, dict):
+        given = [(bone, _part(each, "node")) for bone, each in bones.items()]
+    found: dict[str, int] = {}
+    for bone, node in given:
+        if not _is_index(node, file.tree.n_nodes):
+            source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
+        elif bone in HUMAN_BONES or bone in SPINE_BONES:
+            found[bone] = node
+        else:
+            source.warn("G006.bone", f"{pointer}/humanoid/humanBones", bone=bone)
+    return found
+
+
+def _modern(bone: str) -> str:
+    for old, new in _OLD_THUMB.items():
+        if bone.endswith(old):
+            return bone.removesuffix(old) + new
+    return bone
+
+
+def _is_index(value: Any, count: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < count
+
+
+def _expressions(
+    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+) -> tuple[NodeExpression, ...]:
+    """Return the expressions that bind morph targets; say which change materials only."""
+    if version == 0:
+        groups = _part(told, "blendShapeMaster", "blendShapeGroups")
+        named = [(each.get("name"), each) for each in groups or () if isinstance(each, dict)]
+        at = f"{pointer}/blendShapeMaster/blendShapeGroups"
+    else:
+        kinds = [_part(told, "expressions", kind) for kind in ("preset", "custom")]
+        named = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
+        at = f"{pointer}/expressions"
+    found, undrawn = [], []
+    for name, each in named:
+        if not isinstance(each, dict):
+            continue
+        binds = _binds(source, file, each, version, at)
+        if any(
+            each.get(key)
+            for key in ("materialColorBinds", "textureTransformBinds", "materialValues")
+        ):
+            undrawn.append(str(name))
+        if binds:
+            found.append(_expression(str(name), each, binds))
+    if undrawn:
+        source.warn("F007.vrm-materials", at, names=undrawn)
+    return tuple(found)
+
+
+def _expression(
+    name: str, told: Mapping[str, Any], binds: tuple[tuple[int, int, float], ...]
+) -> NodeExpression:
+    overrides = {}
+    for kind, key in _OVERRIDES.items():
+        effect = told.get(key, "none")
+        overrides[kind] = effect if effect in OVERRIDES else "none"
+    kinds = [kind for kind, names in PROCEDURAL.items() if name in names]
+    return NodeExpression(
+        name,
+        binds,
+        is_binary=told.get("isBinary") is True,
+        kind=kinds[0] if kinds else "",
+        overrides=overrides,
+    )
+
+
+def _binds(
+    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
+) -> tuple[tuple[int, int, float], ...]:
+    """Return node, morph target and weight of each bind of an expression."""
+    listed = told.get("binds" if version == 0 else "morphTargetBinds")
+    binds: list[tuple[int, int, float]] = []
+    for each in listed if isinstance(listed, list) else ():
+        index, weight = _part(each, "index"), _part(each, "weight")
+        if version == 0:
+            mesh, scale = _part(each, "mesh"), 1.0 / _PERCENT
+            is_mesh = _is_index(mesh, len(file.meshes))
+            nodes = np.flatnonzero(file.tree.meshes == mesh).tolist() if is_mesh else []
+        else:
+            node, scale = _part(each, "node"), 1.0
+            nodes = [node] if _is_index(node, file.tree.n_nodes) else []
+        is_number = isinstance(weight, int | float) and bool(np.isfinite(weight))
+        valid = [node for node in nodes if _has_target(file, node, index)]
+        if not valid or not is_number:
+            source.warn("G006.bind", pointer, found=index)
+            continue
+        binds += [(node, index, float(weight) * scale) for node in valid]
+    return tuple(binds)
+
+
+def _has_target(file: NodeFile, node: int, index: Any) -> bool:
+    mesh = int(file.tree.meshes[node])
+    return mesh >= 0 and _is_index(index, len(file.meshes[mesh].target_names))
+
+
+def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return the properties of the model for ``viewer info``, each a heading and a text."""
+    meta = told.get("meta")
+    facts = [("VRM", str(told.get("specVersion") or "0.x")[:_LONGEST])]
+    for heading, keys in _META.items():
+        value = next((_part(meta or {}, key) for key in keys if _part(meta or {}, key)), None)
+        if value is None and any(_part(meta or {}, key) is False for key in keys):
+            value = False
+        if isinstance(value, bool):
+            facts.append((heading, "allowed" if value else "not allowed"))
+        elif isinstance(value, list):
+            facts.append((heading, ", ".join(map(str, value))[:_LONGEST]))
+        elif value:
+            facts.append((heading, str(value)[:_LONGEST]))
+    return tuple(facts)

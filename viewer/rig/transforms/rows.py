@@ -1,0 +1,150 @@
+"""Curves of keyed transforms: the components of their channels, with rotations as Euler angles.
+
+A rotation is shown as the angles x, y, z of the joint about its rest rotation, R = R_rest Rz Ry Rx,
+which are also the DOFs of a ball joint. Other channels are shown as the values of their keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.rotation import (
+    axis_rotations,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+)
+from viewer.rig.memo import Memo
+from viewer.rig.motion.transform_clip import TransformChannel, TransformClip, TransformPath
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.transforms.sampling import TransformSamples, sample_transforms
+
+__all__ = ["TransformRow", "angles_of", "from_angles", "key_values", "row_values", "rows_of"]
+
+_rows: Memo[TransformClip, tuple[TransformRow, ...]] = Memo(kept=1)
+_parts: Memo[TransformClip, TransformClip] = Memo(kept=2)
+
+
+@dataclass(frozen=True, slots=True)
+class TransformRow:
+    """One curve of a clip.
+
+    Attributes
+    ----------
+    path : str
+        Entry of ``TRANSFORM_PATHS``.
+    joint : int
+        Joint that moves; -1 for weights.
+    component : int
+        0 to 2 for x, y, z, or the component of a channel of weights.
+    channel : int
+        Index of the channel; -1 for a rotation without keys.
+    shape : int
+        Blend shape of a weight, else -1.
+    """
+
+    path: TransformPath
+    joint: int
+    component: int
+    channel: int
+    shape: int = -1
+
+
+def rows_of(clip: TransformClip, skeleton: Skeleton) -> tuple[TransformRow, ...]:
+    """Return the curves of a clip: of each joint its rotation and what has keys, then weights."""
+    return _rows.get(clip, id(skeleton), lambda: _listed(clip, skeleton))
+
+
+def _listed(clip: TransformClip, skeleton: Skeleton) -> tuple[TransformRow, ...]:
+    owned = {(one.joint, one.path): index for index, one in enumerate(clip.channels)}
+    paths: tuple[TransformPath, ...] = ("translation", "rotation", "scale")
+    hidden = skeleton.auxiliary
+    rows = [
+        TransformRow(path, joint, component, owned.get((joint, path), -1))
+        for joint in range(skeleton.n_joints)
+        for path in paths
+        if (joint, path) in owned or (path == "rotation" and (hidden is None or not hidden[joint]))
+        for component in range(3)
+    ]
+    for index, channel in enumerate(clip.channels):
+        if channel.shapes is not None:
+            rows += [
+                TransformRow("weights", -1, component, index, shape)
+                for component, shape in enumerate(channel.shapes.tolist())
+            ]
+    return tuple(rows)
+
+
+def angles_of(skeleton: Skeleton, joint: int, quaternions: Floats) -> Floats:
+    """Return a joint's angles about x, y, z from rest, radians: (..., 3) for rotations (..., 4)."""
+    base = quaternion_to_matrix(skeleton.rest_rotations[joint])
+    return matrix_to_euler(base.T @ quaternion_to_matrix(quaternions))
+
+
+def from_angles(skeleton: Skeleton, joint: int, angles: Floats) -> Floats:
+    """Return the rotation (4,) relative to the parent of a joint with angles (3,) from rest."""
+    x, y, z = (axis_rotations(axis, angles[axis]) for axis in range(3))
+    base = quaternion_to_matrix(skeleton.rest_rotations[joint])
+    return matrix_to_quaternion(base @ z @ y @ x)
+
+
+def key_values(channel: TransformChannel, skeleton: Skeleton) -> Floats:
+    """Return the values of a channel's keys as curves: (N, C), three angles for rotations."""
+    if channel.path == "rotation":
+        return angles_of(skeleton, channel.joint, channel.values)
+    return channel.values
+
+
+def row_values(
+    clip: TransformClip, skeleton: Skeleton, chosen: Sequence[int], times: Floats
+) -> Floats:
+    """Return some curves of a clip at many times.
+
+    Parameters
+    ----------
+    clip : TransformClip
+        The motion.
+    skeleton : Skeleton
+        The skeleton that it moves.
+    chosen : sequence of int
+        Indices into ``rows_of``.
+    times : (T,)
+        Seconds.
+
+    Returns
+    -------
+    (T, C)
+        Radians, lengths, factors or weights; 0 for rotations without keys.
+    """
+    rows = [rows_of(clip, skeleton)[index] for index in chosen]
+    used = tuple(sorted({row.channel for row in rows if row.channel >= 0}))
+
+    def part() -> TransformClip:
+        channels = tuple(clip.channels[index] for index in used)
+        return TransformClip(clip.name, channels, clip.start, clip.end)
+
+    found = sample_transforms(_parts.get(clip, used, part), times)
+    result = np.zeros((len(times), len(rows)))
+    for column, row in enumerate(rows):
+        if row.channel >= 0:
+            result[:, column] = _sampled(found, skeleton, row)
+    return result
+
+
+def _sampled(found: TransformSamples, skeleton: Skeleton, row: TransformRow) -> Floats:
+    """Return one curve from the samples of its channel: (T,)."""
+    if row.path == "weights":
+        return found.weights[:, int(np.argmax(found.weighted == row.shape))]
+    targets, values = {
+        "rotation": (found.rotated, found.rotations),
+        "translation": (found.translated, found.translations),
+        "scale": (found.scaled, found.scales),
+    }[row.path]
+    own = values[:, int(np.argmax(targets == row.joint))]
+    if row.path == "rotation":
+        own = angles_of(skeleton, row.joint, own)
+    return np.asarray(own[:, row.component])
