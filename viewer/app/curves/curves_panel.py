@@ -38,7 +38,7 @@ from viewer.app.curves.state import Curves, KeyPlace
 from viewer.app.curves.transform_keys import TransformKeys
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
-from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
+from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel, TransformClip
 
 __all__ = ["draw"]
 
@@ -87,13 +87,14 @@ def draw(state: AppState) -> None:
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
     """Deselect curves and keys that no longer exist, and show those of a newly selected joint."""
     view, clip = state.of(Curves), state.actor.clip
-    owner = (id(state.actor), type(clip).__name__, len(curves))
+    kind = f"{type(clip).__name__} {state.actor.animation}"
+    owner = (id(state.actor), kind, len(curves))
     if owner != view.owner:
         view.owner, view.joint = owner, -1
-        view.choose(_rows_of(curves, curves[0].number))
+        view.choose(_first_shown(state, curves, curves[0].number))
     if state.selected_joint != view.joint:
         view.joint = state.selected_joint
-        rows = _rows_of(curves, view.joint)
+        rows = _first_shown(state, curves, view.joint)
         if view.joint >= 0 and rows:
             view.choose(rows)
             view.wants_scroll = True
@@ -102,8 +103,12 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
         drop_missing(view, keyed, len(curves))
 
 
-def _rows_of(curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
-    return tuple(row for row, curve in enumerate(curves) if curve.number == number)
+def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
+    """Return the curves that a selected joint shows: of keyed transforms only its angles."""
+    rows = tuple(row for row, curve in enumerate(curves) if curve.number == number)
+    if not isinstance(state.actor.clip, TransformClip):
+        return rows
+    return tuple(row for row in rows if curves[row].is_angle) or rows
 
 
 # The list

@@ -55,8 +55,8 @@ def read_nodes(source: Source) -> NodeFile:
     _check_version(document)
     check_extensions(document)
     skins = read_skins(document)
-    tree = _without_empty_skins(read_tree(document), skins)
     materials = read_materials(document)
+    tree = _without_empty_skins(read_tree(document), skins)
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
     tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
@@ -78,19 +78,19 @@ def read_nodes(source: Source) -> NodeFile:
     )
 
 
+def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTree:
+    """Return the nodes without their references to skins that have no joints."""
+    empty = [index for index, skin in enumerate(skins) if not len(skin.joints)]
+    used = np.where(np.isin(tree.skins, empty), -1, tree.skins).astype(np.int32)
+    return replace(tree, skins=used) if empty else tree
+
+
 def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
     """Return a mesh whose primitives without a material have this one."""
     primitives = (
         replace(one, material=index) if one.material < 0 else one for one in mesh.primitives
     )
     return replace(mesh, primitives=tuple(primitives))
-
-
-def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTree:
-    """Return the nodes without their references to skins that have no joints."""
-    empty = [index for index, skin in enumerate(skins) if not len(skin.joints)]
-    used = np.where(np.isin(tree.skins, empty), -1, tree.skins).astype(np.int32)
-    return replace(tree, skins=used) if empty else tree
 
 
 def _object(document: Document, name: str) -> dict[str, object]:
