@@ -63,7 +63,7 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Fi
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
     pieces = pieces_of(file, members.meshes, bindings)
-    columns = shape_columns(file, members.meshes)
+    columns = shape_columns(file, members.meshes, readers)
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
