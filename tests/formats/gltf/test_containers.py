@@ -119,9 +119,12 @@ def test_deviations_from_json_are_warnings() -> None:
         ("G001.constants", ""),
         ("G001.repeated", ""),
     ]
+    nulls = b'"scene": null, "extras": {"a": null}, "nodes": [{"name": null, "mesh": null}]}'
+    assert warned(head + nulls) == [("G001.nulls", "")]
+    assert read(head + nulls).extras == {"a": None} and read(head + nulls).tree.names == ("",)
     assert warned(head + b'"nodes": [{"name": "a\xff"}]}') == [("G001.text", "")]
     assert read(head + b'"nodes": [{"name": "a\xff"}]}').tree.names == ("a\ufffd",)
-    assert warned(b"{}") == [("G001.no-asset", "/")]
+    assert warned(b"{}") == [("G001.no-asset", "")]
 
 
 @pytest.mark.parametrize(
@@ -179,7 +182,7 @@ def test_files_beside_the_document(tmp_path: Path, name: str, uri: str) -> None:
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"gone\.bin: cannot be read"):
+    with pytest.raises(FormatError, match=r"a\.gltf#/buffers/0/uri: .*gone\.bin: cannot be read"):
         read(triangle().json("gone.bin"), tmp_path / "a.gltf")
 
 

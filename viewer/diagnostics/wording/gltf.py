@@ -33,12 +33,14 @@ MESSAGES = {
     "G001.length": "expected {expected:#byte} as declared by the header, found {found}",
     "G001.constants": "{n:#number} invalid in JSON (first: {found})",
     "G001.repeated": "{n:#repeated key} (first: {found:quoted}): only the last value is used",
+    "G001.nulls": "{n:#member} that {n:?is|are} null: ignored",
     "G001.text": "invalid UTF-8 at byte {at} of the JSON: replaced",
     # Values
     "F002.gltf-missing": "expected {wanted} as {member:quoted}, found none",
     "F002.gltf-type": "expected {wanted}, found {found}",
     "F002.gltf-index": "expected an index below {count} ({what}), found {found}",
     # Buffers and images
+    "F001.gltf-file": "{problem}",
     "F002.gltf-scheme": "expected a data URI or a relative file name, found {found:quoted}",
     "F002.gltf-outside": "{found:quoted} {reason}",
     "F002.gltf-data-uri": "expected a comma before the data, found {found:quoted}",

@@ -66,12 +66,34 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     except ValueError:  # the only other error that decoding raises
         raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
     if type(root) is not dict:
-        raise source.fault("F002.gltf-type", "/", wanted="an object", found=describe(root))
+        raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))
     if constants:
         source.warn("G001.constants", n=len(constants), found=constants[0])
     if repeated:
         source.warn("G001.repeated", n=len(repeated), found=repeated[0])
+    if "null" in text and (n_nulls := _remove_nulls(root)):
+        source.warn("G001.nulls", n=n_nulls)
     return root
+
+
+def _remove_nulls(root: dict[str, Any]) -> int:
+    """Remove members that are null, which some exporters write instead of leaving them out.
+
+    Returns their number. Application data are left as they are.
+    """
+    count = 0
+    left: list[Any] = [root]
+    while left:
+        value = left.pop()
+        if type(value) is list:
+            left.extend(item for item in value if type(item) in (dict, list))
+            continue
+        for name in [name for name, member in value.items() if member is None]:
+            del value[name]
+            count += 1
+        members = (member for name, member in value.items() if name != "extras")
+        left.extend(member for member in members if type(member) in (dict, list))
+    return count
 
 
 def _text(source: Source, data: bytes) -> str:

@@ -30,9 +30,9 @@ from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
 from viewer.formats._gltf.targets import node_weights
-from viewer.formats._nodes.content import NodeFile, NodeSkin, NodeTree
+from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._source import Source
-from viewer.rig.material import Material
 
 __all__ = ["read_nodes"]
 
@@ -55,9 +55,13 @@ def read_nodes(source: Source) -> NodeFile:
     _check_version(document)
     check_extensions(document)
     skins = read_skins(document)
+    materials = read_materials(document)
     tree = _without_empty_skins(read_tree(document), skins)
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
     tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
+    if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
+        meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
+        materials = (*materials, DEFAULT_MATERIAL)
     root = document.root
     return NodeFile(
         name=source.path.stem,
@@ -65,7 +69,7 @@ def read_nodes(source: Source) -> NodeFile:
         roots=shown_roots(document, tree),
         meshes=meshes,
         skins=skins,
-        materials=tuple(Material(name) for name in _names(document, "materials")),
+        materials=materials,
         animations=read_animations(document, Targets(tree, meshes)),
         cameras=read_cameras(document),
         extensions=_object(document, "extensions"),
@@ -81,9 +85,12 @@ def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTre
     return replace(tree, skins=used) if empty else tree
 
 
-def _names(document: Document, name: str) -> list[str]:
-    table = document.table(name)
-    return [table[index].text("name") for index in range(len(table))]
+def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
+    """Return a mesh whose primitives without a material have this one."""
+    primitives = (
+        replace(one, material=index) if one.material < 0 else one for one in mesh.primitives
+    )
+    return replace(mesh, primitives=tuple(primitives))
 
 
 def _object(document: Document, name: str) -> dict[str, object]:

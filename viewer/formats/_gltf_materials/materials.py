@@ -15,9 +15,9 @@ from typing import Any
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
 from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
+from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.rig.material import ALPHA_MODES, Material
 

@@ -50,7 +50,8 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     found = [_figure(file, members, readers) for members in groups]
     _note_normals([piece for _, pieces in found for piece in pieces], source)
     _note_weights([piece for _, pieces in found for piece in pieces], source)
-    views, left_out = views_of(file.tree, scene_order(file), file.cameras)
+    order = scene_order(file) if file.cameras else []
+    views, left_out = views_of(file.tree, order, file.cameras)
     if left_out:
         source.warn("F007.orthographic", names=left_out)
     return FigureGroup(file.name, tuple(figure for figure, _ in found), views)
@@ -62,7 +63,7 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Fi
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
     pieces = pieces_of(file, members.meshes, bindings)
-    columns = shape_columns(file, members.meshes)
+    columns = shape_columns(file, members.meshes, readers)
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
