@@ -64,3 +64,8 @@ class Cast:
         self.ups.append(up)
         self.placed.append(placed)
         self.origins.append(origin)
+
+    def take(self, index: int) -> Actor:
+        """Remove one actor and return it."""
+        del self.ups[index], self.placed[index], self.origins[index]
+        return self.actors.pop(index)
