@@ -17,6 +17,9 @@ MESSAGES = {
     "G006.bone-node": "human bone {bone:quoted}: expected the index of a node, found {found}: "
     "ignored",
     "G006.bind": "expected a morph target and its weight, found target {found}: ignored",
+    "G006.constraint": "invalid constraint ignored: expected {expected}",
+    "F002.constraint-cycle": "expected constraints without a cycle, found a cycle of "
+    "nodes {nodes:list12}",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
