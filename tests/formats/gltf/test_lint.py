@@ -40,13 +40,13 @@ def test_several_errors_are_found(tmp_path: Path) -> None:
 def test_findings_of_checks_name_the_element(tmp_path: Path) -> None:
     file = skinned()
     file.root["nodes"][2]["name"] = "hip"
-    # The first joint of the skin, node 1, has no name; its rest pose is 2 m above its bind pose.
-    file.root["nodes"][1]["translation"] = [0, 2, 0]
+    # The first joint of the skin, node 1, has no name; the second is not where it was bound.
+    file.root["nodes"][2]["translation"] = [0, 2, 0]
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
     found = {finding.code: finding for finding in lint_files([path])[1]}
     assert found["S007"].place() == f"{path}#/nodes/1"
-    assert found["B004"].place() == f"{path}#/skins/0/joints/0"
+    assert found["B004"].place() == f"{path}#/skins/0/joints/1"
     assert found["M005"].place(is_short=True) == "a.gltf#/meshes/0/primitives/0/attributes/POSITION"
 
 
