@@ -20,6 +20,8 @@ MESSAGES = {
     "G006.constraint": "invalid constraint ignored: expected {expected}",
     "F002.constraint-cycle": "expected constraints without a cycle, found a cycle of "
     "nodes {nodes:list12}",
+    "G006.first-person": "expected a mesh and auto, both, thirdPersonOnly or firstPersonOnly, "
+    "found {found:quoted}: ignored",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",

@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._nodes.content import NodeExpression, NodeFile
+from viewer.formats._nodes.surfaces import part_name
 from viewer.formats._source import Source
 from viewer.formats._vrm.constraints import read_constraints
+from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, part
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
@@ -67,13 +69,34 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
         told = file.extensions.get(key)
         if isinstance(told, dict):
             pointer = f"/extensions/{key}"
-            return replace(
+            file = replace(
                 file,
                 humanoid=_humanoid(source, file, told, version, pointer),
                 expressions=_expressions(source, file, told, version, pointer),
-                facts=_facts(told),
+                part_views=read_part_views(file, told, version, pointer, source),
             )
-    return file
+            return replace(file, facts=(*_facts(told), *_contents(file)))
+    return replace(file, facts=_contents(file))
+
+
+def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
+    """Return facts about the parts for one view only, and the constraints."""
+    names = file.tree.names
+    shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
+    facts = [
+        (heading, ", ".join(part_name(file, node) for node, view in file.part_views.items()
+                            if view == wanted))
+        for heading, wanted in shown.items()
+    ]  # fmt: skip
+    facts.append((
+        "constraints",
+        ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
+    ))  # fmt: skip
+    return tuple((heading, _shortened(text)) for heading, text in facts if text)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
 def _humanoid(
