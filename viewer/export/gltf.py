@@ -19,7 +19,7 @@ from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._gltf.document import Document, text_of
 from viewer.export._gltf.losses import Written, gltf_losses, not_held
 from viewer.export._gltf.materials import Color, material_losses
-from viewer.export._gltf.mesh import add_mesh
+from viewer.export._gltf.mesh import add_meshes
 from viewer.export._gltf.motion import add_animation, moving, still_locals
 from viewer.export._gltf.nodes import Locals, Tree, add_nodes, locals_of
 from viewer.export._gltf.reading import parsed
@@ -56,7 +56,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     written = {"counts": built.counts, "size": len(data[path])}
     notes = [Diagnostic("X001.gltf", path, values=written)]
     notes += _beside(data, path) + _remarks(body, figure.up)
-    file = Written(path, parsed([*data.values()]), built.tree, built.mesh_node)
+    file = Written(path, parsed([*data.values()]), built.tree, built.mesh_nodes)
     figure, frames = pose_frames(figure, pose)
     rows = np.zeros(1, dtype=np.intp)
     notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
@@ -118,7 +118,7 @@ def export_animation(
             "size": len(data[file]),
         }
         notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
-        written = Written(file, parsed([*data.values()]), made.tree, made.mesh_node, start)
+        written = Written(file, parsed([*data.values()]), made.tree, made.mesh_nodes, start)
         rows = start + np.flatnonzero(present[start:stop])
         lost += gltf_losses(
             written,
@@ -168,7 +168,7 @@ class _Built:
     """Indices and summary of one file's contents."""
 
     tree: Tree
-    mesh_node: int | None
+    mesh_nodes: list[int]
     counts: list[Phrase]
 
 
@@ -192,28 +192,30 @@ def _add_body(
     figure, influences = body.figure, body.influences
     fixes = influences is not None and influences.n_fixed > 0
     tree = add_nodes(document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes)
-    scene, counts, node = [tree.root], list[Phrase](), None
+    scene, counts, nodes = [tree.root], list[Phrase](), list[int]()
     if figure.mesh is not None and figure.mesh.n_vertices:
-        mesh, written = add_mesh(document, figure.name, body.shape, influences, color)
-        item: dict[str, Any] = {"name": text_of(f"{figure.name} mesh"), "mesh": mesh}
-        node = document.add("nodes", item)
+        written = add_meshes(document, figure.name, body.shape, influences, color)
+        bound: dict[str, Any] = {}
         if influences is not None and figure.skin is not None:
             matrices = inverse_bind_matrices(influences, figure.skin.inverse_bind)
-            bound = document.array(matrices, "MAT4")
+            stored = document.array(matrices, "MAT4")
             joints = tree.joints + tree.fixed
-            skin = {"name": text_of(figure.name), "joints": joints, "inverseBindMatrices": bound}
-            item["skin"] = document.add("skins", skin)
-            scene.append(node)  # glTF ignores the transform of a skinned mesh's own node
+            skin = {"name": text_of(figure.name), "joints": joints, "inverseBindMatrices": stored}
+            bound["skin"] = document.add("skins", skin)
+        for name, mesh in zip(written.names, written.meshes, strict=True):
+            nodes.append(document.add("nodes", {"name": name, "mesh": mesh, **bound}))
+        if bound:
+            scene += nodes  # glTF ignores the transform of a skinned mesh's own node
         else:
-            document.root["nodes"][tree.place].setdefault("children", []).append(node)
+            document.root["nodes"][tree.place].setdefault("children", []).extend(nodes)
         before = figure.mesh.n_vertices
-        key = "written-vertices" if written == before else "split-vertices"
-        counts = [Phrase(key, n=written, before=before)]
+        key = "written-vertices" if written.n_vertices == before else "split-vertices"
+        counts = [Phrase(key, n=written.n_vertices, before=before)]
         counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
     if figure.skeleton is not None:
         counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
     document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return _Built(tree, node, counts)
+    return _Built(tree, nodes, counts)
 
 
 def _add_animation(
@@ -237,8 +239,8 @@ def _add_animation(
         body = replace(body, shape=replace(body.shape, weights=weights))
     built = _add_body(document, body, up, pose, still_locals(skeleton, rest, part))
     morph = None
-    if built.mesh_node is not None and np.ptp(weights, axis=0).any():
-        morph = built.mesh_node, weights
+    if built.mesh_nodes and np.ptp(weights, axis=0).any():
+        morph = built.mesh_nodes, weights
     name = animation.motion.name or animation.name
     add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morph)
     return built

@@ -53,6 +53,7 @@ MESSAGES = {
     "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
     "to {length}{extent:+ ({})}",
     # Omitted data
+    "X005.hidden-parts": "{n:#hidden part|is|are} written, too",
     "X003.parts": "not stored in {format}: {parts:all}",
     "X003.clip-placement": "the placement of the whole figure is not part of its clip and is "
     "omitted",

@@ -85,10 +85,10 @@ class Document:
             accessors.append(self.add("accessors", accessor))
         return accessors
 
-    def picture(self, png: bytes, name: str) -> int:
-        """Add an image, the bytes of a PNG file; return its index in ``images``."""
-        view = self._view(png, 0)
-        image = {"name": text_of(name), "mimeType": "image/png", "bufferView": view}
+    def picture(self, data: bytes, name: str) -> int:
+        """Add an image, the bytes of a PNG or JPEG file; return its index in ``images``."""
+        kind = "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+        image = {"name": text_of(name), "mimeType": kind, "bufferView": self._view(data, 0)}
         return self.add("images", image)
 
     def glb(self) -> bytes:

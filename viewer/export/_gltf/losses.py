@@ -35,8 +35,8 @@ class Written:
         Its parsed contents.
     tree : Tree
         Indices of the nodes.
-    mesh_node : int or None
-        Index of the mesh's node.
+    mesh_nodes : list of int
+        Indices of the nodes of the meshes, which share their vertices.
     start : int
         Frame of the figure that is the first in the file.
     """
@@ -44,7 +44,7 @@ class Written:
     path: Path
     file: GltfFile
     tree: Tree
-    mesh_node: int | None
+    mesh_nodes: list[int]
     start: int = 0
 
 
@@ -73,14 +73,15 @@ def gltf_losses(
     columns = changing(frames, still)
     expected = figure_side(figure, frames, how, still)
     sources = None
-    if figure.mesh is not None and written.mesh_node is not None:
+    node = written.mesh_nodes[0] if written.mesh_nodes else None
+    if figure.mesh is not None and node is not None:
         sources = split_seams(figure.mesh)[0]
         expected = _split(expected, sources)
     else:
         expected = replace(expected, body=None, exact=None)
     least = negligible(figure, frames, rows)
     targets = np.flatnonzero(np.isin(shape.targets, columns))
-    place = (written.file, written.tree, written.mesh_node, targets, written.start)
+    place = (written.file, written.tree, node, targets, written.start)
     found = apart(expected, read_back(*place), rows, least)
     causes = []
     if found.vertices is not None:

@@ -1,7 +1,11 @@
-"""Meshes in glTF form: a primitive per material, vertices split at seams, morph targets."""
+"""Meshes in glTF form: one per part, with a primitive per material, and shared vertices.
+
+Vertices are split at seams. Morph targets are those of all parts.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +15,7 @@ from viewer.export._gltf.document import INDICES, VERTICES, Document, text_of
 from viewer.export._gltf.materials import Color, Materials
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import Influences, influence_sets
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, split_seams, vertex_normals
@@ -21,23 +25,30 @@ _LONG = 65535  # maximum number of vertices with 16-bit indices, the highest bei
 _NOT_UNIT = 1e-3  # tolerance of unit length; normals may under- or overflow when squared
 
 
-def add_mesh(
+@dataclass(frozen=True, slots=True)
+class WrittenMeshes:
+    """Indices and names of a figure's meshes, and their number of vertices together."""
+
+    meshes: list[int]
+    names: list[str]
+    n_vertices: int
+
+
+def add_meshes(
     document: Document,
     name: str,
     shape: Shape,
     influences: Influences | None,
     color: Color | None = None,
-) -> tuple[int, int]:
-    """Add a figure's mesh.
+) -> WrittenMeshes:
+    """Add a figure's mesh: a mesh for each of its parts.
 
     ``document``: modified in place.
     ``name``: name of the figure.
     ``shape``: shape of a figure whose mesh is not empty.
     ``influences``: influences of the mesh; None if it is not skinned.
     ``color`` (r, g, b): linear colour of untextured surfaces.
-    Returns ``mesh``: its index.
-    Returns ``n_vertices``: number of written vertices; vertices on seams are
-      duplicated.
+    Returns the meshes; vertices on seams are duplicated.
     """
     mesh = shape.figure.require_mesh()
     sources, uv_indices, triangles = split_seams(mesh)
@@ -47,15 +58,23 @@ def add_mesh(
     ):
         attributes[f"JOINTS_{number}"] = document.array(joints, "VEC4", VERTICES)
         attributes[f"WEIGHTS_{number}"] = document.array(weights, "VEC4", VERTICES)
-    item: dict[str, Any] = {"name": text_of(f"{name} mesh")}
+    common: dict[str, Any] = {}
     shared: dict[str, Any] = {"attributes": attributes}
     shapes = shape.figure.blend_shapes
     if shapes is not None and len(shape.targets):
         shared["targets"] = _targets(document, mesh, shapes, shape.targets, sources)
-        item["weights"] = shape.weights[0].tolist()
-        item["extras"] = {"targetNames": [text_of(shapes.names[row]) for row in shape.targets]}
-    item["primitives"] = _primitives(document, mesh, triangles, len(sources), shared, color)
-    return document.add("meshes", item), len(sources)
+        common["weights"] = shape.weights[0].tolist()
+        common["extras"] = {"targetNames": [text_of(shapes.names[row]) for row in shape.targets]}
+    materials = Materials(document, mesh, color)
+    meshes, names = [], []
+    for part in np.unique(mesh.part_indices).tolist() or [-1]:
+        title = mesh.parts[part] if part >= 0 else ""
+        names.append(text_of(title or f"{name} mesh"))
+        chosen = mesh.part_indices == part
+        primitives = _primitives(document, materials, triangles, chosen, shared, len(sources))
+        item = {"name": names[-1], **common, "primitives": primitives}
+        meshes.append(document.add("meshes", item))
+    return WrittenMeshes(meshes, names, len(sources))
 
 
 def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints) -> dict[str, int]:
@@ -68,6 +87,9 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
         for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
             flipped = uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
             attributes[f"TEXCOORD_{number}"] = document.array(flipped, "VEC2", VERTICES)
+    if mesh.colors is not None:
+        colors = np.clip(mesh.colors[sources], 0.0, 1.0)
+        attributes["COLOR_0"] = document.array(colors, "VEC4", VERTICES)
     return attributes
 
 
@@ -106,23 +128,24 @@ def _targets(
 
 def _primitives(
     document: Document,
-    mesh: Mesh,
+    materials: Materials,
     triangles: Ints,
-    n_vertices: int,
+    chosen: Bools,
     shared: dict[str, Any],
-    color: Color | None,
+    n_vertices: int,
 ) -> list[dict[str, Any]]:
-    materials = Materials(document, mesh, color)
+    """Return a primitive for each material of the chosen triangles, (T,)."""
     if len(triangles) == 0:
         return [{**shared, "mode": _POINTS, "material": materials.plain()}]
     dtype = np.uint16 if n_vertices <= _LONG else np.uint32
+    indices = materials.mesh.material_indices
     primitives = []
-    for index in np.unique(mesh.material_indices).tolist():
-        chosen = triangles[mesh.material_indices == index].astype(dtype).ravel()
+    for index in np.unique(indices[chosen]).tolist():
+        corners = triangles[chosen & (indices == index)].astype(dtype).ravel()
         primitives.append(
             {
                 **shared,
-                "indices": document.array(chosen, "SCALAR", INDICES),
+                "indices": document.array(corners, "SCALAR", INDICES),
                 "material": materials.add(index),
             }
         )

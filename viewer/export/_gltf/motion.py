@@ -42,7 +42,7 @@ def add_animation(
     skeleton: Skeleton,
     frames: Frames,
     tree: Tree,
-    morph: tuple[int, Floats] | None,
+    morph: tuple[list[int], Floats] | None,
 ) -> int:
     """Add rotations of all joints, other properties where they change, and the figure's placement.
 
@@ -56,7 +56,7 @@ def add_animation(
     ``skeleton``: skeleton in the written shape.
     ``frames``: frames without gaps.
     ``tree``: the nodes.
-    ``morph``: the mesh's node and its targets' weights, if these change.
+    ``morph``: nodes of the meshes and their targets' weights, if these change.
     Returns: number of joints with translations.
     Raises RigError if numbers do not fit single precision.
     """
@@ -83,7 +83,9 @@ def add_animation(
         scales = np.repeat(frames.figure_scales[:, None], 3, axis=1)
         keys.add(tree.place, "scale", document.array(scales, "VEC3"))
     if morph is not None:
-        keys.add(morph[0], "weights", document.array(morph[1].ravel(), "SCALAR"))
+        output = document.array(morph[1].ravel(), "SCALAR")
+        for node in morph[0]:
+            keys.add(node, "weights", output)
     document.add(
         "animations",
         {"name": text_of(name), "samplers": keys.samplers, "channels": keys.channels},

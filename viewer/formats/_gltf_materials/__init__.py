@@ -1,1 +1,1 @@
-"""Materials of glTF documents: their textures, images, and older models."""
+"""Materials of glTF files: their surfaces, textures and images."""
