@@ -22,6 +22,7 @@ MESSAGES = {
     "nodes {nodes:list12}",
     "G006.first-person": "expected a mesh and auto, both, thirdPersonOnly or firstPersonOnly, "
     "found {found:quoted}: ignored",
+    "F007.vrm-springs": "{n:#spring chain} not simulated: hair and clothes follow their joints",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",

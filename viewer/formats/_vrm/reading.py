@@ -19,6 +19,7 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.springs import note_springs
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
@@ -65,6 +66,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
         If constraints of nodes depend on each other.
     """
     file = replace(file, constraints=read_constraints(file.tree, source))
+    note_springs(file, source)
     for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
         told = file.extensions.get(key)
         if isinstance(told, dict):
