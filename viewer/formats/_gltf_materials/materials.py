@@ -3,7 +3,8 @@
 Read: all properties of the core specification, ``KHR_texture_transform``, ``KHR_materials_unlit``,
 ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived model
 ``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated, see
-``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored with a warning, because the shape can still be shown.
+``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored
+with a warning, because the shape can still be shown.
 """
 
 from __future__ import annotations

@@ -16,17 +16,16 @@ import numpy as np
 from viewer.formats._nodes.content import NodeExpression, NodeFile
 from viewer.formats._nodes.surfaces import part_name
 from viewer.formats._source import Source
+from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, part
 from viewer.formats._vrm.springs import note_springs
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
-from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
 __all__ = ["with_vrm"]
 
 _PERCENT = 100.0
-_OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
 # Heading for each property, under its names in versions 1.0 and 0.x.
 _META = {
@@ -73,7 +72,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
             pointer = f"/extensions/{key}"
             file = replace(
                 file,
-                humanoid=_humanoid(source, file, told, version, pointer),
+                humanoid=read_humanoid(source, file, told, version, pointer),
                 expressions=_expressions(source, file, told, version, pointer),
                 part_views=read_part_views(file, told, version, pointer, source),
             )
@@ -99,35 +98,6 @@ def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-
-
-def _humanoid(
-    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
-) -> dict[str, int]:
-    """Return the node of each human bone, by its name in VRM 1.0."""
-    bones = part(told, "humanoid", "humanBones")
-    given: list[tuple[Any, Any]] = []
-    if version == 0 and isinstance(bones, list):
-        given = [(part(each, "bone"), part(each, "node")) for each in bones]
-        given = [(_modern(bone), node) for bone, node in given if isinstance(bone, str)]
-    elif isinstance(bones, dict):
-        given = [(bone, part(each, "node")) for bone, each in bones.items()]
-    found: dict[str, int] = {}
-    for bone, node in given:
-        if not is_index(node, file.tree.n_nodes):
-            source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
-        elif bone in HUMAN_BONES or bone in SPINE_BONES:
-            found[bone] = node
-        else:
-            source.warn("G006.bone", f"{pointer}/humanoid/humanBones", bone=bone)
-    return found
-
-
-def _modern(bone: str) -> str:
-    for old, new in _OLD_THUMB.items():
-        if bone.endswith(old):
-            return bone.removesuffix(old) + new
-    return bone
 
 
 def _expressions(
