@@ -65,3 +65,8 @@ class Cast:
         self.ups.append(up)
         self.placed.append(placed)
         self.groups.append(group)
+
+    def remove(self, index: int) -> None:
+        """Remove one actor."""
+        for properties in (self.actors, self.ups, self.placed, self.groups):
+            del properties[index]

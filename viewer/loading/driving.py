@@ -126,7 +126,7 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
         return named, False
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and is_body(actor.figure):
-            del cast.actors[index], cast.ups[index], cast.placed[index]
+            cast.remove(index)
             return actor.figure, _is_bundled(actor.figure)
     body = read(Source.open(bundled_body()))
     assert isinstance(body, Figure)  # it is a bundled file
