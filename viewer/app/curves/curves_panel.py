@@ -38,7 +38,7 @@ from viewer.app.curves.state import Curves, KeyPlace
 from viewer.app.curves.transform_keys import TransformKeys
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import EXTRAPOLATIONS, TANGENT_RULES, Channel, Clip, Tangent, slopes
-from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel, TransformClip
+from viewer.rig.motion.transform_clip import INTERPOLATIONS, TransformChannel
 
 __all__ = ["draw"]
 
@@ -91,7 +91,7 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
     owner = (id(state.actor), kind, len(curves))
     if owner != view.owner:
         view.owner, view.joint = owner, -1
-        view.choose(_first_shown(state, curves, curves[0].number))
+        view.choose(_first_shown(state, curves, _first_number(state, curves)))
     if state.selected_joint != view.joint:
         view.joint = state.selected_joint
         rows = _first_shown(state, curves, view.joint)
@@ -104,11 +104,22 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
-    """Return the curves that a selected joint shows: of keyed transforms only its angles."""
+    """Return the curves that a selected joint shows: of keyed transforms its angles with keys."""
     rows = tuple(row for row, curve in enumerate(curves) if curve.number == number)
-    if not isinstance(state.actor.clip, TransformClip):
+    keyed = keyed_of(state.actor)
+    if not isinstance(keyed, TransformKeys):
         return rows
-    return tuple(row for row in rows if curves[row].is_angle) or rows
+    moving = tuple(row for row in rows if keyed.channel(row) is not None)
+    return tuple(row for row in moving if curves[row].is_angle) or moving or rows
+
+
+def _first_number(state: AppState, curves: tuple[Curve, ...]) -> int:
+    """Return the joint whose curves are shown first: of keyed transforms the first with keys."""
+    keyed, numbers = keyed_of(state.actor), [curve.number for curve in curves]
+    if isinstance(keyed, TransformKeys):
+        moving = (n for row, n in enumerate(numbers) if keyed.channel(row) is not None)
+        return next(moving, numbers[0])
+    return numbers[0]
 
 
 # The list

@@ -68,7 +68,7 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Fi
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
-        skeleton=skeleton_of(joints, file.humanoid),
+        skeleton=skeleton_of(joints, file.humanoid, file.constraints),
         skin=skin_of(pieces, inverse_binds(bindings)) if pieces else None,
         up=file.up,
         unit=file.unit,
