@@ -66,7 +66,7 @@ class Cast:
         self.placed.append(placed)
         self.groups.append(group)
 
-    def remove(self, index: int) -> None:
-        """Remove one actor."""
-        for properties in (self.actors, self.ups, self.placed, self.groups):
-            del properties[index]
+    def take(self, index: int) -> Actor:
+        """Remove one actor and return it."""
+        del self.ups[index], self.placed[index], self.groups[index]
+        return self.actors.pop(index)

@@ -113,6 +113,12 @@ def test_syntax_errors_have_a_line() -> None:
     assert str(caught.value).startswith("a.gltf:3: expected JSON, found a syntax error")
 
 
+def test_texts_of_more_than_half_a_gigabyte_are_refused(monkeypatch) -> None:
+    monkeypatch.setattr("viewer.formats._gltf.json_text._MOST_BYTES", 50)
+    assert refused(TEXT) == ("F001.gltf-text", "")
+    assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
+
+
 def test_deviations_from_json_are_warnings() -> None:
     head = b'{"asset": {"version": "2.0"}, '
     assert warned(head + b'"extras": NaN, "nodes": [], "nodes": [{}]}') == [

@@ -15,6 +15,7 @@ __all__ = ["parsed"]
 
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_MOST_BYTES = 512 << 20  # parsing takes three times as much memory
 _THOROUGH = 1 << 20  # characters below which repeated keys are always looked for
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
@@ -36,6 +37,8 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     FormatError
         If it is not a valid JSON object.
     """
+    if len(data) > _MOST_BYTES:
+        raise source.fault("F001.gltf-text", most=_MOST_BYTES, size=len(data))
     text = _text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []
     repeated: list[str] = []

@@ -54,9 +54,8 @@ def read_nodes(source: Source) -> NodeFile:
     document = open_document(source)
     _check_version(document)
     check_extensions(document)
-    skins = read_skins(document)
     materials = read_materials(document)
-    tree = _without_empty_skins(read_tree(document), skins)
+    tree, skins = _without_empty(read_tree(document), read_skins(document))
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
     tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
@@ -78,11 +77,16 @@ def read_nodes(source: Source) -> NodeFile:
     )
 
 
-def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTree:
-    """Return the nodes without their references to skins that have no joints."""
-    empty = [index for index, skin in enumerate(skins) if not len(skin.joints)]
-    used = np.where(np.isin(tree.skins, empty), -1, tree.skins).astype(np.int32)
-    return replace(tree, skins=used) if empty else tree
+def _without_empty(
+    tree: NodeTree, skins: tuple[NodeSkin, ...]
+) -> tuple[NodeTree, tuple[NodeSkin, ...]]:
+    """Return nodes and skins without the skins that have no joints, and references to them."""
+    is_kept = np.array([len(skin.joints) > 0 for skin in skins], dtype=np.bool_)
+    if is_kept.all():
+        return tree, skins
+    # The last entry is that of nodes without skin, whose index is -1.
+    numbers = np.append(np.where(is_kept, np.cumsum(is_kept) - 1, -1), -1).astype(np.int32)
+    return replace(tree, skins=numbers[tree.skins]), tuple(s for s in skins if len(s.joints))
 
 
 def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:

@@ -81,6 +81,8 @@ class _Grouping:
         self.is_identity = _identities(file.tree)
         self.moved = set(file.humanoid.values())
         self.moved.update(*(animation.nodes for animation in file.animations))
+        for constraint in file.constraints:
+            self.moved.update((constraint.joint, constraint.source))
         self.drawn = _drawn_meshes(file)
         self.order = self._order()
         self.place = {node: place for place, node in enumerate(self.order)}

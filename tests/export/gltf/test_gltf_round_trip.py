@@ -6,9 +6,9 @@ import io
 from dataclasses import fields, replace
 
 import numpy as np
+from export.seamed import UVS, seamed_mesh
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
-from seamed import UVS, seamed_mesh
 
 import viewer
 from viewer.export import export
