@@ -18,11 +18,13 @@ from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._gltf.document import Document, text_of
 from viewer.export._gltf.losses import Written, gltf_losses, not_held
-from viewer.export._gltf.materials import Color, material_losses
+from viewer.export._gltf.materials import Color, Materials, material_losses
 from viewer.export._gltf.mesh import add_mesh
 from viewer.export._gltf.motion import add_animation, moving, still_locals
 from viewer.export._gltf.nodes import Locals, Tree, add_nodes, locals_of
-from viewer.export._gltf.reading import parsed
+from viewer.export._gltf.parts import parts_of
+from viewer.export._gltf.reading import Placed, parsed
+from viewer.export._gltf.records import add_record
 from viewer.export._gltf.shape import Shape, shape_of
 from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
 from viewer.export._losses.between import resampling_losses
@@ -56,7 +58,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     written = {"counts": built.counts, "size": len(data[path])}
     notes = [Diagnostic("X001.gltf", path, values=written)]
     notes += _beside(data, path) + _remarks(body, figure.up)
-    file = Written(path, parsed([*data.values()]), built.tree, built.mesh_node)
+    file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
     figure, frames = pose_frames(figure, pose)
     rows = np.zeros(1, dtype=np.intp)
     notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
@@ -118,7 +120,7 @@ def export_animation(
             "size": len(data[file]),
         }
         notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
-        written = Written(file, parsed([*data.values()]), made.tree, made.mesh_node, start)
+        written = Written(file, parsed([*data.values()]), made.tree, made.meshes, start)
         rows = start + np.flatnonzero(present[start:stop])
         lost += gltf_losses(
             written,
@@ -168,7 +170,7 @@ class _Built:
     """Indices and summary of one file's contents."""
 
     tree: Tree
-    mesh_node: int | None
+    meshes: list[Placed]
     counts: list[Phrase]
 
 
@@ -187,33 +189,69 @@ def _add_body(
     pose: Pose | None,
     still: Locals | None,
     color: Color | None = None,
+    is_still: bool = True,
 ) -> _Built:
-    """Add nodes, mesh and skin of a figure; return their indices and counts."""
+    """Add nodes, meshes and skin of a figure; return their indices and counts.
+
+    ``is_still``: whether the figure as a whole does not move.
+    """
     figure, influences = body.figure, body.influences
-    fixes = influences is not None and influences.n_fixed > 0
-    tree = add_nodes(document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes)
-    scene, counts, node = [tree.root], list[Phrase](), None
+    fixes, record = influences is not None and influences.n_fixed > 0, figure.record
+    bare = record is not None and is_still
+    tree = add_nodes(
+        document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes, bare
+    )
+    if record is not None:
+        add_record(document, record, tree.joints)
+    scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
     if figure.mesh is not None and figure.mesh.n_vertices:
-        mesh, written = add_mesh(document, figure.name, body.shape, influences, color)
-        item: dict[str, Any] = {"name": text_of(f"{figure.name} mesh"), "mesh": mesh}
-        node = document.add("nodes", item)
-        if influences is not None and figure.skin is not None:
-            matrices = inverse_bind_matrices(influences, figure.skin.inverse_bind)
-            bound = document.array(matrices, "MAT4")
-            joints = tree.joints + tree.fixed
-            skin = {"name": text_of(figure.name), "joints": joints, "inverseBindMatrices": bound}
-            item["skin"] = document.add("skins", skin)
-            scene.append(node)  # glTF ignores the transform of a skinned mesh's own node
-        else:
-            document.root["nodes"][tree.place].setdefault("children", []).append(node)
-        before = figure.mesh.n_vertices
+        meshes = _add_meshes(document, body, tree, color)
+        scene += _place_meshes(document, body, tree, meshes)
+        written, before = sum(len(each.part.sources) for each in meshes), figure.mesh.n_vertices
         key = "written-vertices" if written == before else "split-vertices"
         counts = [Phrase(key, n=written, before=before)]
         counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
     if figure.skeleton is not None:
         counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
     document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return _Built(tree, node, counts)
+    return _Built(tree, meshes, counts)
+
+
+def _add_meshes(document: Document, body: _Body, tree: Tree, color: Color | None) -> list[Placed]:
+    """Add the parts of a figure, each with its node."""
+    figure, meshes = body.figure, list[Placed]()
+    materials = Materials(document, figure.require_mesh(), color)
+    record = figure.record
+    for part in parts_of(f"{figure.name} mesh", body.shape, body.influences):
+        mesh = add_mesh(document, materials, part, body.shape, body.influences)
+        if part.joint >= 0:
+            node = tree.joints[part.joint]
+            document.root["nodes"][node]["mesh"] = mesh
+        else:
+            item: dict[str, Any] = {"name": text_of(part.name)} if part.name else {}
+            if record is not None and part.index in record.part_extras:
+                item["extras"] = record.part_extras[part.index]
+            node = document.add("nodes", {**item, "mesh": mesh})
+        meshes.append(Placed(node, part))
+    return meshes
+
+
+def _place_meshes(document: Document, body: _Body, tree: Tree, meshes: list[Placed]) -> list[int]:
+    """Bind the meshes that have nodes of their own; return those that are roots of the scene."""
+    nodes = document.root["nodes"]
+    own = [placed.node for placed in meshes if placed.part.joint < 0]
+    influences, skin = body.influences, body.figure.skin
+    if not own:
+        return []
+    if influences is None or skin is None:
+        nodes[tree.place].setdefault("children", []).extend(own)
+        return []
+    bound = document.array(inverse_bind_matrices(influences, skin.inverse_bind), "MAT4")
+    item = {"name": text_of(body.figure.name), "joints": tree.joints + tree.fixed}
+    index = document.add("skins", {**item, "inverseBindMatrices": bound})
+    for node in own:
+        nodes[node]["skin"] = index
+    return own  # glTF ignores the transform of a skinned mesh's own node
 
 
 def _add_animation(
@@ -235,12 +273,16 @@ def _add_animation(
     if len(weights) > 1:
         weights = weights[slice(*span)]
         body = replace(body, shape=replace(body.shape, weights=weights))
-    built = _add_body(document, body, up, pose, still_locals(skeleton, rest, part))
-    morph = None
-    if built.mesh_node is not None and np.ptp(weights, axis=0).any():
-        morph = built.mesh_node, weights
+    is_still = not np.ptp(part.figure_translations, axis=0).any() and not np.ptp(part.figure_scales)
+    locals_ = still_locals(skeleton, rest, part)
+    built = _add_body(document, body, up, pose, locals_, is_still=is_still)
+    morphs = [
+        (placed.node, own)
+        for placed in built.meshes
+        if np.ptp(own := weights[:, placed.part.targets], axis=0).any()
+    ]
     name = animation.motion.name or animation.name
-    add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morph)
+    add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morphs)
     return built
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._gltf.nodes import Tree
-from viewer.export._gltf.reading import GltfFile, read_back
+from viewer.export._gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import PER_SET, Influences
 from viewer.export._left_out import extra_parts, not_held_note
@@ -17,7 +18,6 @@ from viewer.export._losses.apart import apart, apart_notes, extent_of, negligibl
 from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figure_side
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import split_seams
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import METHODS, Skinning
@@ -35,17 +35,25 @@ class Written:
         Its parsed contents.
     tree : Tree
         Indices of the nodes.
-    mesh_node : int or None
-        Index of the mesh's node.
+    meshes : list of Placed
+        Its meshes.
     start : int
         Frame of the figure that is the first in the file.
+    keys : dict, optional
+        Animated values of each frame; by default, those of files whose keys are the frames.
     """
 
     path: Path
     file: GltfFile
     tree: Tree
-    mesh_node: int | None
+    meshes: list[Placed]
     start: int = 0
+    keys: Keys | None = None
+
+    @property
+    def sources(self) -> Ints:
+        """The figure's vertex that each vertex of the file is a copy of."""
+        return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
 def gltf_losses(
@@ -68,28 +76,39 @@ def gltf_losses(
     ``shape``, ``influences``: the written shape and skin.
     ``first_frame``: number of the first frame; None for a single pose.
     """
-    weights = frames.shape_weights
-    still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
-    columns = changing(frames, still)
-    expected = figure_side(figure, frames, how, still)
-    sources = None
-    if figure.mesh is not None and written.mesh_node is not None:
-        sources = split_seams(figure.mesh)[0]
-        expected = _split(expected, sources)
-    else:
-        expected = replace(expected, body=None, exact=None)
+    expected, read = sides(written, figure, frames, how, shape)
+    sources = written.sources if written.meshes else None
     least = negligible(figure, frames, rows)
-    targets = np.flatnonzero(np.isin(shape.targets, columns))
-    place = (written.file, written.tree, written.mesh_node, targets, written.start)
-    found = apart(expected, read_back(*place), rows, least)
+    found = apart(expected, read(None), rows, least)
     causes = []
     if found.vertices is not None:
         causes = _causes(figure, frames, rows, how, shape, influences, least)
     notes = apart_notes(written.path, figure, found, first_frame, sources)
     notes = with_values(notes, causes=causes)
     if influences is not None and influences.most > PER_SET and sources is not None:
-        notes += _first_set(expected, read_back(*place, 1), figure, rows, least, influences)
+        notes += _first_set(expected, read(1), figure, rows, least, influences)
     return notes
+
+
+def sides(
+    written: Written, figure: Figure, frames: Frames, how: Skinning, shape: Shape
+) -> tuple[Side, Callable[[int | None], Side]]:
+    """Return a posed figure, and a function that returns the file, as comparable sides.
+
+    Parameters as for ``gltf_losses``; the function takes a number of influence sets, None for all.
+    """
+    weights = frames.shape_weights
+    still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
+    columns = changing(frames, still)
+    expected = figure_side(figure, frames, how, still)
+    if written.meshes:
+        expected = _split(expected, written.sources)
+    else:
+        expected = replace(expected, body=None, exact=None)
+    targets = np.flatnonzero(np.isin(shape.targets, columns))
+    keys = frame_keys(written.file) if written.keys is None else written.keys
+    place = written.file, written.tree, written.meshes, shape.figure, targets, keys, written.start
+    return expected, lambda sets: read_back(*place, sets)
 
 
 def _split(side: Side, sources: Ints) -> Side:

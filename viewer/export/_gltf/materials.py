@@ -22,6 +22,14 @@ _PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour of untextured surface
 _MATTE = {"metallicFactor": 0.0, "roughnessFactor": 0.8}  # glTF surfaces are metallic by default
 _WRAPS = {"clamp": 33071, "repeat": 10497, "mirror": 33648}
 _SMOOTH, _SHARP = (9729, 9987), (9728, 9986)  # magnified, minified with mipmaps
+_MINIFICATIONS = {
+    "nearest": 9728,
+    "linear": 9729,
+    "nearest_mipmap_nearest": 9984,
+    "linear_mipmap_nearest": 9985,
+    "nearest_mipmap_linear": 9986,
+    "linear_mipmap_linear": 9987,
+}
 _SHEAR = 1e-6  # shear of a texture transform, which rotation and scale cannot express
 
 
@@ -38,15 +46,19 @@ class Materials:
         self._images: dict[tuple[int, int], tuple[int, Bytes]] = {}
         self._textures: dict[tuple[int, int], int] = {}
         self._samplers: dict[tuple[Any, ...], int] = {}
+        self._materials: dict[int, int] = {}
 
     def plain(self, name: str = "plain") -> int:
         """Add a material without textures; return its index."""
         return self._add(name, {"baseColorFactor": [*(self._color or _PLAIN), 1.0], **_MATTE})
 
     def add(self, index: int) -> int:
-        """Add a material of the mesh; return its index in the document."""
-        if index < 0:
-            return self.plain()
+        """Return the index in the document of a material of the mesh, -1 for none, added once."""
+        if index not in self._materials:
+            self._materials[index] = self.plain() if index < 0 else self._own(index)
+        return self._materials[index]
+
+    def _own(self, index: int) -> int:
         material = self._mesh.materials[index]
         name = material.name or material.texture or f"material{index}"
         has_uvs = self._mesh.uvs is not None and len(self._mesh.uvs) > 0
@@ -112,9 +124,10 @@ class Materials:
         image = texture.image
         key = id(image), image.size
         if key not in self._images:
-            png = self._document.picture(encode_png(image), texture.name or name)
+            data = texture.encoded or encode_png(image)
+            added = self._document.picture(data, texture.name or name)
             # The pixels are kept alive, so that no other array gets the same id.
-            self._images[key] = png, image
+            self._images[key] = added, image
         source, sampler = self._images[key][0], self._sampler(texture)
         pair = source, sampler
         if pair not in self._textures:
@@ -130,9 +143,10 @@ class Materials:
         return reference
 
     def _sampler(self, texture: Texture) -> int:
-        key = (*texture.wrap, texture.is_smooth)
+        key = (*texture.wrap, texture.is_smooth, texture.minification)
         if key not in self._samplers:
             magnified, minified = _SMOOTH if texture.is_smooth else _SHARP
+            minified = _MINIFICATIONS.get(texture.minification, minified)
             filters = {"magFilter": magnified, "minFilter": minified}
             wraps = {"wrapS": _WRAPS[texture.wrap[0]], "wrapT": _WRAPS[texture.wrap[1]]}
             self._samplers[key] = self._document.add("samplers", {**filters, **wraps})
