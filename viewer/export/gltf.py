@@ -7,53 +7,52 @@ it if it is in another unit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
-from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.body import Body, Built, add_body, body_of
+from viewer.export._gltf.clip_losses import clip_losses, shape_rows, shown_weights
+from viewer.export._gltf.document import Document
+from viewer.export._gltf.keyed import add_clips, first_time
 from viewer.export._gltf.losses import Written, gltf_losses, not_held
-from viewer.export._gltf.materials import Color, Materials, material_losses
-from viewer.export._gltf.mesh import add_mesh
+from viewer.export._gltf.materials import material_losses
 from viewer.export._gltf.motion import add_animation, moving, still_locals
-from viewer.export._gltf.nodes import Locals, Tree, add_nodes, locals_of
-from viewer.export._gltf.parts import parts_of
-from viewer.export._gltf.reading import Placed, parsed
-from viewer.export._gltf.records import add_record
-from viewer.export._gltf.shape import Shape, shape_of
-from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
+from viewer.export._gltf.nodes import locals_of
+from viewer.export._gltf.reading import parsed
+from viewer.export._gltf.shape import shape_of
 from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
-from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
+from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.single_frame import pose_frames
-from viewer.rig.pose import Pose
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["export", "export_animation"]
+__all__ = ["export", "export_animation", "export_clips"]
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write a figure in its current pose; see ``viewer.export.export``."""
     figure, pose = actor.figure, actor.pose
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
-    body = _body_of(figure, shape_of(figure, weights), skinning)
+    body = body_of(figure, shape_of(figure, weights), skinning)
     skeleton, still = body.shape.figure.skeleton, None
     if skeleton is not None and pose is not None:
         still = locals_of(skeleton, pose)
     document = Document(figure.name)
-    built = _add_body(document, body, figure.up, pose, still, actor.color)
+    built = add_body(document, body, figure.up, pose, still, actor.color)
     (data,) = _files([(path, document)])
     written = {"counts": built.counts, "size": len(data[path])}
     notes = [Diagnostic("X001.gltf", path, values=written)]
@@ -63,6 +62,54 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     rows = np.zeros(1, dtype=np.intp)
     notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
     return notes + not_held(figure, body.shape)
+
+
+def export_clips(
+    actor: Actor, path: Path, skinning: Skinning, clips: Sequence[TransformClip]
+) -> list[Diagnostic]:
+    """Write a figure at rest with animations, which keep their keys and interpolation.
+
+    Parameters
+    ----------
+    actor : Actor
+        Provides the figure, its shape and its placement.
+    path : Path
+        The file.
+    skinning : Skinning
+        Selects influences; the reference for the measured error.
+    clips : sequence of TransformClip
+        Motions of the figure, see ``own_animations``.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes: the written files, then the largest error over all animations.
+
+    Raises
+    ------
+    RigError
+        If numbers do not fit single precision.
+    OutputError
+        If a file cannot be written.
+    """
+    figure, pose = actor.figure, still_pose(actor)
+    weights = shape_rows(clips, shown_weights(figure, pose.shape_weights))
+    shape = shape_of(figure, weights)
+    body = body_of(figure, replace(shape, weights=shape.weights[:1]), skinning)
+    document = Document(figure.name)
+    locals_ = locals_of(body.figure.require_skeleton(), pose)
+    built = add_body(document, body, figure.up, pose, locals_, actor.color)
+    kept = add_clips(document, clips, built.tree, built.meshes, shape.targets, weights[0])
+    (data,) = _files([(path, document)])
+    written = {"counts": built.counts, "n": len(kept), "size": len(data[path])}
+    notes = [Diagnostic("X001.gltf-animations", path, values=written)]
+    notes += _beside(data, path) + _remarks(body, figure.up)
+    file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
+    notes += clip_losses(file, figure, pose, kept, skinning, body)
+    early = [clip.name for clip in kept if first_time(clip) < 0.0]
+    if early:
+        notes.append(Diagnostic("X005.negative-times", values={"names": early, "n": len(early)}))
+    return notes + not_held(figure, shape)
 
 
 def export_animation(
@@ -98,7 +145,7 @@ def export_animation(
     frames = filled(animation.frames, options.closing == "interpolate")
     reference = int(present.argmax())
     shape = shape_of(animation.figure, frames.shape_weights, reference)
-    body = _body_of(animation.figure, shape, options.skinning)
+    body = body_of(animation.figure, shape, options.skinning)
     spans = [(0, frames.n_frames)]
     if options.closing == "split" and not present.all():
         spans = runs(present)
@@ -152,116 +199,14 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
         raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Body:
-    """Data shared by all files of an export."""
-
-    shape: Shape
-    influences: Influences | None  # None if the mesh is not skinned
-
-    @property
-    def figure(self) -> Figure:
-        """The figure as written."""
-        return self.shape.figure
-
-
-@dataclass(frozen=True, slots=True)
-class _Built:
-    """Indices and summary of one file's contents."""
-
-    tree: Tree
-    meshes: list[Placed]
-    counts: list[Phrase]
-
-
-def _body_of(figure: Figure, shape: Shape, skinning: Skinning) -> _Body:
-    if figure.mesh is None and figure.skeleton is None:
-        raise RigError(f"figure {figure.name} has neither mesh nor skeleton to write as glTF")
-    if not figure.is_attached or figure.skin is None:
-        return _Body(shape, None)
-    return _Body(shape, influences_of(skin_used(figure.skin, skinning)))
-
-
-def _add_body(
-    document: Document,
-    body: _Body,
-    up: str,
-    pose: Pose | None,
-    still: Locals | None,
-    color: Color | None = None,
-    is_still: bool = True,
-) -> _Built:
-    """Add nodes, meshes and skin of a figure; return their indices and counts.
-
-    ``is_still``: whether the figure as a whole does not move.
-    """
-    figure, influences = body.figure, body.influences
-    fixes, record = influences is not None and influences.n_fixed > 0, figure.record
-    bare = record is not None and is_still
-    tree = add_nodes(
-        document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes, bare
-    )
-    if record is not None:
-        add_record(document, record, tree.joints)
-    scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
-    if figure.mesh is not None and figure.mesh.n_vertices:
-        meshes = _add_meshes(document, body, tree, color)
-        scene += _place_meshes(document, body, tree, meshes)
-        written, before = sum(len(each.part.sources) for each in meshes), figure.mesh.n_vertices
-        key = "written-vertices" if written == before else "split-vertices"
-        counts = [Phrase(key, n=written, before=before)]
-        counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
-    if figure.skeleton is not None:
-        counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
-    document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return _Built(tree, meshes, counts)
-
-
-def _add_meshes(document: Document, body: _Body, tree: Tree, color: Color | None) -> list[Placed]:
-    """Add the parts of a figure, each with its node."""
-    figure, meshes = body.figure, list[Placed]()
-    materials = Materials(document, figure.require_mesh(), color)
-    record = figure.record
-    for part in parts_of(f"{figure.name} mesh", body.shape, body.influences):
-        mesh = add_mesh(document, materials, part, body.shape, body.influences)
-        if part.joint >= 0:
-            node = tree.joints[part.joint]
-            document.root["nodes"][node]["mesh"] = mesh
-        else:
-            item: dict[str, Any] = {"name": text_of(part.name)} if part.name else {}
-            if record is not None and part.index in record.part_extras:
-                item["extras"] = record.part_extras[part.index]
-            node = document.add("nodes", {**item, "mesh": mesh})
-        meshes.append(Placed(node, part))
-    return meshes
-
-
-def _place_meshes(document: Document, body: _Body, tree: Tree, meshes: list[Placed]) -> list[int]:
-    """Bind the meshes that have nodes of their own; return those that are roots of the scene."""
-    nodes = document.root["nodes"]
-    own = [placed.node for placed in meshes if placed.part.joint < 0]
-    influences, skin = body.influences, body.figure.skin
-    if not own:
-        return []
-    if influences is None or skin is None:
-        nodes[tree.place].setdefault("children", []).extend(own)
-        return []
-    bound = document.array(inverse_bind_matrices(influences, skin.inverse_bind), "MAT4")
-    item = {"name": text_of(body.figure.name), "joints": tree.joints + tree.fixed}
-    index = document.add("skins", {**item, "inverseBindMatrices": bound})
-    for node in own:
-        nodes[node]["skin"] = index
-    return own  # glTF ignores the transform of a skinned mesh's own node
-
-
 def _add_animation(
     document: Document,
     animation: SampledAnimation,
-    body: _Body,
+    body: Body,
     frames: Frames,
     span: tuple[int, int],
     up: str,
-) -> _Built:
+) -> Built:
     """Add a figure at rest, and a range of frames as an animation."""
     skeleton = body.figure.require_skeleton()
     part = frames_between(frames, slice(*span))
@@ -275,7 +220,7 @@ def _add_animation(
         body = replace(body, shape=replace(body.shape, weights=weights))
     is_still = not np.ptp(part.figure_translations, axis=0).any() and not np.ptp(part.figure_scales)
     locals_ = still_locals(skeleton, rest, part)
-    built = _add_body(document, body, up, pose, locals_, is_still=is_still)
+    built = add_body(document, body, up, pose, locals_, is_still=is_still)
     morphs = [
         (placed.node, own)
         for placed in built.meshes
@@ -310,7 +255,7 @@ def _beside(data: dict[Path, bytes], path: Path) -> list[Diagnostic]:
     ]
 
 
-def _remarks(body: _Body, up: str) -> list[Diagnostic]:
+def _remarks(body: Body, up: str) -> list[Diagnostic]:
     """Return notes about coordinate space and shape for users of the file."""
     figure, notes = body.figure, list[Diagnostic]()
     if up == "z":
@@ -339,7 +284,7 @@ def _remarks(body: _Body, up: str) -> list[Diagnostic]:
 
 
 def _motion_remarks(
-    animation: SampledAnimation, body: _Body, frames: Frames, options: MotionOptions
+    animation: SampledAnimation, body: Body, frames: Frames, options: MotionOptions
 ) -> list[Diagnostic]:
     """Return notes about gaps, and about joints with translations."""
     skeleton = animation.figure.require_skeleton()

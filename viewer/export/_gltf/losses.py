@@ -82,12 +82,10 @@ def gltf_losses(
     found = apart(expected, read(None), rows, least)
     causes = []
     if found.vertices is not None:
-        causes = _causes(figure, frames, rows, how, shape, influences, least)
+        causes = causes_of(figure, frames, rows, how, shape, influences, least)
     notes = apart_notes(written.path, figure, found, first_frame, sources)
     notes = with_values(notes, causes=causes)
-    if influences is not None and influences.most > PER_SET and sources is not None:
-        notes += _first_set(expected, read(1), figure, rows, least, influences)
-    return notes
+    return notes + first_set_note(expected, read, figure, rows, least, influences)
 
 
 def sides(
@@ -121,11 +119,21 @@ def _split(side: Side, sources: Ints) -> Side:
     )
 
 
-def _first_set(
-    expected: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
+def first_set_note(
+    expected: Side,
+    read: Callable[[int | None], Side],
+    figure: Figure,
+    rows: Rows,
+    least: float,
+    influences: Influences | None,
 ) -> list[Diagnostic]:
-    """Return a note about the error of programs that read four influences per vertex."""
-    found = apart(expected, cut, rows, least)
+    """Return a note about the error of programs that read four influences per vertex.
+
+    Empty if there are not more. ``expected``, ``read``: from ``sides``.
+    """
+    if influences is None or influences.most <= PER_SET or expected.body is None:
+        return []
+    found = apart(expected, read(1), rows, least)
     most, worst = int(influences.most), found.vertices
     if worst is None:
         return [Diagnostic("X005.influences", values={"most": most})]
@@ -139,7 +147,7 @@ def _first_set(
     return [Diagnostic("X002.first-influences", values=values)]
 
 
-def _causes(
+def causes_of(
     figure: Figure,
     frames: Frames,
     rows: Rows,
@@ -175,12 +183,18 @@ def _weights_phrase(influences: Influences) -> Phrase:
 
 def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
     """Return a note that lists the parts of a figure that the file does not hold."""
-    unused = figure.n_shapes - len(shape.targets)
-    skeleton, lost = figure.skeleton, []
+    shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
+    rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())
+    mixed = 0 if shapes is None else sum(shapes.is_expression(row) for row in rows)
+    unused = len(rows) - mixed
     if shape.baked is not None:
         lost.append(Phrase("part-baked-shapes", n=figure.n_shapes))
     elif unused > 0:
         lost.append(Phrase("part-blend-shapes", n=unused))
+    if mixed and shape.baked is None:
+        lost.append(Phrase("part-expressions", n=mixed))
+    if skeleton is not None and skeleton.humanoid is not None:
+        lost.append(Phrase("part-humanoid"))
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
     lost += extra_parts(figure)
