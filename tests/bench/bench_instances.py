@@ -25,7 +25,8 @@ from viewer.rendering.gpu.upload import as_uniform
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rendering.passes.mesh_pass import draw_runs, set_surface
+from viewer.rendering.passes.mesh_pass import set_surface
+from viewer.rendering.passes.runs import draw_runs
 from viewer.rendering.view import View, set_lights, view_of
 from viewer.resources import resource
 from viewer.rig.figure import Figure

@@ -14,6 +14,7 @@ NAMES = [
     "bodies",
     "deform",
     "instances",
+    "materials",
     "structure",
     "motion",
     "read",

@@ -13,6 +13,7 @@ from seamed import POSITIONS, seamed_actor
 
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export_animation
+from viewer.export._gaps import filled
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
@@ -130,3 +131,18 @@ def test_unknown_gap_modes_are_refused(tmp_path, key):
     with pytest.raises(RigError, match=f"^{message}$"):
         export_animation(animation, tmp_path / "m_{frame}", key, MotionOptions(gaps="jump"))
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(("fills", "x"), [(False, [1, 1, 1, 3]), (True, [1, 5 / 3, 7 / 3, 3])])
+def test_scales_of_joints_in_gaps(fills, x):
+    figure = seamed_actor(unit="m").figure
+    scales = np.ones((2, figure.skeleton.n_joints, 3))
+    scales[1, 0, 0] = 3.0
+    clip = SampledClip(
+        "grow",
+        Timing(10.0, np.array([0, -1, -1, 1])),
+        np.tile([0.0, 0.0, 0.0, 1.0], (2, figure.skeleton.n_joints, 1)),
+        scales=scales,
+    )
+    found = filled(sample_animation(Actor(figure, clip=clip)).frames, fills)
+    assert_allclose(found.scales[:, 0, 0], x, atol=1e-12)

@@ -1,5 +1,7 @@
 """Wavefront ``.obj``, read back by a separate parser."""
 
+from dataclasses import replace
+
 import faults
 import numpy as np
 import pytest
@@ -49,6 +51,19 @@ def test_mesh_at_rest_round_trips(tmp_path):
     assert_array_equal(corners(obj), [TRIANGLES, UV_TRIANGLES, TRIANGLES])
     assert notes == [f"{tmp_path / 'out.obj'}: 5 vertices, 3 triangles"]
     assert names(tmp_path) == ["out.obj"]
+
+
+def test_colours_follow_positions_in_srgb(tmp_path):
+    """0.21404 of the light is sRGB 0.5; opacity is written where there is any."""
+    colors = np.tile([1.0, 0.21404, 0.0, 1.0], (5, 1))
+    for opacity in ((), (0.25,)):
+        colors[0, 3:] = opacity or 1.0
+        actor = seamed_actor(mesh=replace(seamed_mesh(), colors=colors))
+        export(actor, tmp_path / f"{len(opacity)}.obj")
+        lines = (tmp_path / f"{len(opacity)}.obj").read_text().splitlines()
+        found = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
+        assert_array_equal(found[:, :3], POSITIONS)
+        assert_allclose(found[0, 3:], [1.0, 0.5, 0.0, *opacity], atol=1e-5)
 
 
 def test_indices_are_counted_from_1(tmp_path):

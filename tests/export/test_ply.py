@@ -128,3 +128,15 @@ def test_figure_without_mesh_is_refused(tmp_path):
     with pytest.raises(RigError, match=r"^figure bones has no mesh to write as \.ply$"):
         write(tmp_path, Actor(Figure("bones", skeleton=joints)))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_hidden_parts_are_written_and_reported(tmp_path):
+    actor = seamed_actor()
+    mesh = actor.figure.mesh
+    parts = np.arange(mesh.n_triangles) % 2
+    mesh = replace(mesh, parts=("even", "odd"), triangle_parts=parts)
+    actor.figure = replace(actor.figure, mesh=mesh)
+    actor.hidden_parts = frozenset({1})
+    notes = export(actor, tmp_path / "parts.ply")
+    assert [note.values for note in notes if note.key == "X005.hidden-parts"] == [{"n": 1}]
+    assert len(read_ply(tmp_path / "parts.ply").elements["face"]) == mesh.n_triangles

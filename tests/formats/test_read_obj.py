@@ -141,15 +141,21 @@ def test_triangles_of_a_closed_box_of_quads_enclose_its_volume() -> None:
     assert volume(mesh.positions, mesh.triangles) == pytest.approx(30.0)
 
 
-def test_colours_and_weights_are_ignored_with_one_note() -> None:
-    figure, warnings = read(
-        "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nv 0 0 1 2\nv 0 0 1 1\nf 1 2 3\n"
-    )
+def test_weights_are_ignored_with_a_note() -> None:
+    figure, warnings = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1 2\nv 0 0 1 1\nf 1 2 3\n")
     assert figure.mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    assert warnings == [
-        "a.obj:1: colours of 2 vertices ignored",
-        "a.obj:4: w of 1 vertex ignored",
-    ]
+    assert warnings == ["a.obj:4: w of 1 vertex ignored"]
+
+
+@pytest.mark.parametrize(("half", "most"), [("0.5", "1"), ("127.5", "255")])
+def test_colours_of_vertices_become_linear(half: str, most: str) -> None:
+    """sRGB 0.5 is 0.2140 of the light; vertices without a colour are white."""
+    mesh = silent(
+        f"v 0 0 0 {most} 0 {half}\nv 1 0 0\nv 0 1 0 0 {half} 0 0.25\nf 1 2 3\nf 3 2 1\n"
+    ).mesh
+    wanted = [[1, 0, 0.214041, 1], [1, 1, 1, 1], [0, 0.214041, 0, 0.25]]
+    np.testing.assert_allclose(mesh.colors, wanted, atol=1e-6)
+    assert silent("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh.colors is None
 
 
 def test_continued_lines_comments_and_blanks() -> None:

@@ -138,6 +138,20 @@ def test_colours_of_vertices_become_linear() -> None:
     np.testing.assert_allclose(figure.mesh.colors, wanted, atol=1e-6)
 
 
+def test_a_texture_replaces_colours_of_vertices(tmp_path) -> None:
+    (tmp_path / "a.png").write_bytes(encode_png(np.full((1, 1, 4), 255, np.uint8)))
+    names = ["float x", "float y", "float z", "float s", "float t", "uchar red", "uchar green"]
+    rows = [[0, 0, 0, 0, 0, 9, 9, 9], [1, 0, 0, 0, 0, 9, 9, 9], [0, 1, 0, 0, 0, 9, 9, 9]]
+    triangle = ("face", ["list uchar uchar vertex_indices"], [[[0, 1, 2]]])
+    vertices = ("vertex", [*names, "uchar blue"], rows)
+    data = binary("<", [vertices, triangle], ["comment TextureFile a.png"])
+    figure, warnings = read(data, tmp_path / "a.ply")
+    assert figure.mesh.colors is None and figure.mesh.materials[0].image is not None
+    assert warnings == [unused("vertex red", "vertex green", "vertex blue")]
+    (tmp_path / "a.png").unlink()
+    assert read(data, tmp_path / "a.ply")[0].mesh.colors is not None
+
+
 def test_trailing_ctrl_z_byte_of_binary_data_is_kept() -> None:
     data = binary("<", [("vertex", ["float x", "float y", "uchar z"], [[0, 0, 26]] * 3),
                         ("face", ["list uchar uchar vertex_indices"], [])])  # fmt: skip

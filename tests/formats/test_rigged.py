@@ -70,6 +70,7 @@ def figure() -> Figure:
     )
     skeleton = ball_skeleton(("root", "tïp"), np.array([-1, 0]), np.array([[0.0, 0, 0], [1, 0, 0]]))
     skeleton = replace(skeleton, boxes=np.arange(12.0).reshape(2, 2, 3))
+    skeleton = replace(skeleton, auxiliary=np.array([False, True]))
     rows = [[(0, 1.0)], [(1, 0.25), (0, 0.75)], [(1, 1.0)], []]
     return Figure(
         "scan",
@@ -148,7 +149,7 @@ def test_parts_that_a_figure_lacks_are_left_out(tmp_path):
     bare = Figure(
         "bare",
         Mesh(whole.mesh.positions, whole.mesh.normals, whole.mesh.triangles),
-        replace(whole.skeleton, boxes=None),
+        replace(whole.skeleton, boxes=None, auxiliary=None),
         whole.skin,
     )
     save(bare, tmp_path / "bare.npz")

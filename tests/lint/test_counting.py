@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from faults import told
 from lint.sound import column, legs, scene_of, standing
+from rig.animated import channel, clip_of, leg
 
 from viewer.app.core.clock import Clock
 from viewer.diagnostics.phrase import Phrase
@@ -97,3 +98,12 @@ def test_file_frame_numbers_are_kept() -> None:
     places[20, 0, 0] = 3.0
     scene = scene_of(figure, replace(clip, translations=places))
     assert sorted(jump_of(scene).frames.tolist()) == [120, 121]
+
+
+def test_frames_of_keyed_transforms_are_at_the_rate_of_the_keys() -> None:
+    keys = [[0.0, 0, 0], [0, 0, 0], [90, 0, 0]]
+    jump = clip_of(channel(0, "translation", np.array([0, 12, 13]) / 24.0, keys))
+    scene = Scene([Actor(leg(), clip=jump)])
+    found = jump_of(scene)
+    assert sorted(found.frames.tolist()) == [12, 13]
+    assert shown_frame(scene, float(found.times[0])) == found.frames[0]

@@ -151,3 +151,16 @@ def test_recorded_pose_restores_morph_weights():
     other = figure_pose(whole)
     assert apply_record(record_of(whole, pose), whole, other) == []
     assert other.shape_weights.tolist() == [0.25, 0.75]
+
+
+def test_further_targets_keep_the_weights_of_the_file():
+    first = with_morphs(figure(), [LIFTED]).blend_shapes
+    known = BlendShapes(
+        first.names, first.offsets, first.groups, first.normal_offsets, np.array([0.5])
+    )
+    both = with_morphs(figure(blend_shapes=known), [WIDE])
+    assert both.blend_shapes.names == ("lifted", "wide")
+    assert figure_pose(both).shape_weights.tolist() == [0.5, 0.0]
+    # A pose that is not given is that of the file.
+    assert_array_equal(deform(both)[0], deform(both, figure_pose(both))[0])
+    assert deform(both)[0][2].tolist() == [0.0, 1.0, 2.0]

@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.state import Files
+from viewer.app.palette.palette_window import Palette
 from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
 
@@ -60,6 +61,9 @@ def handle_keys(state: AppState) -> None:
         return
     # Otherwise ImGui would move the focus with Tab also while nothing is typed.
     imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
+    if state.of(Palette).is_open:
+        # Letters may be typed before the text box of the palette has the focus.
+        return
     if imgui.is_key_pressed(imgui.Key.escape, False) and _close_menus():
         return
     appearance = state.of(Appearance)

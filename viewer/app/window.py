@@ -111,6 +111,8 @@ def show(
     hold()  # GLFW's callbacks swallow exceptions raised in them, such as an interrupt
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.motion_settings = motion
+    if motion is not None and motion.frame_rate is not None:
+        state.clock.count_by(motion.frame_rate)
     state.framing.is_fitting = fit_distance
     if options.shading == "scalar":
         start_heat_map(state)

@@ -19,6 +19,7 @@ from viewer.rig.scene import Actor, Motion
 from viewer.rig.transforms.rate import key_rate
 
 _SHOWN_GAPS = 6
+_NO_NAME = "(no name)"
 
 
 def describe_clip(clip: Motion) -> dict[str, Any]:
@@ -107,7 +108,7 @@ def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
         head = "animations" if row == 0 else ""
         start, end = map(number_text, each["range"])
         mark = "*" if each["plays"] else " "
-        name = printable(each["name"]) or "(no name)"
+        name = printable(each["name"]) or _NO_NAME
         lines.append(f"  {head:10} {each['number']:{width}}{mark} {name}: {start} to {end} s")
     return lines
 
@@ -115,7 +116,8 @@ def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
 def clip_lines(clip: dict[str, Any]) -> list[str]:
     """Return the description as lines of text."""
     start, end = clip["range"]
-    head = f"  clip       {printable(clip['name'])}: {number_text(start)} to {number_text(end)} s, "
+    name = printable(clip["name"]) or _NO_NAME
+    head = f"  clip       {name}: {number_text(start)} to {number_text(end)} s, "
     if clip.get("kind") == "transforms":
         return _transform_lines(head, clip)
     if "kind" in clip:

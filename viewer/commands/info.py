@@ -20,7 +20,7 @@ from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
-from viewer.phrases import counted, printable
+from viewer.phrases import counted, listed, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
@@ -58,6 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for actor, parts in zip(scene.actors, found["actors"], strict=True):
             print("\n".join(_lines(parts) + model_lines(parts["model"], actor.figure)))
+        if found["cameras"]:
+            print(f"{counted(len(found['cameras']), 'camera')}: {listed(found['cameras'])}")
     return 0
 
 
@@ -77,6 +79,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
             _describe_actor(actor, scene.up) | {"model": describe_model(actor, how)}
             for actor in scene.actors
         ],
+        "cameras": [printable(view.name) for view in scene.views],
         "warnings": list(scene.warnings),
         "diagnostics": [described(found) for found in scene.diagnostics],
     }
@@ -153,6 +156,8 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
         "unused_vertices": int(mesh.n_vertices - len(np.unique(mesh.triangles))),
         "normal_lengths": [float(lengths.min()), float(lengths.max())],
         "has_uvs": mesh.uvs is not None,
+        "has_colors": mesh.colors is not None,
+        "parts": _describe_parts(mesh),
         "materials": [
             {
                 "name": material.name,
@@ -163,6 +168,16 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
             for material in mesh.materials
         ],
     }
+
+
+def _describe_parts(mesh: Mesh) -> list[dict[str, Any]]:
+    """Return the parts that can be hidden, with their numbers of triangles."""
+    # Triangles of no part are counted first.
+    counts = np.bincount(mesh.part_indices + 1, minlength=len(mesh.parts) + 1)[1:]
+    return [
+        {"name": name, "triangles": int(count)}
+        for name, count in zip(mesh.parts, counts, strict=True)
+    ]
 
 
 def _describe_surface(material: Material) -> dict[str, Any]:
@@ -274,6 +289,11 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
         f"({mesh['degenerate_triangles']} degenerate), "
         f"{'with' if mesh['has_uvs'] else 'without'} texture coordinates"
     ]
+    if mesh["has_colors"]:
+        lines[0] += ", with vertex colours"
+    if len(mesh["parts"]) > 1:
+        names = listed([printable(part["name"] or "without a name") for part in mesh["parts"]])
+        lines.append(f"    {counted(len(mesh['parts']), 'part')}: {names} (--hide-part hides them)")
     for material in mesh["materials"]:
         pixels = material["pixels"]
         state = f"{pixels[0]} x {pixels[1]} pixels" if pixels else "not drawn"

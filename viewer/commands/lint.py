@@ -34,7 +34,6 @@ from viewer.lint import (
 )
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
-from viewer.rig.motion.timing import DEFAULT_RATE
 
 __all__ = ["add_arguments", "run"]
 
@@ -117,7 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
         max_speed=arguments.max_speed,
         max_rotation=float(np.radians(arguments.max_rotation)),
         confidence=arguments.confidence,
-        frame_rate=arguments.fps or DEFAULT_RATE,
+        frame_rate=arguments.fps,
         ground=arguments.ground,
     )
     files = scene_files(arguments)

@@ -193,6 +193,8 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning())
+    if actor.hidden_parts:
+        notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
     return notes
 
 

@@ -85,12 +85,13 @@ def filled(frames: Frames, interpolate: bool) -> Frames:
     rotations[moves] = slerp(
         rotations[moves], frames.rotations[after[moves]], fraction[moves, None]
     )
-    weights = frames.shape_weights
+    weights, scales = frames.shape_weights, frames.scales
     return replace(
         frames,
         present=np.ones(len(every), dtype=np.bool_),
         rotations=rotations,
         translations=_line(frames.translations, before, after, fraction),
+        scales=scales if len(scales) == 1 else _line(scales, before, after, fraction),
         shape_weights=weights if len(weights) == 1 else _line(weights, before, after, fraction),
         figure_translations=_line(frames.figure_translations, before, after, fraction),
         figure_scales=_line(frames.figure_scales, before, after, fraction),

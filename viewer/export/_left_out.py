@@ -12,7 +12,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
-_NEGLIGIBLE = 1e-6  # largest difference of equal scales
+_NEGLIGIBLE = 1e-4  # files round constant scales by less
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:

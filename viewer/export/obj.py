@@ -24,6 +24,7 @@ from viewer.rig.motion.evaluation import pose_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
+from viewer.rig.srgb import encode_srgb
 from viewer.rig.units import UNIT_NAMES
 
 __all__ = ["export", "export_animation"]
@@ -40,7 +41,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     parts = [f"# {name}: {actor.figure.up} up{unit}\n"]
     if beside:
         parts.append(f"mtllib {list(beside)[-1].name}\n")
-    parts += [f"o {name}\n", _rows("v", positions)]
+    parts += [f"o {name}\n", _rows("v", _colored(positions, mesh.colors))]
     if mesh.uvs is not None:
         parts.append(_rows("vt", mesh.uvs))
     parts.append(_rows("vn", normals))
@@ -54,7 +55,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
     textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
     lost = library_losses(mesh)
-    lost += [part for part in surface_parts(mesh) if part not in lost]
+    lost += [part for part in surface_parts(mesh, has_colors=True) if part not in lost]
     notes = not_held_note(".obj and .mtl", lost)
     return [Diagnostic("X001.mesh", path, values=counts), *textures, *notes]
 
@@ -84,6 +85,14 @@ def export_animation(
     }
     key = "X001.meshes" if len(files) > 1 else "X001.one-mesh"
     return [Diagnostic(key, path, values=values), *filling]
+
+
+def _colored(positions: Floats, colors: Floats | None) -> Floats:
+    """Return positions followed by colours in sRGB, with opacity if there is any."""
+    if colors is None:
+        return positions
+    opacity = colors[:, 3:] if (colors[:, 3] != 1.0).any() else colors[:, :0]
+    return np.hstack([positions, encode_srgb(colors[:, :3]), np.clip(opacity, 0.0, 1.0)])
 
 
 def _rows(keyword: str, rows: Floats) -> str:

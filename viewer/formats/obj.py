@@ -9,7 +9,8 @@ r"""Reader of Wavefront ``.obj`` meshes, which have no rig.
     corner = v | v/vt | v//vn | v/vt/vn              from 1, or from -1 for the last one so far
 
 Vertices keep their indices, including those without a face. Polygons are triangulated. A vertex
-with several normals gets their mean, because a ``Mesh`` has one normal per vertex.
+with several normals gets their mean, because a ``Mesh`` has one normal per vertex. Colours of
+vertices are sRGB, 0 to 1 or 0 to 255; a texture replaces them.
 """
 
 from __future__ import annotations
@@ -75,6 +76,8 @@ def read(source: Source) -> Figure:
         uv_triangles=uv_triangles,
         materials=materials,
         triangle_materials=of_face[owners],
+        # Scans have the colours of their texture at the vertices, too.
+        colors=None if any(one.image is not None for one in materials) else parts.colors,
     )
     if mesh.n_triangles == 0:
         source.warn("F007.no-faces", n=mesh.n_vertices)

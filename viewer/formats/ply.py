@@ -9,8 +9,8 @@
 Properties used: x y z, nx ny nz, s t (or u v, texture_u texture_v), red green blue alpha of
 ``vertex``; the corners (``vertex_indices`` or ``vertex_index``) and ``texcoord``, two numbers per
 corner, of ``face``. Colours are sRGB, integers or numbers from 0 to 1; alpha may be missing. A
-comment ``TextureFile`` names a texture image. Polygons are triangulated; other data is ignored with
-a warning that names it.
+comment ``TextureFile`` names a texture image, which replaces them. Polygons are triangulated;
+other data is ignored with a warning that names it.
 """
 
 from __future__ import annotations
@@ -77,17 +77,19 @@ def read(source: Source) -> Figure:
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
     uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)
     materials = _materials(source, header, uvs is not None)
+    # Scans have the colours of their texture at the vertices, too.
+    is_painted = any(material.image is not None for material in materials)
     mesh = Mesh(
         positions=positions,
         normals=filled_normals(source, normals, positions, triangles),
         triangles=triangles,
         uvs=uvs,
         uv_triangles=uv_triangles,
-        colors=_colors(source, vertices),
+        colors=None if is_painted else _colors(source, vertices),
         materials=materials,
         triangle_materials=np.zeros(len(owners), np.int32) if materials else None,
     )
-    _report(source, tables, uv_corners is not None)
+    _report(source, tables, uv_corners is not None, is_painted)
     if mesh.n_triangles == 0:
         source.warn("F007.ply-no-faces", n=mesh.n_vertices)
     comments = "\n".join(text for text, _ in header.comments)
@@ -283,13 +285,13 @@ def _materials(source: Source, header: Header, has_uvs: bool) -> tuple[Material,
     return (Material(name, Texture(name, load_image(source, name, offset))),)
 
 
-def _report(source: Source, tables: dict[str, Table], uses_wedges: bool) -> None:
+def _report(source: Source, tables: dict[str, Table], uses_wedges: bool, is_painted: bool) -> None:
     """Issue a single warning about all data in the file that the mesh does not use."""
     used = {
         "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
         "face": {*CORNERS, *(("texcoord",) if uses_wedges else ())},
     }
-    if set(_COLORS[:3]) <= set(tables["vertex"].columns):
+    if not is_painted and set(_COLORS[:3]) <= set(tables["vertex"].columns):
         used["vertex"] |= {*_COLORS}
     left = []
     for name, table in tables.items():

@@ -6,8 +6,8 @@
     positions (V, 3)   triangles (T, 3)   and the rest of the mesh, see ``_rigged/mesh.py``
     joint_names (J,)   parents (J,)   rest_translations (J, 3)   rest_rotations (J, 4)
     rest_scales (J, 3)   dof_joints (D,)   dof_kinds (D,)   rest_dofs (D,)   dof_limits (D, 2)
-    boxes (J, 2, 3)   skin_starts (V + 1,)   skin_joints (N,)   skin_weights (N,)
-    inverse_bind (J, 4, 4)   correctives (9 (J - 1), V, 3)
+    boxes (J, 2, 3)   auxiliary (J,)   skin_starts (V + 1,)   skin_joints (N,)
+    skin_weights (N,)   inverse_bind (J, 4, 4)   correctives (9 (J - 1), V, 3)
     layout_starts (J,)   layout_is_euler (J,)   layout_counts (3,): numbers, translation, scale
     hand_0_side ()   hand_0_joints (H,)   hand_0_components (C, 3 H)   hand_0_mean (3 H,) …
     field_0_name ()   field_0_title ()   field_0_unit ()   field_0_values (V,)
@@ -121,6 +121,7 @@ def _skeleton(archive: Archive) -> Skeleton:
         rest_dofs=_finite(archive, "rest_dofs", (n_dofs,)),
         dof_limits=_limits(archive, n_dofs),
         boxes=_finite(archive, "boxes", (count, 2, 3)) if archive.has("boxes") else None,
+        auxiliary=_numbers(archive, "auxiliary", (count,)) if archive.has("auxiliary") else None,
     )
 
 
@@ -312,7 +313,7 @@ def figure_arrays(figure: Figure) -> dict[str, NDArray[Any]]:
 
 _SKELETON = (
     *("parents", "rest_translations", "rest_rotations", "rest_scales"),
-    *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes"),
+    *("dof_joints", "dof_kinds", "rest_dofs", "dof_limits", "boxes", "auxiliary"),
 )
 """Keys with the same names as in ``Skeleton``."""
 

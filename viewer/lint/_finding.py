@@ -15,7 +15,6 @@ from viewer.lint._counting import Counting
 from viewer.lint._track import Track
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
@@ -50,8 +49,8 @@ class LintOptions:
         Captured keypoints below this have low confidence.
     rate : float
         Minimum sampling rate of keyed clips, per second.
-    frame_rate : float
-        Frames per second for numbering the frames of keyed clips.
+    frame_rate : float or None
+        Frames per second for numbering the frames of keyed clips; None for the rate of their keys.
     ground : float, "auto" or "none"
         Height of the ground along the scene's up axis; detected from the feet if
         ``"auto"``; with ``"none"``, feet are not checked.
@@ -61,7 +60,7 @@ class LintOptions:
     max_rotation: float = float(np.radians(MAX_ROTATION))
     confidence: float = 0.3
     rate: float = 60.0
-    frame_rate: float = DEFAULT_RATE
+    frame_rate: float | None = None
     ground: float | Literal["auto", "none"] = "auto"
 
 

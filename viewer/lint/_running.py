@@ -11,6 +11,7 @@ import numpy as np
 from viewer.lint._counting import counting_of
 from viewer.lint._finding import Finding, LintOptions, Subject
 from viewer.rig.arrays import Ints
+from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.scene import Scene
 
 __all__ = ["CHECKS", "Check", "Progress", "lint_scene"]
@@ -74,7 +75,7 @@ def lint_scene(
         Findings by actor, in the order of ``CHECKS``; each has its actor and locations.
     """
     chosen = options or LintOptions()
-    counting = counting_of(scene, chosen.frame_rate)
+    counting = counting_of(scene, chosen.frame_rate or scene_rate(scene.actors))
     known: set[int] = set()
     steps: list[tuple[Subject, str]] = []
     for index, actor in enumerate(scene.actors):

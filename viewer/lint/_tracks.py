@@ -14,7 +14,13 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.clip import Clip
-from viewer.rig.motion.evaluation import JointMotion, frames_between, frames_of, world_frames
+from viewer.rig.motion.evaluation import (
+    JointMotion,
+    frame_rate,
+    frames_between,
+    frames_of,
+    world_frames,
+)
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.shape import rest_joints, shaped
@@ -83,7 +89,8 @@ def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:
     Times are seconds on the clip's own clock.
     """
     options = subject.options
-    rate = options.frame_rate * max(1, math.ceil(options.rate / options.frame_rate))
+    rate = options.frame_rate or frame_rate(clip)
+    rate *= max(1, math.ceil(options.rate / rate))
     count = min(math.floor((clip.end - clip.start) * rate + _ON_STEP) + 1, _MOST)
     return clip.start + np.arange(count) / rate
 
@@ -92,9 +99,8 @@ def frame_numbers(subject: Subject, times: Floats) -> Ints:
     """Return the frames of the timeline at times of a keyed clip: (F,) int32."""
     actor = subject.actor
     assert actor.clip is not None  # checked by the callers
-    counting = subject.counting or Counting(
-        subject.options.frame_rate, actor.clip.start + actor.offset
-    )
+    rate = subject.options.frame_rate or frame_rate(actor.clip)
+    counting = subject.counting or Counting(rate, actor.clip.start + actor.offset)
     return counting.numbers(times + actor.offset)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading.cast import Cast
+from viewer.rig.motion.animation import Animation
 from viewer.rig.motion.animation_choice import chosen_animation, counterpart, play_animation
 from viewer.rig.scene import Actor
 
@@ -36,9 +37,11 @@ def animate(cast: Cast, wanted: str) -> None:
     refusals = []
     for actors in files:
         try:
-            _start(cast, actors, wanted)
+            chosen = chosen_animation([actor.figure for actor in actors], wanted)
         except RigError as problem:
             refusals.append(problem)
+        else:
+            _start(cast, actors, chosen, is_requested=bool(wanted))
     if files and len(refusals) == len(files):
         raise refusals[0]
 
@@ -52,13 +55,12 @@ def _files(cast: Cast) -> list[list[Actor]]:
     return [*files.values()]
 
 
-def _start(cast: Cast, actors: list[Actor], wanted: str) -> None:
-    chosen = chosen_animation([actor.figure for actor in actors], wanted)
+def _start(cast: Cast, actors: list[Actor], chosen: Animation | None, is_requested: bool) -> None:
     for actor in actors:
         index = -1 if chosen is None else counterpart(actor.figure, chosen)
         try:
             play_animation(actor, index)
         except FormatError as problem:
-            if wanted:
+            if is_requested:
                 raise
             cast.diagnostics.append(replace(problem.diagnostic, is_refusal=False))

@@ -68,12 +68,13 @@ def begin(
     figures = contents.figures
     pairs = _pairs([figure for _, figure in figures])
     cast = Cast([])
+    group_of = {figure: group for group in contents.groups for figure in group.figures}
     for pair in pairs:
         figure = _join([figures[index] for index in pair])
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
         origin = figures[pair[-1]][0]
         actor = Actor(figure, called=cast.free_title(called), origin=origin)
-        cast.add(actor, figure.up, placed=False, origin=origin)
+        cast.add(actor, figure.up, placed=False, group=group_of.get(figure))
     _give_morphs(contents, cast)
     _move(contents, cast, settings or MotionSettings())
     for path, record in contents.poses:
@@ -84,7 +85,7 @@ def begin(
     world_up = world_up or next(iter(cast.ups), "y")
     stand_up(cast, world_up)
     place_side_by_side(cast)
-    cast.views += placed_views(cast, contents.views)
+    cast.views += placed_views(cast)
     found = (*contents.diagnostics, *cast.diagnostics)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
     scene.files, scene.images = contents.files, cast.images

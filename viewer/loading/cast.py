@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
     from viewer.rig.captures.camera_images import CameraImages
     from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.figure_group import FigureGroup
 
 __all__ = ["Cast"]
 
@@ -29,8 +30,8 @@ class Cast:
         The up axis of each actor.
     placed : list of bool
         Whether each actor's motion determines its position.
-    origins : list of Path or None
-        File of each actor; several actors of one file keep their places relative to each other.
+    groups : list of FigureGroup or None
+        Group of each actor's figure; its actors keep their places relative to each other.
     builders : list of Builder
         Captures that are still being read.
     views : list of CameraView
@@ -44,7 +45,7 @@ class Cast:
     actors: list[Actor]
     ups: list[str] = field(default_factory=list)
     placed: list[bool] = field(default_factory=list)
-    origins: list[Path | None] = field(default_factory=list)
+    groups: list[FigureGroup | None] = field(default_factory=list)
     builders: list[Builder] = field(default_factory=list)
     views: list[CameraView] = field(default_factory=list)
     images: CameraImages | None = None
@@ -58,9 +59,14 @@ class Cast:
         """Return an unused title for a new actor, or for all people of a new capture."""
         return free_title(self.actors, title)
 
-    def add(self, actor: Actor, up: str, placed: bool, origin: Path | None = None) -> None:
+    def add(self, actor: Actor, up: str, placed: bool, group: FigureGroup | None = None) -> None:
         """Append one actor, and its file if it may hold several figures."""
         self.actors.append(actor)
         self.ups.append(up)
         self.placed.append(placed)
-        self.origins.append(origin)
+        self.groups.append(group)
+
+    def take(self, index: int) -> Actor:
+        """Remove one actor and return it."""
+        del self.ups[index], self.placed[index], self.groups[index]
+        return self.actors.pop(index)

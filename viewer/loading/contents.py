@@ -27,7 +27,6 @@ from viewer.rig.figure import Figure
 if TYPE_CHECKING:
     from viewer.formats import Content
     from viewer.formats.rig import NamedFiles
-    from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure_group import FigureGroup
     from viewer.rig.morph_target import MorphTarget
@@ -49,9 +48,9 @@ class Contents:
     Attributes
     ----------
     figures : list of (Path, Figure)
-        Several of one path keep their places relative to each other.
-    views : list of (Path, CameraView)
-        Cameras of files with figures, in the space of these.
+        All figures, those of groups included.
+    groups : list of FigureGroup
+        Figures of one file, which keep their places relative to each other and to their cameras.
     called : dict
         Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic
@@ -61,7 +60,7 @@ class Contents:
     """
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
-    views: list[tuple[Path, CameraView]] = field(default_factory=list)
+    groups: list[FigureGroup] = field(default_factory=list)
     clips: list[tuple[Path, Clip]] = field(default_factory=list)
     poses: list[tuple[Path, PoseRecord]] = field(default_factory=list)
     pictures: list[tuple[Path, Bytes]] = field(default_factory=list)
@@ -168,7 +167,7 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple
     if kind == "FigureGroup":
         group = cast("FigureGroup", content)
         contents.figures += [(source.path, figure) for figure in group.figures]
-        contents.views += [(source.path, view) for view in group.views]
+        contents.groups.append(group)
         return ()
     if isinstance(content, Figure) and source.is_folder:
         content = _with_own_picture(source, content)

@@ -126,8 +126,8 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
         return named, False
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and is_body(actor.figure):
-            del cast.actors[index], cast.ups[index], cast.placed[index]
-            return actor.figure, _is_bundled(actor.figure)
+            figure = cast.take(index).figure
+            return figure, _is_bundled(figure)
     body = read(Source.open(bundled_body()))
     assert isinstance(body, Figure)  # it is a bundled file
     return body, True

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from viewer.loading.cast import Cast
 from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box
 
@@ -29,9 +28,9 @@ def stand_up(cast: Cast, world_up: str) -> None:
 def place_side_by_side(cast: Cast) -> None:
     """Move actors without a position from their files to the right of those before them.
 
-    Actors of one file are moved together.
+    Actors of one group of figures are moved together.
     """
-    loose = _by_file(cast)
+    loose = _by_group(cast)
     placed = [a for a, placed in zip(cast.actors, cast.placed, strict=True) if placed]
     if not loose or len(loose) + len(placed) < 2:
         return
@@ -52,27 +51,26 @@ def place_side_by_side(cast: Cast) -> None:
         before = span
 
 
-def _by_file(cast: Cast) -> list[list[Actor]]:
-    """Return the actors without a position of their own, those of one file together."""
-    groups: dict[Path | int, list[Actor]] = {}
-    for index, actor in enumerate(cast.actors):
+def _by_group(cast: Cast) -> list[list[Actor]]:
+    """Return the actors without a position of their own, those of one group together."""
+    groups: dict[FigureGroup | int, list[Actor]] = {}
+    for index, (actor, group) in enumerate(zip(cast.actors, cast.groups, strict=True)):
         if not cast.placed[index]:
-            origin = cast.origins[index]
-            groups.setdefault(index if origin is None else origin, []).append(actor)
+            groups.setdefault(index if group is None else group, []).append(actor)
     return list(groups.values())
 
 
-def placed_views(cast: Cast, views: Iterable[tuple[Path, CameraView]]) -> list[CameraView]:
-    """Return the cameras of files with figures, moved with the figures of their file."""
+def placed_views(cast: Cast) -> list[CameraView]:
+    """Return the cameras of groups of figures, moved with these figures."""
     placements = {
-        origin: actor.placement
-        for actor, origin in zip(cast.actors, cast.origins, strict=True)
-        if origin is not None
+        group: actor.placement
+        for actor, group in zip(cast.actors, cast.groups, strict=True)
+        if group is not None
     }
     found = []
-    for path, view in views:
-        placement = placements[path]
-        rotation = view.rotation @ placement[:3, :3].T
-        moved = view.translation - rotation @ placement[:3, 3]
-        found.append(replace(view, rotation=rotation, translation=moved))
+    for group, placement in placements.items():
+        for view in group.views:
+            rotation = view.rotation @ placement[:3, :3].T
+            moved = view.translation - rotation @ placement[:3, 3]
+            found.append(replace(view, rotation=rotation, translation=moved))
     return found

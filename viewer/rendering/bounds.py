@@ -118,7 +118,10 @@ def _of_joints(actor: Actor) -> Floats:
     skeleton = shaped(actor.figure, pose.shape_weights).require_skeleton()
     world = posed_skeleton(skeleton, pose).world
     places = world[:, :3, 3]
-    thick = np.full(len(places), _BONE * box_size(bounding_box(places)))
+    size, mesh = box_size(bounding_box(places)), actor.figure.mesh
+    if size == 0.0 and mesh is not None:  # all joints coincide
+        size = box_size(bounding_box(mesh.positions))
+    thick = np.full(len(places), _BONE * (size or 1.0))
     bones = np.column_stack([places, thick])
     if skeleton.boxes is None:
         return bones

@@ -93,13 +93,17 @@ def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
         if target.normals is not None:
             offsets[1, row, target.vertices] = target.normals - mesh.normals[target.vertices]
     names, groups = tuple(target.name for target in targets), (MORPH_GROUP,) * count
+    # New targets come last and have a weight of 0.
+    rest = np.append(figure.rest_shape_weights, np.zeros(count))
     if shapes is not None and shapes.normal_offsets is not None:
         names, groups = shapes.names + names, shapes.groups + groups
         known = np.stack([shapes.direction_values(), shapes.normal_values()])
         offsets = np.concatenate([known, offsets], axis=1)
     # BlendShapes uses read-only arrays without copying them.
     offsets.flags.writeable = False
-    return replace(figure, blend_shapes=BlendShapes(names, offsets[0], groups, offsets[1]))
+    rules = None if shapes is None else shapes.rules
+    made = BlendShapes(names, offsets[0], groups, offsets[1], rest, rules)
+    return replace(figure, blend_shapes=made)
 
 
 def on_one_joint(figure: Figure) -> Figure:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.number_key import NumberKey
 from viewer.rig.posed_skeleton import PosedSkeleton
@@ -155,6 +156,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 
     The rotations of the DOF table are multiplied so that the first row is applied first: rows x, y,
     z give R(DOFs) = Rz Ry Rx (CSE169 course notes, "rotation about x first, then y, then z").
+    Joints with a constraint follow their source instead.
 
     Parameters
     ----------
@@ -175,12 +177,18 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     joints, axes = skeleton.dof_joints[is_translation], skeleton.dof_kinds[is_translation]
     # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
     np.add.at(local[:, :3, 3], (joints, axes), pose.dofs[is_translation])
-    local[:, :3, :3] = joint_rotations(skeleton, pose) * pose.scales[:, None, :]
+    rotations = constrained_matrices(
+        skeleton, joint_rotations(skeleton, pose), local[:, :3, 3], pose.scales
+    )
+    local[:, :3, :3] = rotations * pose.scales[:, None, :]
     return local
 
 
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
-    """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs): (J, 3, 3)."""
+    """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs): (J, 3, 3).
+
+    Constraints are not applied: these are the rotations that the pose asks for.
+    """
     return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
 
 

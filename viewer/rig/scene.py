@@ -274,12 +274,15 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     """
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
+    shows_mesh = show != "skeleton" or figure.skeleton is None
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
         shape = shaped(figure, actor.pose.shape_weights).require_skeleton()
-        placement = placement_matrix(actor.pose)
-        parts.append(apply_transform(placement, skeleton_points(shape, actor.pose)))
-    if figure.mesh is not None and (show != "skeleton" or figure.skeleton is None):
+        joints = skeleton_points(shape, actor.pose)
+        parts.append(apply_transform(placement_matrix(actor.pose), joints))
+        # Joints that coincide have no size to frame.
+        shows_mesh = shows_mesh or not np.ptp(joints, axis=0).any()
+    if figure.mesh is not None and shows_mesh:
         is_bound = show == "binding"
         points = figure.mesh.positions if is_bound else deform(figure, actor.pose)[0]
         if actor.hidden_parts:

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.humanoid import Humanoid
 
 __all__ = [
@@ -57,6 +58,10 @@ class Skeleton:
         Joints that the file does not have: a reader added them to express a transform or a second
         binding exactly. They have no DOFs, and ``shown_joints`` leaves them out: lists, pictures
         and messages show the nearest ancestor in their place. None if there are none.
+    humanoid : Humanoid or None
+        Joints with the standard names of human bones, if the file states them.
+    constraints : tuple of Constraint
+        Joints that follow others, in the order of evaluation; at most one per joint.
     """
 
     names: tuple[str, ...]
@@ -71,6 +76,7 @@ class Skeleton:
     boxes: Floats | None = None
     auxiliary: Bools | None = None
     humanoid: Humanoid | None = None
+    constraints: tuple[Constraint, ...] = ()
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:

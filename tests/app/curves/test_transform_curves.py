@@ -1,5 +1,7 @@
 """Keyed transforms in the Curves panel: keys by mouse, fields and buttons, each step undone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from app.curves.plotted import _center, _pick, _type_into
@@ -46,6 +48,20 @@ def test_curves_are_named_by_joint_and_property(hand):
         "knee.sx", "knee.sy", "knee.sz", "foot.x", "foot.y", "foot.z", "shapes.rise",
         "shapes.widen",
     ]  # fmt: skip
+
+
+def test_a_joint_shows_its_angles_first_else_what_has_keys(hand):
+    assert hand.state.of(Curves).rows == rows(hand, "hip.x", "hip.y", "hip.z")
+    add_key_at(hand.state, rows(hand, "foot.x"), 1.0)
+    delete_chosen(hand.state)
+    hand.state.selected_joint = 1
+    hand.step(2)
+    assert hand.state.of(Curves).rows == rows(hand, "knee.x", "knee.y", "knee.z")
+    hand.state.actor.clip = replace(
+        hand.state.actor.clip, channels=tuple(one for one in channels(hand) if one.path == "scale")
+    )
+    hand.step(2)
+    assert hand.state.of(Curves).rows == rows(hand, "knee.sx", "knee.sy", "knee.sz")
 
 
 def test_a_dragged_key_moves_and_one_undo_returns_it(hand):

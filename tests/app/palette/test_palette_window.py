@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from imgui_bundle import imgui
 
 from viewer.app.palette.entries import entries
 from viewer.app.palette.palette_window import Palette
@@ -90,3 +91,15 @@ def test_disabled_entries_say_why_and_do_not_run(hand):
 def test_all_kinds_are_there_with_names_of_their_own(hand, kind):
     named = [entry.text for entry in entries(hand.state) if entry.kind == kind]
     assert named and len(named) == len(set(named))
+
+
+def test_letter_typed_before_the_palette_has_the_focus_runs_no_action(hand):
+    hand.io.add_key_event(imgui.Key.mod_ctrl, True)
+    hand.step()
+    hand.io.add_key_event(imgui.Key.p, True)
+    hand.step()
+    hand.io.add_key_event(imgui.Key.mod_ctrl, False)
+    hand.step()
+    hand.io.add_key_event(imgui.Key.w, True)
+    hand.step(4)
+    assert not hand.state.options.wireframe

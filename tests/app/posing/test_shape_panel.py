@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from app import box_body
@@ -302,3 +304,17 @@ def test_typed_morph_weight_is_unlimited_and_resets(morphed):
     assert (morphed.scene_picture() != before).any()
     morphed.click("Reset shape")
     assert _weights(morphed).tolist() == [0, 0]
+
+
+def test_reset_returns_to_the_weights_of_the_file(morphed):
+    figure = morphed.state.actor.figure
+    shapes = replace(figure.blend_shapes, rest_weights=np.array([0.25, 0.0]))
+    morphed.state.actor.figure = replace(figure, blend_shapes=shapes)
+    _weights(morphed)[:] = 0.5, 0.75
+    morphed.step(2)
+    morphed.key("r")
+    assert _weights(morphed).tolist() == [0.25, 0.0]
+    _weights(morphed)[:] = 0.5, 0.75
+    morphed.step(2)
+    morphed.double_click("coefficient 0")
+    assert _weights(morphed).tolist() == [0.25, 0.75]

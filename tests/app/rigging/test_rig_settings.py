@@ -246,7 +246,9 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     assert again.is_attached and again.fields[0].name == "confidence"
     hand.click("Save rigged…")
     hand.state.of(Files).dialog.enter(tmp_path)
-    hand.state.of(Files).dialog.name = "arm2.skel"
+    hand.step(2)
+    hand.key("a", "ctrl")
+    hand.type("arm2.skel")
     hand.step()
     hand.click("Save###Save")
     hand.finish_job()
@@ -254,7 +256,9 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     assert found == ["arm2.json", "arm2.obj", "arm2.skel", "arm2.skin"]
     hand.click("Save rigged…")
     hand.state.of(Files).dialog.enter(tmp_path)
-    hand.state.of(Files).dialog.name = "arm3.glb"
+    hand.step(2)
+    hand.key("a", "ctrl")
+    hand.type("arm3.glb")
     hand.step()
     hand.click("Save###Save")
     hand.finish_job()

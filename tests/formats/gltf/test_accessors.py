@@ -113,7 +113,7 @@ def test_sparse_values_replace_those_of_the_view_or_zeros() -> None:
         ({"byteOffset": 2**63}, "F002.gltf-accessor", ""),
         ({"byteOffset": -4}, "F002.gltf-type", "/byteOffset"),
         ({"bufferView": 9}, "F002.gltf-index", "/bufferView"),
-        ({"bufferView": None}, "F002.gltf-type", "/bufferView"),
+        ({"bufferView": "0"}, "F002.gltf-type", "/bufferView"),
         ({"componentType": 5124}, "F002.gltf-type", "/componentType"),
         ({"componentType": [5126]}, "F002.gltf-type", "/componentType"),
         ({"type": "VEC5"}, "F002.gltf-type", "/type"),

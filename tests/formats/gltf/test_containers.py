@@ -113,15 +113,24 @@ def test_syntax_errors_have_a_line() -> None:
     assert str(caught.value).startswith("a.gltf:3: expected JSON, found a syntax error")
 
 
+def test_texts_of_more_than_half_a_gigabyte_are_refused(monkeypatch) -> None:
+    monkeypatch.setattr("viewer.formats._gltf.json_text._MOST_BYTES", 50)
+    assert refused(TEXT) == ("F001.gltf-text", "")
+    assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
+
+
 def test_deviations_from_json_are_warnings() -> None:
     head = b'{"asset": {"version": "2.0"}, '
     assert warned(head + b'"extras": NaN, "nodes": [], "nodes": [{}]}') == [
         ("G001.constants", ""),
         ("G001.repeated", ""),
     ]
+    nulls = b'"scene": null, "extras": {"a": null}, "nodes": [{"name": null, "mesh": null}]}'
+    assert warned(head + nulls) == [("G001.nulls", "")]
+    assert read(head + nulls).extras == {"a": None} and read(head + nulls).tree.names == ("",)
     assert warned(head + b'"nodes": [{"name": "a\xff"}]}') == [("G001.text", "")]
     assert read(head + b'"nodes": [{"name": "a\xff"}]}').tree.names == ("a\ufffd",)
-    assert warned(b"{}") == [("G001.no-asset", "/")]
+    assert warned(b"{}") == [("G001.no-asset", "")]
 
 
 @pytest.mark.parametrize(
@@ -179,7 +188,7 @@ def test_files_beside_the_document(tmp_path: Path, name: str, uri: str) -> None:
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"gone\.bin: cannot be read"):
+    with pytest.raises(FormatError, match=r"a\.gltf#/buffers/0/uri: .*gone\.bin: cannot be read"):
         read(triangle().json("gone.bin"), tmp_path / "a.gltf")
 
 

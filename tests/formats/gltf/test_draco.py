@@ -49,7 +49,7 @@ def test_counts_are_those_of_the_data() -> None:
             "F002.gltf-draco-id",
             f"{POINTER}/attributes/POSITION",
         ),
-        (compressed(attributes=None), "F002.gltf-type", f"{POINTER}/attributes"),
+        (compressed(attributes=[]), "F002.gltf-type", f"{POINTER}/attributes"),
         (compressed(bufferView=4), "F002.gltf-index", f"{POINTER}/bufferView"),
     ],
 )

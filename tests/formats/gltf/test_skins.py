@@ -62,7 +62,11 @@ def test_invalid_skins(skin: dict[str, object], key: str, pointer: str) -> None:
 def test_skin_without_joints_is_not_used() -> None:
     file = skinned()
     file.root["skins"][0]["joints"] = []
-    assert read(file).tree.skins.tolist() == [-1, -1, -1]
+    file.root["skins"].append({"joints": [2]})
+    file.root["nodes"][2]["skin"] = 1
+    content = read(file)
+    assert [skin.joints.tolist() for skin in content.skins] == [[2]]
+    assert content.tree.skins.tolist() == [-1, -1, 0]
     assert warned(file) == [("G004.no-joints", "/skins/0/joints")]
 
 

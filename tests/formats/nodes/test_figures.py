@@ -174,6 +174,18 @@ def test_weights_are_divided_by_their_sum_and_the_deviation_is_reported():
     assert_array_equal(figure.skin.joints[-1], 2)
 
 
+def test_another_skinning_method_is_recommended():
+    bound = skin([1, 2], 3)
+    dual = NodeSkin("body", bound.joints, bound.inverse_bind, "dqs")
+    notes = source()
+    figure_group(file_of(arm(), meshes=(mesh(triangle(1, 2)),), skins=(dual,)), notes)
+    (note,) = notes.diagnostics.warnings
+    assert (note.key, note.values) == (
+        "F007.skinning-method",
+        {"names": ["body"], "method": "dqs"},
+    )
+
+
 def test_empty_file_is_refused_and_a_skeleton_opens():
     with pytest.raises(FormatError) as caught:
         figures_of(file_of(tree_of({"name": "lonely"})))

@@ -104,7 +104,7 @@ def test_actors_of_a_file_keep_their_places_beside_others_and_cameras_follow():
     contents = Contents()
     for path, group in ((Path("a.glb"), first), (Path("b.glb"), second)):
         contents.figures += [(path, figure) for figure in group.figures]
-        contents.views += [(path, view) for view in group.views]
+        contents.groups.append(group)
     scene = assemble(contents)
     assert [actor.title for actor in scene.actors] == [
         *("hero", "villain", "chair"),

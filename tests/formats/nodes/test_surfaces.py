@@ -118,12 +118,26 @@ def test_animated_targets_have_sliders_of_their_own():
         *("face.smile", "face.blink"),
         *("teeth.smile", "teeth.blink"),
     )
-    assert not reads
+    assert reads == [1]
     weights, moved = figure.animations[0].clip().channels
     assert_array_equal(weights.shapes, [2, 3])
     assert (moved.path, moved.joint) == ("translation", 0)
     assert figure.animations[0].clip() is figure.animations[0].clip()
     assert reads == [1]
+
+
+def test_equally_animated_targets_share_sliders():
+    tree, meshes, skins = faces_with_targets()
+    times, values = np.array([0.0, 1.0]), np.array([[0.0, 1.0], [1.0, 0.5]])
+
+    def talk():
+        return tuple(NodeChannel(node, "weights", times, values.copy()) for node in (1, 2))
+
+    animation = NodeAnimation("talk", 0.0, 1.0, frozenset([1, 2]), talk)
+    figure = figure_of(file_of(tree, meshes=meshes, skins=skins, animations=(animation,)))
+    assert figure.blend_shapes.names == ("smile", "blink")
+    (channel,) = figure.animations[0].clip().channels
+    assert_array_equal(channel.shapes, [0, 1])
 
 
 @pytest.mark.parametrize("key", ["generator", "copyright"])

@@ -234,6 +234,37 @@ J_Bip_C_Hips = pelvis
   J_Bip_R_LowerLeg = right_knee
  J_Sec_Hair1_01 = -
 """
+MAKEHUMAN = """
+root = pelvis
+ spine05 = spine1
+  spine04 = -
+   spine03 = spine2
+    spine02 = -
+     spine01 = spine3
+      clavicle.L = left_collar
+       shoulder01.L = -
+        upperarm01.L = left_shoulder
+         upperarm02.L = -
+          lowerarm01.L = left_elbow
+           lowerarm02.L = -
+            wrist.L = left_wrist
+             metacarpal1.L = -
+               finger2-2.L = left_index2
+             finger1-1.L = left_thumb1
+      neck01 = neck
+       neck02 = -
+        head = head
+         jaw = jaw
+ pelvis.L = -
+  upperleg01.L = left_hip
+ pelvis.R = -
+  upperleg01.R = right_hip
+   upperleg02.R = -
+    lowerleg01.R = right_knee
+     lowerleg02.R = -
+      foot.R = right_ankle
+       toe1-1.R = right_foot
+"""
 POSER = """
 hip = pelvis
  abdomen = spine1
@@ -300,6 +331,7 @@ TABLES = {
     "biped underscores": BIPED.replace("Bip01 ", "Bip001_").replace("Bip001_=", "Bip001 ="),
     "unreal": UNREAL,
     "vrm": VRM,
+    "makehuman": MAKEHUMAN,
     "poser": POSER,
     "old bvh": OLD_BVH,
     "xsens": XSENS,

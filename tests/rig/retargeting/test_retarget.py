@@ -20,11 +20,14 @@ from rig.retargeting.two_people import (
 
 from viewer.diagnostics.phrase import Phrase
 from viewer.rig.figure import Figure
+from viewer.rig.humanoid import HUMAN_BONES, Humanoid
 from viewer.rig.mesh import Mesh
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.retarget import retarget
 
+SPINE = {"spine1": "spine", "spine2": "chest", "spine3": "upperChest"}
+VRM_BONES = {name: bone for bone, name in HUMAN_BONES.items()} | SPINE
 LIMBS = [
     (("LeftUpLeg", "LeftLeg"), ("left_hip", "left_knee")),
     (("LeftLeg", "LeftFoot"), ("left_knee", "left_ankle")),
@@ -156,9 +159,18 @@ def test_a_source_with_z_up_is_turned_upright() -> None:
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
     assert_same_limbs(source, figure, clip, TO_Y)
-    path = places(source.figure, source.clip)["Hips"] @ TO_Y.T
-    scale = path_scale()
-    np.testing.assert_allclose(places(figure, clip)["pelvis"], scale * path, atol=1e-12)
+    theirs = {name: way @ TO_Y.T for name, way in places(source.figure, source.clip).items()}
+    assert_same_path(places(figure, clip), theirs)
+
+
+def assert_same_path(mine: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> None:
+    """Assert that the hips follow the scaled path, and that feet at rest are equally high."""
+    raised = mine["pelvis"] - path_scale() * theirs["Hips"]
+    # The first frame is the rest pose.
+    height = mine["left_ankle"][0, 1] - path_scale() * theirs["LeftFoot"][0, 1]
+    np.testing.assert_allclose(height, 0.0, atol=1e-12)
+    np.testing.assert_allclose(raised[:, [0, 2]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.ptp(raised[:, 1]), 0.0, atol=1e-12)
 
 
 def path_scale() -> float:
@@ -174,8 +186,7 @@ def path_scale() -> float:
 def test_the_path_is_scaled_by_leg_length() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
-    theirs = places(source.figure, source.clip)["Hips"]
-    np.testing.assert_allclose(places(figure, clip)["pelvis"], path_scale() * theirs, atol=1e-12)
+    assert_same_path(places(figure, clip), places(source.figure, source.clip))
     values = {"scale": pytest.approx(path_scale()), "by": Phrase("ratio-of-legs")}
     assert told(notes)[-1] == ("F007.path-scaled", values)
     assert clip.figure_translations is None
@@ -201,6 +212,17 @@ def test_a_source_with_another_front_at_rest_rotates_the_figure() -> None:
     where = places(figure, clip)
     # The line between the figure's hips, along x at rest, is aligned with the source's: along -z.
     np.testing.assert_allclose(bones(where, ("right_hip", "left_hip"))[0], [0, 0, -1], atol=EXACT)
+
+
+def test_a_humanoid_with_any_names_that_faces_backwards_walks_forwards() -> None:
+    half = np.diag([-1.0, 1.0, -1.0])  # VRM 0.x
+    bones = {VRM_BONES[name]: joint for joint, name in enumerate(BODY)}
+    source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body", half)
+    names = tuple(f"n{joint}" for joint in range(len(BODY)))
+    skeleton = replace(figure.skeleton, names=names, humanoid=Humanoid(bones))
+    clip, _ = retarget(source, replace(figure, skeleton=skeleton))
+    assert_same_limbs(source, figure, clip)
+    assert_same_path(places(figure, clip), places(source.figure, source.clip))
 
 
 def test_a_source_whose_rest_pose_lies_down_stands_up_in_its_frames() -> None:

@@ -139,8 +139,9 @@ class Clock:
         """
         was_whole = (self.start, self.end) == self.whole
         moving = [actor for actor in self.scene.actors if actor.clip is not None]
-        keyed = [actor for actor in moving if isinstance(actor.clip, Clip | TransformClip)]
-        sampled = [actor for actor in moving if actor not in keyed]
+        keyed, sampled = list[Actor](), list[Actor]()
+        for actor in moving:
+            (keyed if isinstance(actor.clip, Clip | TransformClip) else sampled).append(actor)
         if not self._is_rate_set:
             self.keyed_rate = scene_rate(keyed)
         self.has_motion, self.has_frames = bool(moving), bool(sampled)

@@ -87,13 +87,14 @@ def draw(state: AppState) -> None:
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
     """Deselect curves and keys that no longer exist, and show those of a newly selected joint."""
     view, clip = state.of(Curves), state.actor.clip
-    owner = (id(state.actor), type(clip).__name__, len(curves))
+    kind = f"{type(clip).__name__} {state.actor.animation}"
+    owner = (id(state.actor), kind, len(curves))
     if owner != view.owner:
         view.owner, view.joint = owner, -1
-        view.choose(_rows_of(curves, curves[0].number))
+        view.choose(_first_shown(state, curves, _first_number(state, curves)))
     if state.selected_joint != view.joint:
         view.joint = state.selected_joint
-        rows = _rows_of(curves, view.joint)
+        rows = _first_shown(state, curves, view.joint)
         if view.joint >= 0 and rows:
             view.choose(rows)
             view.wants_scroll = True
@@ -102,8 +103,23 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
         drop_missing(view, keyed, len(curves))
 
 
-def _rows_of(curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
-    return tuple(row for row, curve in enumerate(curves) if curve.number == number)
+def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
+    """Return the curves that a selected joint shows: of keyed transforms its angles with keys."""
+    rows = tuple(row for row, curve in enumerate(curves) if curve.number == number)
+    keyed = keyed_of(state.actor)
+    if not isinstance(keyed, TransformKeys):
+        return rows
+    moving = tuple(row for row in rows if keyed.channel(row) is not None)
+    return tuple(row for row in moving if curves[row].is_angle) or moving or rows
+
+
+def _first_number(state: AppState, curves: tuple[Curve, ...]) -> int:
+    """Return the joint whose curves are shown first: of keyed transforms the first with keys."""
+    keyed, numbers = keyed_of(state.actor), [curve.number for curve in curves]
+    if isinstance(keyed, TransformKeys):
+        moving = (n for row, n in enumerate(numbers) if keyed.channel(row) is not None)
+        return next(moving, numbers[0])
+    return numbers[0]
 
 
 # The list

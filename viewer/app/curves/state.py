@@ -27,7 +27,7 @@ class Curves:
     wants_scroll : bool
         Whether the list scrolls to the first selected curve in the next frame.
     owner : (int, str, int)
-        Key of the actor, kind of motion and number of curves for which ``rows`` are valid.
+        Key of the actor, motion and number of curves for which ``rows`` are valid.
     joint : int
         Joint whose curves were last selected.
     """

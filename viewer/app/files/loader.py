@@ -99,7 +99,8 @@ class Loader:
         if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
             figures = []  # the people are drawn with the bundled body and replace the scene
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
-        joined = replace(contents, figures=figures, morphs=[*opened.morphs, *contents.morphs])
+        morphs = [*opened.morphs, *contents.morphs]
+        joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
         if contents.skeleton_motions and len(self.scene.actors) > count:

@@ -98,6 +98,7 @@ def choose_animation(state: AppState, index: int) -> None:
         _put_aside(state, actor)
         play_animation(actor, number, clip)
     state.clock.follow(chosen)
+    state.clock.set_range(*state.clock.whole)
     if state.clock.has_motion:
         motion = chosen.clip
         start = state.clock.whole[0] if motion is None else motion.start + chosen.offset

@@ -12,6 +12,7 @@ from viewer.app.core.clock import Clock
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item
+from viewer.app.playback.key_marks import key_times
 from viewer.phrases import printable
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.transform_clip import TransformClip
@@ -30,6 +31,7 @@ _CHOSEN_EDGE = 0.85  # opacities
 _NARROWEST = 0.35  # smallest width of a bar, in font sizes: single frames must be visible
 _NARROWEST_GAP = 1.0  # points between two bars of that width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
+_KEY, _KEY_SIZE = (0.0, 0.0, 0.0, 0.55), 0.16  # size relative to the height of a track
 _LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
 
 
@@ -61,6 +63,8 @@ def draw_tracks(state: AppState) -> None:
         top = corner.y + height * (row + 1)
         chosen = index == state.chosen_actor
         _draw_track(state.scene.actors[index], state.clock, area, top, height, chosen)
+        if chosen:
+            _draw_keys(state, area, top, height)
     _draw_ruler(state.clock, area, height)
     _draw_time(state.clock, area)
     imgui.end_child()
@@ -109,6 +113,21 @@ def _draw_track(
         draw_list.add_rect_filled((x0, top + gap), (x1, top + height - gap), color, 2.0)
         if chosen:
             draw_list.add_rect((x0, top + gap), (x1, top + height - gap), edge, 2.0)
+
+
+def _draw_keys(
+    state: AppState, area: tuple[float, float, float, float], top: float, height: float
+) -> None:
+    """Mark the keys of the selected joint, or all keys, on the chosen actor's track."""
+    low, high = state.clock.whole
+    left, _, width, _ = area
+    scale = width / max(high - low, 1e-9)
+    # Marks closer than a point cannot be told apart.
+    places = np.unique(np.round((key_times(state.actor, state.selected_joint) - low) * scale))
+    draw_list, color = imgui.get_window_draw_list(), imgui.get_color_u32(_KEY)
+    middle, half = top + 0.5 * height, _KEY_SIZE * height
+    for x in (left + places[(places >= 0.0) & (places <= width)]).tolist():
+        draw_list.add_line((x, middle - half), (x, middle + half), color, 1.0)
 
 
 def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[float, float]]:

@@ -18,6 +18,7 @@ from viewer.app.core.widgets import (
     same_line_if_room,
     show_tooltip,
 )
+from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.pose_actions import random_shape, reset_shape
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
@@ -25,6 +26,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.memo import Memo
 from viewer.rig.morph_target import MORPH_GROUP
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 
@@ -129,6 +131,8 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
         "%.2f",
     )
     note_item(state, f"coefficient {index}")
+    if imgui.is_item_activated() and isinstance(state.actor.clip, TransformClip):
+        pause_for_edit(state)
     if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
         pose.shape_weights[index] = value
     if not is_morph:
@@ -137,7 +141,7 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
         unit = "1 is the full morph target" if is_morph else "standard deviations"
         show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
-            pose.shape_weights[index] = 0.0
+            pose.shape_weights[index] = state.actor.figure.rest_shape_weights[index]
 
 
 def _draw_marks() -> None:

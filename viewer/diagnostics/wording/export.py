@@ -57,6 +57,7 @@ MESSAGES = {
     "X002.animations": "largest difference of {vertices} over {n:#animation}: {length}{place:+ "
     "({})}, compared at {times} times{causes:+: {}}",
     # Omitted data
+    "X005.hidden-parts": "{n:#hidden part|is|are} written, too",
     "X003.parts": "not stored in {format}: {parts:all}",
     "X003.clip-placement": "the placement of the whole figure is not part of its clip and is "
     "omitted",

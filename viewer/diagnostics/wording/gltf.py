@@ -17,6 +17,9 @@ MESSAGES = {
     "G006.bone-node": "human bone {bone:quoted}: expected the index of a node, found {found}: "
     "ignored",
     "G006.bind": "expected a morph target and its weight, found target {found}: ignored",
+    "G006.constraint": "invalid constraint ignored: expected {expected}",
+    "F002.constraint-cycle": "expected constraints without a cycle, found a cycle of "
+    "nodes {nodes:list12}",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
@@ -26,6 +29,8 @@ MESSAGES = {
     "F002.gltf-no-json": "expected a JSON object, found no text",
     "F002.gltf-utf-16": "expected JSON in UTF-8, found UTF-16 text",
     "F002.gltf-json": "expected JSON, found a syntax error: {reason:text} (character {at})",
+    "F001.gltf-text": "expected at most {most} bytes of JSON, found {size}: store the data in a "
+    ".glb or .bin file",
     "F002.gltf-digits": "expected numbers of at most {most} digits, found a longer number",
     "G001.chunk-again": "ignored another {kind:text} chunk",
     "G001.chunk-length": "{kind:text} chunk: expected {expected:#byte}, found {found}",
@@ -33,12 +38,14 @@ MESSAGES = {
     "G001.length": "expected {expected:#byte} as declared by the header, found {found}",
     "G001.constants": "{n:#number} invalid in JSON (first: {found})",
     "G001.repeated": "{n:#repeated key} (first: {found:quoted}): only the last value is used",
+    "G001.nulls": "{n:#member} that {n:?is|are} null: ignored",
     "G001.text": "invalid UTF-8 at byte {at} of the JSON: replaced",
     # Values
     "F002.gltf-missing": "expected {wanted} as {member:quoted}, found none",
     "F002.gltf-type": "expected {wanted}, found {found}",
     "F002.gltf-index": "expected an index below {count} ({what}), found {found}",
     # Buffers and images
+    "F001.gltf-file": "{problem}",
     "F002.gltf-scheme": "expected a data URI or a relative file name, found {found:quoted}",
     "F002.gltf-outside": "{found:quoted} {reason}",
     "F002.gltf-data-uri": "expected a comma before the data, found {found:quoted}",
@@ -48,7 +55,7 @@ MESSAGES = {
     "data after {size} bytes",
     "F002.gltf-no-data": "expected a uri or a binary chunk, found neither",
     "F002.gltf-compressed": "expected valid compressed data, found damaged data",
-    "F002.gltf-draco": "compressed with Draco, which needs DracoPy: pip install DracoPy",
+    "F002.gltf-draco": "compressed with Draco, which needs the extra draco: pip install DracoPy",
     "F002.gltf-draco-id": "expected an attribute of the compressed data, found {found}",
     "F002.gltf-decoded-width": "expected {expected:#component}, found {found} in compressed data",
     "F002.gltf-decoded": "expected at most {most} bytes of decoded data for a file of this size, "

@@ -7,6 +7,8 @@ MESSAGES = {
     "vertex} along the edges",
     "F007.no-weights": "{n:#vertex} without weights: attached to the first listed joint",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
+    "F007.skinning-method": "skins {names:list} are made for another skinning method: choose it "
+    "with --method {method}",
     "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
     "F007.weight-sums": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "
     "by their sum",

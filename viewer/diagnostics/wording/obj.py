@@ -33,7 +33,6 @@ MESSAGES = {
     "F005.library-refused": "material library {name:text} {reason}",
     "F005.mtl-materials": "{n:#material|is|are} not in any library (first: {material:text}): drawn "
     "untextured",
-    "F007.obj-colour": "colours of {n:#vertex} ignored",
     "F007.obj-w": "w of {n:#vertex} ignored",
     "F007.obj-lines": "{n:#line} not drawn",
     "F007.obj-points": "{n:#point} not drawn",

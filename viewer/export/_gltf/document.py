@@ -19,7 +19,6 @@ VERTICES, INDICES = 34962, 34963  # targets of buffer views
 
 _TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_JPEG = b"\xff\xd8\xff"
 _PADDING = 4  # alignment of arrays: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
 _HEADER = 28  # bytes of a .glb besides JSON and arrays
@@ -88,9 +87,8 @@ class Document:
 
     def picture(self, data: bytes, name: str) -> int:
         """Add an image, the bytes of a PNG or JPEG file; return its index in ``images``."""
-        view = self._view(data, 0)
-        kind = "image/jpeg" if data.startswith(_JPEG) else "image/png"
-        image = {"name": text_of(name), "mimeType": kind, "bufferView": view}
+        kind = "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+        image = {"name": text_of(name), "mimeType": kind, "bufferView": self._view(data, 0)}
         return self.add("images", image)
 
     def glb(self) -> bytes:

@@ -11,7 +11,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.export._gltf.document import Document, text_of
 from viewer.media.image import encode_png
 from viewer.rig.arrays import Bytes, Floats
-from viewer.rig.material import Material, Texture
+from viewer.rig.material import MINIFICATIONS, Material, Texture
 from viewer.rig.mesh import Mesh
 
 __all__ = ["Color", "Materials", "material_losses"]
@@ -22,14 +22,7 @@ _PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour of untextured surface
 _MATTE = {"metallicFactor": 0.0, "roughnessFactor": 0.8}  # glTF surfaces are metallic by default
 _WRAPS = {"clamp": 33071, "repeat": 10497, "mirror": 33648}
 _SMOOTH, _SHARP = (9729, 9987), (9728, 9986)  # magnified, minified with mipmaps
-_MINIFICATIONS = {
-    "nearest": 9728,
-    "linear": 9729,
-    "nearest_mipmap_nearest": 9984,
-    "linear_mipmap_nearest": 9985,
-    "nearest_mipmap_linear": 9986,
-    "linear_mipmap_linear": 9987,
-}
+_MINIFIED = dict(zip(MINIFICATIONS, (9728, 9729, 9984, 9985, 9986, 9987), strict=True))
 _SHEAR = 1e-6  # shear of a texture transform, which rotation and scale cannot express
 
 
@@ -42,26 +35,28 @@ class Materials:
     """
 
     def __init__(self, document: Document, mesh: Mesh, color: Color | None) -> None:
-        self._document, self._mesh, self._color = document, mesh, color
+        # Vertex colours replace the figure's colour.
+        own = color or _PLAIN if mesh.colors is None else (1.0, 1.0, 1.0)
+        self._document, self.mesh, self._color = document, mesh, own
         self._images: dict[tuple[int, int], tuple[int, Bytes]] = {}
+        self._added: dict[int, int] = {}
         self._textures: dict[tuple[int, int], int] = {}
         self._samplers: dict[tuple[Any, ...], int] = {}
-        self._materials: dict[int, int] = {}
 
     def plain(self, name: str = "plain") -> int:
         """Add a material without textures; return its index."""
-        return self._add(name, {"baseColorFactor": [*(self._color or _PLAIN), 1.0], **_MATTE})
+        return self._add(name, {"baseColorFactor": [*self._color, 1.0], **_MATTE})
 
     def add(self, index: int) -> int:
-        """Return the index in the document of a material of the mesh, -1 for none, added once."""
-        if index not in self._materials:
-            self._materials[index] = self.plain() if index < 0 else self._own(index)
-        return self._materials[index]
+        """Add a material of the mesh unless it is there; return its index in the document."""
+        if index not in self._added:
+            self._added[index] = self.plain() if index < 0 else self._surface(index)
+        return self._added[index]
 
-    def _own(self, index: int) -> int:
-        material = self._mesh.materials[index]
+    def _surface(self, index: int) -> int:
+        material = self.mesh.materials[index]
         name = material.name or material.texture or f"material{index}"
-        has_uvs = self._mesh.uvs is not None and len(self._mesh.uvs) > 0
+        has_uvs = self.mesh.uvs is not None and len(self.mesh.uvs) > 0
         shown = {
             kind: texture
             for kind, texture in (material.textures if has_uvs else {}).items()
@@ -71,7 +66,7 @@ class Materials:
         if material.base_color is not None:
             surface["baseColorFactor"] = list(material.base_color)
         elif "base_texture" not in shown:
-            surface["baseColorFactor"] = [*(self._color or _PLAIN), 1.0]
+            surface["baseColorFactor"] = [*self._color, 1.0]
         if "base_texture" in shown:
             surface["baseColorTexture"] = self._reference(shown["base_texture"], name)
         if material.is_physical:
@@ -146,7 +141,7 @@ class Materials:
         key = (*texture.wrap, texture.is_smooth, texture.minification)
         if key not in self._samplers:
             magnified, minified = _SMOOTH if texture.is_smooth else _SHARP
-            minified = _MINIFICATIONS.get(texture.minification, minified)
+            minified = _MINIFIED.get(texture.minification, minified)
             filters = {"magFilter": magnified, "minFilter": minified}
             wraps = {"wrapS": _WRAPS[texture.wrap[0]], "wrapT": _WRAPS[texture.wrap[1]]}
             self._samplers[key] = self._document.add("samplers", {**filters, **wraps})

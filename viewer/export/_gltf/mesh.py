@@ -101,8 +101,8 @@ def _attributes(document: Document, mesh: Mesh, part: Part, surface: _Surface) -
         for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
             flipped = uvs[part.uv_indices] * [1.0, -1.0] + [0.0, 1.0]
             attributes[f"TEXCOORD_{number}"] = document.array(flipped, "VEC2", VERTICES)
-    if mesh.colors is not None and not (mesh.colors[part.sources] == 1.0).all():
-        colors = mesh.colors[part.sources]
+    if mesh.colors is not None:
+        colors = np.clip(mesh.colors[part.sources], 0.0, 1.0)
         attributes["COLOR_0"] = document.array(colors, "VEC4", VERTICES)
     return attributes
 

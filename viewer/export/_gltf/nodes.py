@@ -23,6 +23,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.export._gltf.document import Document, text_of
 from viewer.rig.arrays import Floats
+from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.skeleton import Skeleton
@@ -76,8 +77,9 @@ def locals_of(skeleton: Skeleton, pose: Pose) -> Locals:
     ``skeleton``: skeleton with its shape applied.
     ``pose``: pose with DOFs in lengths and radians.
     """
+    places = local_matrices(skeleton, pose)[:, :3, 3]
     rotations = matrix_to_quaternion(joint_rotations(skeleton, pose))
-    return Locals(local_matrices(skeleton, pose)[:, :3, 3], rotations, pose.scales)
+    return Locals(places, constrained(skeleton, rotations, places, pose.scales), pose.scales)
 
 
 def add_nodes(

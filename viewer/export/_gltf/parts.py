@@ -67,10 +67,8 @@ def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Par
     """
     figure, mesh = shape.figure, shape.figure.require_mesh()
     sources, uv_indices, triangles = split_seams(mesh)
-    owners = _owners(mesh, triangles, len(sources))
     parts, taken = list[Part](), set[int]()
-    for index in np.unique(owners).tolist():
-        rows = np.flatnonzero(owners == index).astype(np.int32)
+    for index, rows in _rows(mesh, triangles, len(sources)).items():
         places = np.full(len(sources), -1, dtype=np.int32)
         places[rows] = np.arange(len(rows), dtype=np.int32)
         chosen = mesh.part_indices == index
@@ -84,7 +82,7 @@ def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Par
         parts.append(
             Part(
                 index,
-                mesh.parts[index] if index >= 0 else name,
+                (mesh.parts[index] if index >= 0 else "") or name,
                 _mesh_name(figure, index, name),
                 joint,
                 sources[rows],
@@ -98,14 +96,23 @@ def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Par
     return parts
 
 
-def _owners(mesh: Mesh, triangles: Ints, count: int) -> Ints:
-    """Return the part of each written vertex; one without triangles follows the one before it."""
+def _rows(mesh: Mesh, triangles: Ints, count: int) -> dict[int, Ints]:
+    """Return the written vertices of each part, of which parts may share some.
+
+    Vertices without triangles are with the vertex before them.
+    """
     owners = np.full(count, -2, dtype=np.int32)
     owners[triangles] = mesh.part_indices[:, None]
-    known = np.maximum.accumulate(np.where(owners > -2, np.arange(count), -1))
-    filled = owners[np.maximum(known, 0)]
-    first = mesh.part_indices[0] if mesh.n_triangles else -1
-    return np.where(filled > -2, filled, first).astype(np.int32)
+    is_free = owners == -2
+    known = np.maximum.accumulate(np.where(is_free, -1, np.arange(count)))
+    first = int(mesh.part_indices[0]) if mesh.n_triangles else -1
+    owners = np.where(known >= 0, owners[np.maximum(known, 0)], first)
+    found = {}
+    for index in np.unique(np.append(mesh.part_indices, owners)).tolist():
+        chosen = is_free & (owners == index)
+        chosen[triangles[mesh.part_indices == index]] = True
+        found[index] = np.flatnonzero(chosen).astype(np.int32)
+    return found
 
 
 def _joint_of(figure: Figure, influences: Influences, index: int, sources: Ints) -> int:
@@ -127,7 +134,8 @@ def _mesh_name(figure: Figure, index: int, name: str) -> str:
     if index < 0:
         return name
     has_names = record is not None and len(record.mesh_names) > index
-    return record.mesh_names[index] if record is not None and has_names else ""
+    own = record.mesh_names[index] if record is not None and has_names else ""
+    return own or figure.require_mesh().parts[index]
 
 
 def _targets(shape: Shape, index: int, sources: Ints) -> tuple[NDArray[np.intp], tuple[str, ...]]:

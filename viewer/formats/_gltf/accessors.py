@@ -141,7 +141,8 @@ class Accessors:
         if layout.is_normalized and values.dtype.kind != "f":
             # Signed integers have one more negative value, which is -1 too (glTF 2.0, 3.6.2.2).
             return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
-        return values.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # signalling NaN
+            return values.astype(np.float64)
 
     def fractions(
         self,

@@ -166,6 +166,7 @@ def read_colors(attributes: Attributes) -> Floats | None:
 def _not_finite(values: Floats) -> Bools:
     """Return a mask of the rows that are not finite: (V,)."""
     # The sum is quick to compute; only then are rows looked at.
-    if np.isfinite(values.sum()):
-        return np.zeros(len(values), dtype=np.bool_)
+    with np.errstate(invalid="ignore"):
+        if np.isfinite(values.sum()):
+            return np.zeros(len(values), dtype=np.bool_)
     return np.asarray(~np.isfinite(values).all(axis=1))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf.meshopt import decoded_view, meshopt_of
 from viewer.formats._gltf.uris import is_data_uri, media_type, uri_bytes, uri_path
@@ -55,6 +56,17 @@ class EncodedImage:
     media_type: str
     data: bytes
     is_embedded: bool
+
+
+def _located(buffer: Element, length: int) -> bytes:
+    """Return the data of a buffer's URI; errors about another file name the buffer as well."""
+    try:
+        return uri_bytes(buffer, length)
+    except FormatError as problem:
+        if problem.path == buffer.source.path:
+            raise
+        found = problem.diagnostic
+        raise buffer.fault("F001.gltf-file", "uri", problem=found) from None
 
 
 class Buffers:
@@ -160,7 +172,7 @@ class Buffers:
         buffer = self._buffers[index]
         length = buffer.whole("byteLength")
         if buffer.has("uri"):
-            data: bytes | memoryview = uri_bytes(buffer, length)
+            data: bytes | memoryview = _located(buffer, length)
             if not is_data_uri(buffer.text("uri")):
                 self.n_bytes_read += len(data)
         elif index == 0 and self._binary is not None:

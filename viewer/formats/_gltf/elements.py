@@ -62,11 +62,11 @@ class Element:
 
     def fault(self, key: str, name: str = "", **values: Any) -> FormatError:
         """Return the exception for an error in a member, or in the object as a whole."""
-        return self.source.fault(key, self.at(name) if name else self.pointer or "/", **values)
+        return self.source.fault(key, self.at(name) if name else self.pointer or None, **values)
 
     def warn(self, key: str, name: str = "", **values: Any) -> None:
         """Record a warning about a member, or about the object as a whole."""
-        self.source.warn(key, self.at(name) if name else self.pointer or "/", **values)
+        self.source.warn(key, self.at(name) if name else self.pointer or None, **values)
 
     def wrong(self, name: str, wanted: str) -> FormatError:
         """Return the exception for a member of an unexpected type."""

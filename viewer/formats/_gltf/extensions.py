@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from viewer.formats._gltf.document import Document
+from viewer.formats._gltf_materials.materials import DRAWN_EXTENSIONS
 
 __all__ = ["GEOMETRY", "KNOWN", "check_extensions"]
 
@@ -17,12 +19,6 @@ GEOMETRY = (
 )
 """Extensions of geometry and animation."""
 
-_MATERIALS = (
-    "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",
-    "KHR_texture_transform",
-    "EXT_texture_webp",
-)
 _CHARACTERS = (
     "VRM",
     "VRMC_materials_mtoon",
@@ -31,9 +27,11 @@ _CHARACTERS = (
     "VRMC_vrm",
     "VRMC_vrm_animation",
 )
+# Those of materials and textures are named by the readers of these.
+_ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
 _WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
 
-KNOWN = frozenset((*GEOMETRY, *_MATERIALS, *_CHARACTERS, *_WITHOUT_EFFECT))
+KNOWN = frozenset((*GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS, *_WITHOUT_EFFECT))
 """Extensions that a file may require."""
 
 
@@ -51,7 +49,7 @@ def check_extensions(document: Document) -> None:
         pointer = document.root.at("extensionsRequired")
         document.source.refuse("F002.gltf-extensions", pointer, names=unknown)
     optional = [name for name in _names(document, "extensionsUsed") if name not in KNOWN]
-    optional = [name for name in optional if name not in unknown]
+    optional = [name for name in optional if name not in unknown and not _ABOUT.match(name)]
     if optional:
         document.root.warn("F007.gltf-extensions", "extensionsUsed", names=optional)
     lights = document.root.extension("KHR_lights_punctual")

@@ -15,6 +15,7 @@ __all__ = ["parsed"]
 
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_MOST_BYTES = 512 << 20  # parsing takes three times as much memory
 _THOROUGH = 1 << 20  # characters below which repeated keys are always looked for
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
@@ -36,6 +37,8 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     FormatError
         If it is not a valid JSON object.
     """
+    if len(data) > _MOST_BYTES:
+        raise source.fault("F001.gltf-text", most=_MOST_BYTES, size=len(data))
     text = _text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []
     repeated: list[str] = []
@@ -66,12 +69,34 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     except ValueError:  # the only other error that decoding raises
         raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
     if type(root) is not dict:
-        raise source.fault("F002.gltf-type", "/", wanted="an object", found=describe(root))
+        raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))
     if constants:
         source.warn("G001.constants", n=len(constants), found=constants[0])
     if repeated:
         source.warn("G001.repeated", n=len(repeated), found=repeated[0])
+    if "null" in text and (n_nulls := _remove_nulls(root)):
+        source.warn("G001.nulls", n=n_nulls)
     return root
+
+
+def _remove_nulls(root: dict[str, Any]) -> int:
+    """Remove members that are null, which some exporters write instead of leaving them out.
+
+    Returns their number. Application data are left as they are.
+    """
+    count = 0
+    left: list[Any] = [root]
+    while left:
+        value = left.pop()
+        if type(value) is list:
+            left.extend(item for item in value if type(item) in (dict, list))
+            continue
+        for name in [name for name, member in value.items() if member is None]:
+            del value[name]
+            count += 1
+        members = (member for name, member in value.items() if name != "extras")
+        left.extend(member for member in members if type(member) in (dict, list))
+    return count
 
 
 def _text(source: Source, data: bytes) -> str:

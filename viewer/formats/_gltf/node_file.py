@@ -30,9 +30,9 @@ from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
 from viewer.formats._gltf.targets import node_weights
-from viewer.formats._nodes.content import NodeFile, NodeSkin, NodeTree
+from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._source import Source
-from viewer.rig.material import Material
 
 __all__ = ["read_nodes"]
 
@@ -54,10 +54,13 @@ def read_nodes(source: Source) -> NodeFile:
     document = open_document(source)
     _check_version(document)
     check_extensions(document)
-    skins = read_skins(document)
-    tree = _without_empty_skins(read_tree(document), skins)
+    materials = read_materials(document)
+    tree, skins = _without_empty(read_tree(document), read_skins(document))
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
     tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
+    if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
+        meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
+        materials = (*materials, DEFAULT_MATERIAL)
     root = document.root
     return NodeFile(
         name=source.path.stem,
@@ -65,7 +68,7 @@ def read_nodes(source: Source) -> NodeFile:
         roots=shown_roots(document, tree),
         meshes=meshes,
         skins=skins,
-        materials=tuple(Material(name) for name in _names(document, "materials")),
+        materials=materials,
         animations=read_animations(document, Targets(tree, meshes)),
         cameras=read_cameras(document),
         extensions=_object(document, "extensions"),
@@ -74,16 +77,24 @@ def read_nodes(source: Source) -> NodeFile:
     )
 
 
-def _without_empty_skins(tree: NodeTree, skins: tuple[NodeSkin, ...]) -> NodeTree:
-    """Return the nodes without their references to skins that have no joints."""
-    empty = [index for index, skin in enumerate(skins) if not len(skin.joints)]
-    used = np.where(np.isin(tree.skins, empty), -1, tree.skins).astype(np.int32)
-    return replace(tree, skins=used) if empty else tree
+def _without_empty(
+    tree: NodeTree, skins: tuple[NodeSkin, ...]
+) -> tuple[NodeTree, tuple[NodeSkin, ...]]:
+    """Return nodes and skins without the skins that have no joints, and references to them."""
+    is_kept = np.array([len(skin.joints) > 0 for skin in skins], dtype=np.bool_)
+    if is_kept.all():
+        return tree, skins
+    # The last entry is that of nodes without skin, whose index is -1.
+    numbers = np.append(np.where(is_kept, np.cumsum(is_kept) - 1, -1), -1).astype(np.int32)
+    return replace(tree, skins=numbers[tree.skins]), tuple(s for s in skins if len(s.joints))
 
 
-def _names(document: Document, name: str) -> list[str]:
-    table = document.table(name)
-    return [table[index].text("name") for index in range(len(table))]
+def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
+    """Return a mesh whose primitives without a material have this one."""
+    primitives = (
+        replace(one, material=index) if one.material < 0 else one for one in mesh.primitives
+    )
+    return replace(mesh, primitives=tuple(primitives))
 
 
 def _object(document: Document, name: str) -> dict[str, object]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from viewer.formats._gltf.document import Document
-from viewer.formats._gltf.elements import Element
+from viewer.formats._gltf.elements import Element, Table
 from viewer.formats._nodes.content import NodeSkin
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_skins"]
 
+_EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
 _LAST_ROW = 1e-4  # deviation of the last row from 0 0 0 1 that is rounding
 
 
@@ -23,17 +26,19 @@ def read_skins(document: Document) -> tuple[NodeSkin, ...]:
         If a skin is malformed, refers to missing nodes, or has too few or invalid matrices.
     """
     table = document.table("skins")
-    return tuple(_skin(document, table[index]) for index in range(len(table)))
+    skins = (partial(_skin, document, table, index) for index in range(len(table)))
+    return tuple(document.kept(skin, _EMPTY) for skin in skins)
 
 
-def _skin(document: Document, skin: Element) -> NodeSkin:
+def _skin(document: Document, table: Table, index: int) -> NodeSkin:
+    skin = table[index]
     n_nodes = len(document.table("nodes"))
     joints = skin.indices("joints", n_nodes, "nodes")
     if not joints:
         if not skin.has("joints"):
             raise skin.wrong("joints", "a list of nodes")
         skin.warn("G004.no-joints", "joints")
-        return NodeSkin(skin.text("name"), np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
+        return _EMPTY
     if len(set(joints)) != len(joints):
         skin.warn("G004.joint-twice", "joints", n=len(joints) - len(set(joints)))
     root = skin.values.get("skeleton", 0)

@@ -180,7 +180,7 @@ def inverse_binds(bindings: Bindings) -> Floats:
 
     Joints without influence are bound in the rest pose, or by the identity if that is singular.
     """
-    worlds = rest_worlds(bindings.joints)
+    worlds = _all_worlds(bindings)
     above = np.array(_bound_ancestors(bindings))
     result = np.tile(np.eye(4), (len(worlds), 1, 1))
     for joint, matrix in bindings.matrices.items():
@@ -191,6 +191,14 @@ def inverse_binds(bindings: Bindings) -> Floats:
     free &= _is_regular(worlds)
     result[free] = _inverse(worlds[free]) @ spaces[free]
     return result
+
+
+def _all_worlds(bindings: Bindings) -> Floats:
+    """Return the rest transforms of all joints: added ones coincide with their parents."""
+    parents = list(range(len(bindings.worlds)))
+    for parent in bindings.joints.parents[len(parents) :]:
+        parents.append(parents[parent])
+    return bindings.worlds[parents]
 
 
 def _agree(one: Floats, other: Floats, reach: float) -> bool:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.material import Material
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
 
@@ -283,6 +284,8 @@ class NodeFile:
         Node of each human bone, by its name in VRM 1.0; empty if the file states none.
     expressions : tuple of NodeExpression
         Facial expressions.
+    constraints : tuple of Constraint
+        Nodes (instead of joints) that follow others, in the order of evaluation.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
     """
@@ -302,4 +305,5 @@ class NodeFile:
     asset: Mapping[str, Any] = field(default_factory=dict)
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()

@@ -51,7 +51,9 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     found = [_figure(file, members, readers) for members in groups]
     _note_normals([piece for _, pieces in found for piece in pieces], source)
     _note_weights([piece for _, pieces in found for piece in pieces], source)
-    views, left_out = views_of(file.tree, scene_order(file), file.cameras)
+    order = scene_order(file) if file.cameras else []
+    _note_methods(file, groups, source)
+    views, left_out = views_of(file.tree, order, file.cameras)
     if left_out:
         source.warn("F007.orthographic", names=left_out)
     return FigureGroup(file.name, tuple(figure for figure, _ in found), views)
@@ -63,11 +65,11 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Fi
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
     pieces = pieces_of(file, members.meshes, bindings)
-    columns = shape_columns(file, members.meshes)
+    columns = shape_columns(file, members.meshes, readers)
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
-        skeleton=skeleton_of(joints, file.humanoid),
+        skeleton=skeleton_of(joints, file.humanoid, file.constraints),
         skin=skin_of(pieces, inverse_binds(bindings)) if pieces else None,
         up=file.up,
         unit=file.unit,
@@ -101,6 +103,17 @@ def _note_normals(pieces: list[Piece], source: Source) -> None:
     smooth = [piece for piece in pieces if piece.shading == "smooth"]
     if smooth:
         source.warn("F007.smooth-normals", n=len(smooth))
+
+
+def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
+    """Record skins that the file deforms by another method than LBS, which is chosen by hand."""
+    used = (file.skins[skin] for members in groups for skin in members.skins)
+    others: dict[str, list[str]] = {}
+    for skin in used:
+        if skin.method != "lbs":
+            others.setdefault(skin.method, []).append(skin.name)
+    for method, names in others.items():
+        source.warn("F007.skinning-method", names=names, method=method)
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:

@@ -76,14 +76,17 @@ class _Grouping:
     def __init__(self, file: NodeFile) -> None:
         self.file, self.tree = file, file.tree
         self.parents: list[int] = file.tree.parents.tolist()
+        self.meshes: list[int] = file.tree.meshes.tolist()
         self.roots = _roots(file.tree)
         self.is_identity = _identities(file.tree)
         self.moved = set(file.humanoid.values())
         self.moved.update(*(animation.nodes for animation in file.animations))
+        for constraint in file.constraints:
+            self.moved.update((constraint.joint, constraint.source))
         self.drawn = _drawn_meshes(file)
         self.order = self._order()
         self.place = {node: place for place, node in enumerate(self.order)}
-        self.mesh_nodes = [n for n in self.order if self._mesh(n) in self.drawn]
+        self.mesh_nodes = [n for n in self.order if self.meshes[n] in self.drawn]
         self.skins = self._skins()
         self.same = list(range(len(file.skins)))
         self.owners = self._owners()
@@ -107,14 +110,11 @@ class _Grouping:
         self._name(found)
         return found
 
-    def _mesh(self, node: int) -> int:
-        return int(self.tree.meshes[node])
-
     def _order(self) -> list[int]:
         """Return the nodes of the scene, and of trees with joints of its skins, parents first."""
         tops = [int(self.roots[root]) for root in self.file.roots]
         order = _preorder(self.tree, dict.fromkeys(tops))
-        used = {int(self.tree.skins[n]) for n in order if self._mesh(n) in self.drawn} - {-1}
+        used = {int(self.tree.skins[n]) for n in order if self.meshes[n] in self.drawn} - {-1}
         joints = (self.file.skins[skin].joints for skin in sorted(used))
         more = {int(root) for nodes in joints for root in np.unique(self.roots[nodes])}
         return order + _preorder(self.tree, sorted(more - set(tops)))
@@ -152,7 +152,7 @@ class _Grouping:
         return self.figures.setdefault(key, Members()), self.wanted.setdefault(key, set())
 
     def _add_mesh(self, node: int) -> None:
-        mesh, skin = self.file.meshes[self._mesh(node)], int(self.tree.skins[node])
+        mesh, skin = self.file.meshes[self.meshes[node]], int(self.tree.skins[node])
         if skin >= 0 and any(p.joints is not None for p in mesh.primitives):
             key = "skin", self._find(skin)
         else:
@@ -186,7 +186,7 @@ class _Grouping:
             self._figure(("all", 0) if is_alone else key)[1].add(node)
 
     def _is_skinned(self, node: int) -> bool:
-        return is_skinned(self.file.meshes[self._mesh(node)], int(self.tree.skins[node]))
+        return is_skinned(self.file.meshes[self.meshes[node]], int(self.tree.skins[node]))
 
     def _bare(self) -> list[int]:
         return [node for node in self.order if self.tree.cameras[node] < 0]

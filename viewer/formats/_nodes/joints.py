@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from viewer.formats._nodes.content import NodeTree
 from viewer.rig.arrays import Floats
+from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import forward_kinematics
@@ -146,7 +147,11 @@ def rest_worlds(joints: Joints) -> Floats:
     return forward_kinematics(np.array(joints.parents, dtype=np.int32), local)
 
 
-def skeleton_of(joints: Joints, humanoid: Mapping[str, int] | None = None) -> Skeleton:
+def skeleton_of(
+    joints: Joints,
+    humanoid: Mapping[str, int] | None = None,
+    constraints: Iterable[Constraint] = (),
+) -> Skeleton:
     """Return the skeleton: every joint of the file is a ball joint about its rest, without limits.
 
     Parameters
@@ -155,6 +160,8 @@ def skeleton_of(joints: Joints, humanoid: Mapping[str, int] | None = None) -> Sk
         The joints.
     humanoid : mapping of str to int, optional
         Node of each human bone; those that are no joints of this figure are ignored.
+    constraints : iterable of Constraint
+        Constraints between nodes; those of other figures are ignored.
 
     Returns
     -------
@@ -178,4 +185,9 @@ def skeleton_of(joints: Joints, humanoid: Mapping[str, int] | None = None) -> Sk
         dof_limits=np.tile([-np.inf, np.inf], (count, 1)),
         auxiliary=is_auxiliary if is_auxiliary.any() else None,
         humanoid=Humanoid(bones) if bones else None,
+        constraints=tuple(
+            replace(each, joint=joints.own[each.joint], source=joints.own[each.source])
+            for each in constraints
+            if each.joint in joints.own and each.source in joints.own
+        ),
     )

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
+from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeAnimation, NodeChannel
 from viewer.rig.arrays import Ints
 from viewer.rig.motion.animation import Animation
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 
-__all__ = ["animations_of", "read_once"]
+__all__ = ["Reader", "animations_of", "read_once"]
 
-Reader = Callable[[], tuple[NodeChannel, ...]]
+Reader: TypeAlias = Callable[[], tuple[NodeChannel, ...]]
+"""Returns the channels of an animation."""
 
 
 def read_once(animations: tuple[NodeAnimation, ...]) -> list[Reader]:
@@ -21,10 +24,17 @@ def read_once(animations: tuple[NodeAnimation, ...]) -> list[Reader]:
 
 def _once(read: Reader) -> Reader:
     kept: list[tuple[NodeChannel, ...]] = []
+    problems: list[FormatError] = []
 
     def channels() -> tuple[NodeChannel, ...]:
+        if problems:
+            raise problems[0]
         if not kept:
-            kept.append(read())
+            try:
+                kept.append(read())
+            except FormatError as problem:
+                problems.append(problem)
+                raise
         return kept[0]
 
     return channels
@@ -62,9 +72,17 @@ def _bound(
     """Return functions that return the channels of one figure."""
 
     def bound(read: Reader) -> Callable[[], tuple[TransformChannel, ...]]:
-        return lambda: tuple(
-            moved for channel in read() if (moved := _channel(channel, joints, columns)) is not None
-        )
+        def channels() -> tuple[TransformChannel, ...]:
+            found: dict[tuple[str, object], TransformChannel] = {}
+            for number, channel in enumerate(read()):
+                moved = _channel(channel, joints, columns)
+                if moved is not None:
+                    # Nodes that share blend shapes have equal keys: one channel is enough.
+                    shapes = None if moved.shapes is None else moved.shapes.tobytes()
+                    found.setdefault((moved.path, shapes or number), moved)
+            return tuple(found.values())
+
+        return channels
 
     return [bound(read) for read in readers]
 

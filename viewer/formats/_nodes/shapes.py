@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
+from viewer.formats._nodes.motions import Reader
 from viewer.formats._nodes.surfaces import Piece, part_name
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
@@ -16,11 +18,12 @@ from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
 __all__ = ["blend_shapes_of", "shape_columns"]
 
 
-def shape_columns(file: NodeFile, nodes: list[int]) -> dict[int, Ints]:
+def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> dict[int, Ints]:
     """Return the blend shape of each morph target of each node.
 
-    Nodes with the same names of targets and the same default weights share their blend shapes,
-    as they are parts of one face, unless an animation moves one of them.
+    Nodes share their blend shapes if they have the same names of targets, the same default weights,
+    and the same keys in all animations: they are parts of one face. Only animations of such nodes
+    are read.
 
     Parameters
     ----------
@@ -28,30 +31,54 @@ def shape_columns(file: NodeFile, nodes: list[int]) -> dict[int, Ints]:
         Its meshes.
     nodes : list of int
         Nodes with a mesh.
+    readers : list of callable
+        Return the channels of each animation.
 
     Returns
     -------
     dict of (S,) int32
         Of the nodes with morph targets.
     """
-    moved = set().union(*(animation.nodes for animation in file.animations))
-    known: dict[tuple[tuple[str, ...], tuple[float, ...]], Ints] = {}
+    shaped = [node for node in nodes if _mesh(file, node).target_names]
+    looks = {node: _look(file, node) for node in shaped}
+    counts = Counter(looks.values())
+    known: dict[tuple[object, ...], Ints] = {}
     columns: dict[int, Ints] = {}
     count = 0
-    for node in nodes:
-        mesh = _mesh(file, node)
-        if not mesh.target_names:
-            continue
-        key = mesh.target_names, tuple(_defaults(file, node).tolist())
-        is_shared = node not in moved and all(mesh.target_names)
-        if is_shared and key in known:
-            columns[node] = known[key]
-            continue
-        columns[node] = np.arange(count, count + len(mesh.target_names), dtype=np.int32)
-        count += len(mesh.target_names)
-        if is_shared:
-            known[key] = columns[node]
+    for node in shaped:
+        names = _mesh(file, node).target_names
+        # Targets without names could be anything.
+        is_alone = counts[looks[node]] == 1 or not all(names)
+        key = (node,) if is_alone else (*looks[node], _keys(file, node, readers))
+        if key not in known:
+            known[key] = np.arange(count, count + len(names), dtype=np.int32)
+            count += len(names)
+        columns[node] = known[key]
     return columns
+
+
+def _look(file: NodeFile, node: int) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Return the names and the default weights of a node's morph targets."""
+    return _mesh(file, node).target_names, tuple(_defaults(file, node).tolist())
+
+
+def _keys(file: NodeFile, node: int, readers: list[Reader]) -> tuple[object, ...]:
+    """Return all keys of a node's morph targets, to be compared."""
+    found: list[object] = []
+    for number, (animation, read) in enumerate(zip(file.animations, readers, strict=True)):
+        if node not in animation.nodes:
+            continue
+        try:
+            channels = read()
+        except FormatError:
+            # The animation is refused when it is played; until then its keys are unknown.
+            return (node,)
+        for channel in channels:
+            if channel.node == node and channel.path == "weights":
+                tangents = None if channel.tangents is None else channel.tangents.tobytes()
+                values = channel.times.tobytes(), channel.values.tobytes(), tangents
+                found.append((number, channel.interpolation, *values))
+    return tuple(found)
 
 
 def _mesh(file: NodeFile, node: int) -> NodeMesh:

@@ -12,6 +12,7 @@ from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faul
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
+from viewer.rig.srgb import decode_srgb
 
 __all__ = ["ObjParts", "read_parts"]
 
@@ -31,6 +32,8 @@ class ObjParts:
         Vectors as listed in the file.
     uvs : (U, 2)
         Texture coordinates as listed, v = 0 at the bottom row.
+    colors : (V, 4) or None
+        Linear colours and opacity of the vertices; white for those without a colour.
     counts : (F,)
         Corners of each face.
     corners : (C, 3)
@@ -46,6 +49,7 @@ class ObjParts:
     positions: Floats
     normals: Floats
     uvs: Floats
+    colors: Floats | None
     counts: Places
     corners: Places
     offsets: Places
@@ -66,6 +70,9 @@ class _Gathered:
     )
     libraries: list[tuple[bytes, int]] = field(default_factory=list)
     odd: Counter[bytes] = field(default_factory=Counter)
+    # Vertices with colours; opacity is NaN if it is missing.
+    colored: list[Places] = field(default_factory=list)
+    colors: list[Floats] = field(default_factory=list)
     # Ignored data: the number of vertices, and the offset of the first.
     unused: dict[str, list[int]] = field(default_factory=dict)
 
@@ -102,12 +109,28 @@ def read_parts(source: Source) -> ObjParts:
         positions=_stacked(gathered.tables["v"], 3),
         normals=_stacked(gathered.tables["vn"], 3),
         uvs=_stacked(gathered.tables["vt"], 2),
+        colors=_colors(gathered),
         counts=np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in gathered.faces)]),
         corners=checked_corners(source, gathered.faces, gathered.before),
         offsets=np.concatenate([np.zeros(0, np.int64), *offsets]),
         runs=gathered.runs,
         libraries=gathered.libraries,
     )
+
+
+def _colors(gathered: _Gathered) -> Floats | None:
+    """Return linear colours from sRGB; some programs write 0 to 255 instead of 0 to 1."""
+    if not gathered.colored:
+        return None
+    listed = np.concatenate(gathered.colors)
+    opacity = np.nan_to_num(listed[:, 3], nan=1.0)
+    bytes_or_fractions = np.nan_to_num(listed[:, :3])
+    largest = 255.0 if bytes_or_fractions.max() > 1.0 else 1.0
+    colors = np.ones((gathered.before["v"], 4))
+    rows = np.concatenate(gathered.colored)
+    colors[rows, :3] = decode_srgb(np.clip(bytes_or_fractions / largest, 0.0, 1.0))
+    colors[rows, 3] = np.clip(opacity / (255.0 if opacity.max() > 1.0 else 1.0), 0.0, 1.0)
+    return colors
 
 
 def _stacked(tables: list[Floats], width: int) -> Floats:
@@ -142,10 +165,14 @@ def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
     if len(wrong):
         offset = int(rows.origins[wrong[0]]) - 1
         source.refuse("F002.obj-vertex", offset, len(wrong), found=int(counts[wrong[0]]))
-    colored = np.flatnonzero(counts >= 6)
-    if len(colored):
-        gathered.leave_out("colour", len(colored), int(rows.origins[colored[0]]) - 1)
     firsts = np.cumsum(counts) - counts
+    for count in (6, 7):
+        colored = np.flatnonzero(counts == count)
+        if len(colored):
+            gathered.colored.append(gathered.before["v"] + colored)
+            columns = values[firsts[colored, None] + np.arange(3, count)]
+            opaque = np.full((len(colored), 7 - count), np.nan)
+            gathered.colors.append(np.hstack([columns, opaque]))
     fourth = np.flatnonzero(counts == 4)
     weighted = fourth[values[firsts[fourth] + 3] != 1.0]
     if len(weighted):

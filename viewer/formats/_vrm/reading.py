@@ -15,6 +15,8 @@ import numpy as np
 
 from viewer.formats._nodes.content import NodeExpression, NodeFile
 from viewer.formats._source import Source
+from viewer.formats._vrm.constraints import read_constraints
+from viewer.formats._vrm.json_parts import is_index, part
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
@@ -46,7 +48,21 @@ _LONGEST = 200  # characters of a property
 
 
 def with_vrm(file: NodeFile, source: Source) -> NodeFile:
-    """Return a file with the humanoid, expressions and facts of its VRM extension, if any."""
+    """Return a file with what its VRM extensions say about its characters, if any.
+
+    Parameters
+    ----------
+    file : NodeFile
+        As read by the glTF reader.
+    source : Source
+        Receives messages.
+
+    Raises
+    ------
+    FormatError
+        If constraints of nodes depend on each other.
+    """
+    file = replace(file, constraints=read_constraints(file.tree, source))
     for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
         told = file.extensions.get(key)
         if isinstance(told, dict):
@@ -60,28 +76,20 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     return file
 
 
-def _part(told: Mapping[str, Any], *names: str) -> Any:
-    """Return a nested property; None if it is missing or something else on the way."""
-    value: Any = told
-    for name in names:
-        value = value.get(name) if isinstance(value, dict) else None
-    return value
-
-
 def _humanoid(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> dict[str, int]:
     """Return the node of each human bone, by its name in VRM 1.0."""
-    bones = _part(told, "humanoid", "humanBones")
+    bones = part(told, "humanoid", "humanBones")
     given: list[tuple[Any, Any]] = []
     if version == 0 and isinstance(bones, list):
-        given = [(_part(each, "bone"), _part(each, "node")) for each in bones]
+        given = [(part(each, "bone"), part(each, "node")) for each in bones]
         given = [(_modern(bone), node) for bone, node in given if isinstance(bone, str)]
     elif isinstance(bones, dict):
-        given = [(bone, _part(each, "node")) for bone, each in bones.items()]
+        given = [(bone, part(each, "node")) for bone, each in bones.items()]
     found: dict[str, int] = {}
     for bone, node in given:
-        if not _is_index(node, file.tree.n_nodes):
+        if not is_index(node, file.tree.n_nodes):
             source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
         elif bone in HUMAN_BONES or bone in SPINE_BONES:
             found[bone] = node
@@ -97,20 +105,16 @@ def _modern(bone: str) -> str:
     return bone
 
 
-def _is_index(value: Any, count: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < count
-
-
 def _expressions(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> tuple[NodeExpression, ...]:
     """Return the expressions that bind morph targets; say which change materials only."""
     if version == 0:
-        groups = _part(told, "blendShapeMaster", "blendShapeGroups")
+        groups = part(told, "blendShapeMaster", "blendShapeGroups")
         named = [(each.get("name"), each) for each in groups or () if isinstance(each, dict)]
         at = f"{pointer}/blendShapeMaster/blendShapeGroups"
     else:
-        kinds = [_part(told, "expressions", kind) for kind in ("preset", "custom")]
+        kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
         named = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
         at = f"{pointer}/expressions"
     found, undrawn = [], []
@@ -154,14 +158,14 @@ def _binds(
     listed = told.get("binds" if version == 0 else "morphTargetBinds")
     binds: list[tuple[int, int, float]] = []
     for each in listed if isinstance(listed, list) else ():
-        index, weight = _part(each, "index"), _part(each, "weight")
+        index, weight = part(each, "index"), part(each, "weight")
         if version == 0:
-            mesh, scale = _part(each, "mesh"), 1.0 / _PERCENT
-            is_mesh = _is_index(mesh, len(file.meshes))
+            mesh, scale = part(each, "mesh"), 1.0 / _PERCENT
+            is_mesh = is_index(mesh, len(file.meshes))
             nodes = np.flatnonzero(file.tree.meshes == mesh).tolist() if is_mesh else []
         else:
-            node, scale = _part(each, "node"), 1.0
-            nodes = [node] if _is_index(node, file.tree.n_nodes) else []
+            node, scale = part(each, "node"), 1.0
+            nodes = [node] if is_index(node, file.tree.n_nodes) else []
         is_number = isinstance(weight, int | float) and bool(np.isfinite(weight))
         valid = [node for node in nodes if _has_target(file, node, index)]
         if not valid or not is_number:
@@ -173,7 +177,7 @@ def _binds(
 
 def _has_target(file: NodeFile, node: int, index: Any) -> bool:
     mesh = int(file.tree.meshes[node])
-    return mesh >= 0 and _is_index(index, len(file.meshes[mesh].target_names))
+    return mesh >= 0 and is_index(index, len(file.meshes[mesh].target_names))
 
 
 def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -181,8 +185,8 @@ def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     meta = told.get("meta")
     facts = [("VRM", str(told.get("specVersion") or "0.x")[:_LONGEST])]
     for heading, keys in _META.items():
-        value = next((_part(meta or {}, key) for key in keys if _part(meta or {}, key)), None)
-        if value is None and any(_part(meta or {}, key) is False for key in keys):
+        value = next((part(meta or {}, key) for key in keys if part(meta or {}, key)), None)
+        if value is None and any(part(meta or {}, key) is False for key in keys):
             value = False
         if isinstance(value, bool):
             facts.append((heading, "allowed" if value else "not allowed"))

@@ -89,10 +89,14 @@ class BoneBuffers:
         Skeleton in its rest pose, which determines directions and sizes of ends without a child.
     style : str
         ``"octahedra"``, ``"sticks"`` or ``"axes"``.
+    size : float
+        Size of the figure if all joints coincide, figure units.
     """
 
-    def __init__(self, context: moderngl.Context, skeleton: Skeleton, style: str) -> None:
-        links = bone_links(skeleton)
+    def __init__(
+        self, context: moderngl.Context, skeleton: Skeleton, style: str, size: float = 1.0
+    ) -> None:
+        links = bone_links(skeleton, size)
         self._owner = Owner()
         self._parts: list[_Part] = []
         with self._owner.guard():

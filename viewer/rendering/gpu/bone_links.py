@@ -51,7 +51,7 @@ class BoneLinks:
     size: float
 
 
-def bone_links(skeleton: Skeleton) -> BoneLinks:
+def bone_links(skeleton: Skeleton, size: float = 1.0) -> BoneLinks:
     """Return the links of a skeleton.
 
     A joint with several children has a bone to each. A joint without children has a short end in
@@ -62,6 +62,8 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     ----------
     skeleton : Skeleton
         The skeleton; its rest pose is used.
+    size : float
+        Size of the figure if all joints coincide, figure units.
     """
     worlds = world_matrices(skeleton, rest_pose(skeleton))
     points, axes = worlds[:, :3, 3], unit(np.swapaxes(worlds[:, :3, :3], 1, 2))
@@ -70,7 +72,7 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     above = parents[children]
     spans = points[children] - points[above]
     lengths = np.linalg.norm(spans, axis=1)
-    size = _size(points[drawn], lengths)
+    size = _size(points[drawn], lengths) or size
     lengths = np.where(lengths > _SAME * size, lengths, 0.0)
     ends = _end_joints(skeleton, above)
     ways, reach = _ends(points, parents, ends, axes, size)
@@ -86,15 +88,18 @@ def bone_links(skeleton: Skeleton) -> BoneLinks:
     for beside in (children, above):
         np.maximum.at(longest, beside, lengths)
         np.minimum.at(nearest, beside, np.where(lengths > 0.0, lengths, np.inf))
+    if not lengths.any():
+        # Without bones, ends and balls are as large as the largest ends.
+        longest[:], free[len(children) :, 3] = size * _END_LIMITS[1] / _END, size * _END_LIMITS[1]
     shown = np.clip(_AXIS * nearest, _AXIS_LIMITS[0] * size, _AXIS_LIMITS[1] * size)
     return BoneLinks(drawn, ids.astype(np.int32), free, longest, shown, size)
 
 
 def _size(points: Floats, lengths: Floats) -> float:
-    """Return the size of a figure, excluding a root that is far from everything else."""
+    """Return the size of a skeleton, excluding a root that is far from everything else."""
     whole = box_size(bounding_box(points))
     long = float(np.quantile(lengths, 0.9)) if len(lengths) else 0.0
-    return (min(whole, _REACH * long) if long > 0.0 else whole) or 1.0
+    return min(whole, _REACH * long) if long > 0.0 else whole
 
 
 def _end_joints(skeleton: Skeleton, above: Ints) -> Ints:

@@ -168,7 +168,7 @@ def picture_texture(
     flipped = np.ascontiguousarray(pixels[::-1])
     size = (pixels.shape[1], pixels.shape[0])
     stored_as = _RGBA8 if is_linear else _SRGB8_ALPHA8
-    texture = context.texture(size, 4, flipped.tobytes(), internal_format=stored_as)
+    texture = context.texture(size, 4, flipped, internal_format=stored_as)
     texture.repeat_x = texture.repeat_y = False
     add_mipmaps(texture, flipped, is_linear)
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)

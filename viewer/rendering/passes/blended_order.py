@@ -11,28 +11,22 @@ from dataclasses import replace
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from viewer.rendering.gpu.index_sets import IndexSet, MeshRun
-from viewer.rendering.gpu.ownership import Kept
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.passes.skin_pass import PosedMesh
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["BlendedOrder", "SortedTriangles"]
+__all__ = ["SortedTriangles"]
 
 
 class SortedTriangles:
-    """The blended triangles of an index set in an index buffer of their own.
+    """Blended triangles in an index buffer of their own, sorted.
 
     Parameters
     ----------
     context : moderngl.Context
         The context in use.
-    source : IndexSet
-        All triangles.
-    triangles : (T, 3)
-        Their split vertices, in the order of the index set.
 
     Attributes
     ----------
@@ -42,69 +36,51 @@ class SortedTriangles:
         A run per material, the farthest first.
     """
 
-    def __init__(
-        self, context: moderngl.Context, source: IndexSet, triangles: NDArray[np.int32]
-    ) -> None:
-        rows, starts, count = [], [], 0
-        self._given: list[MeshRun] = [run for run in source.runs if run.surface.is_blended]
-        for run in self._given:
-            rows.append(np.arange(run.first // 3, (run.first + run.count) // 3))
-            starts.append(count)
-            count += len(rows[-1])
-        self._starts = np.array(starts)
-        self._owners = np.repeat(np.arange(len(rows)), [len(one) for one in rows])
-        self._triangles = triangles[np.concatenate(rows)]
-        self._key: tuple[object, ...] = ()
+    def __init__(self, context: moderngl.Context) -> None:
+        self.indices = buffer(context, np.zeros(0), "u4")
         self.runs: tuple[MeshRun, ...] = ()
-        self.indices = buffer(context, self._triangles, "u4")
+        self._given: tuple[MeshRun, ...] = ()
+        self._buffer: moderngl.Buffer | None = None
+        self._triangles: Ints = np.zeros((0, 3), np.int32)
+        self._key: tuple[object, ...] = ()
 
-    def sort(self, mesh: PosedMesh, along: Floats) -> None:
+    def sort(self, mesh: PosedMesh, source: IndexSet, along: Floats) -> None:
         """Sort the triangles, and upload them if their order may have changed.
 
         Parameters
         ----------
         mesh : PosedMesh
             The updated mesh.
+        source : IndexSet
+            Triangles of the mesh; the blended ones are used.
         along : (3,)
             Row of the model-view matrix that gives the depth, which decreases with the distance.
         """
+        given = tuple(run for run in source.runs if run.surface.is_blended and run.count)
+        if given != self._given or source.indices is not self._buffer:
+            rows = [np.arange(run.first // 3, (run.first + run.count) // 3) for run in given]
+            self._triangles = mesh.mesh.triangles[source.order[np.concatenate(rows)]]
+            self._given, self._buffer, self._key = given, source.indices, ()
         key = mesh.n_updates, along.tobytes()
         if key == self._key:
             return
         heights = mesh.posed_positions() @ along.astype(np.float32)
         depths = heights[self._triangles].sum(axis=1)
-        order = np.lexsort((depths, self._owners))
-        self.indices.write(np.ascontiguousarray(self._triangles[order], dtype="u4"))
-        counts = np.array([run.count // 3 for run in self._given])
-        means = np.add.reduceat(depths, self._starts) / counts
-        self.runs = tuple(
-            replace(self._given[index], first=3 * int(self._starts[index]))
-            for index in np.argsort(means, kind="stable").tolist()
-        )
+        stops = np.cumsum([run.count // 3 for run in given])
+        parts = np.split(depths, stops[:-1])
+        starts = [0, *stops[:-1].tolist()]
+        order = [
+            start + np.argsort(part, kind="stable")
+            for start, part in zip(starts, parts, strict=True)
+        ]
+        data = np.ascontiguousarray(self._triangles[np.concatenate(order)], "u4").tobytes()
+        # Vertex arrays that use the buffer remain valid when it is given another size.
+        self.indices.orphan(len(data))
+        self.indices.write(data)
+        farthest = np.argsort([part.mean() for part in parts], kind="stable").tolist()
+        self.runs = tuple(replace(given[one], first=3 * starts[one]) for one in farthest)
         self._key = key
 
     def release(self) -> None:
         """Free the index buffer."""
         self.indices.release()
-
-
-class BlendedOrder:
-    """The sorted blended triangles of one posed mesh, per index set."""
-
-    def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
-        self._sorted: Kept[IndexSet, SortedTriangles] = Kept()
-
-    def sorted(self, mesh: PosedMesh, source: IndexSet, along: Floats) -> SortedTriangles:
-        """Return the blended triangles of an index set, sorted; see ``SortedTriangles.sort``."""
-
-        def make() -> SortedTriangles:
-            return SortedTriangles(self._context, source, mesh.mesh.triangles[source.order])
-
-        found = self._sorted.get(source, make)
-        found.sort(mesh, along)
-        return found
-
-    def release(self) -> None:
-        """Free all index buffers."""
-        self._sorted.keep_only([])

@@ -23,6 +23,7 @@ from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton, shown_joints
+from viewer.rig.skinning import deform
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.bone_buffers import BoneBuffers
@@ -41,7 +42,8 @@ class SkeletonBuffers:
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
         skeleton = figure.require_skeleton()
         self.context, self.figure = context, figure
-        self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton))
+        self._size = _size(figure)
+        self.boxes = BoxBuffers(context, cube, _joint_boxes(skeleton, self._size))
         self._bones: dict[str, BoneBuffers] = {}
         self._key: tuple[NumberKey, bool] | None = None
 
@@ -59,7 +61,7 @@ class SkeletonBuffers:
             from viewer.rendering.gpu.bone_buffers import BoneBuffers
 
             skeleton = self.figure.require_skeleton()
-            self._bones[style] = BoneBuffers(self.context, skeleton, style)
+            self._bones[style] = BoneBuffers(self.context, skeleton, style, self._size)
         return self._bones[style]
 
     def is_current(self, pose: Pose, options: DisplayOptions) -> bool:
@@ -241,12 +243,21 @@ def _draw_instances(program: moderngl.Program, boxes: BoxBuffers) -> None:
     array.render(moderngl.TRIANGLES, vertices=_CUBE_VERTICES, instances=boxes.count)
 
 
-def _joint_boxes(skeleton: Skeleton) -> Floats:
+def _size(figure: Figure) -> float:
+    """Return the size of a skeleton at rest, or of the mesh if all joints coincide."""
+    skeleton = figure.require_skeleton()
+    points = world_matrices(skeleton, rest_pose(skeleton))[shown_joints(skeleton), :3, 3]
+    size = box_size(bounding_box(points))
+    if size == 0.0 and figure.mesh is not None:
+        size = box_size(bounding_box(deform(figure)[0]))
+    return size or 1.0
+
+
+def _joint_boxes(skeleton: Skeleton, size: float) -> Floats:
     """Return the joints' boxes, small cubes if the skeleton has none: (J, 2, 3)."""
     if skeleton.boxes is not None:
         return skeleton.boxes
-    points = world_matrices(skeleton, rest_pose(skeleton))[:, :3, 3]
-    half = _CUBE_SIZE * (box_size(bounding_box(points)) or 1.0)
+    half = _CUBE_SIZE * size
     # Joints that are not shown have boxes without extent.
     boxes = np.zeros((skeleton.n_joints, 2, 3))
     boxes[shown_joints(skeleton)] = [[-half] * 3, [half] * 3]

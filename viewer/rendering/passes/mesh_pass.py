@@ -14,7 +14,7 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.blended_order import BlendedOrder, SortedTriangles
+from viewer.rendering.passes.blended_order import SortedTriangles
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -47,7 +47,7 @@ class MeshPass:
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
         self._arrays: Kept[PosedMesh, VertexArrays] = Kept()
-        self._orders: Kept[PosedMesh, BlendedOrder] = Kept()
+        self._sorted: Kept[PosedMesh, SortedTriangles] = Kept()
 
     def draw(
         self,
@@ -113,8 +113,9 @@ class MeshPass:
         indices = mesh.index_set(options)
         if not (blended and indices.is_blended):
             return indices
-        order = self._orders.get(mesh, lambda: BlendedOrder(self.context))
-        return order.sorted(mesh, indices, (view.matrix @ placement)[2, :3])
+        found = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
+        found.sort(mesh, indices, (view.matrix @ placement)[2, :3])
+        return found
 
     def draw_shape(
         self,
@@ -216,12 +217,12 @@ class MeshPass:
     def forget(self, mesh: PosedMesh) -> None:
         """Free the vertex arrays of a mesh that is about to be released."""
         self._arrays.drop(mesh)
-        self._orders.drop(mesh)
+        self._sorted.drop(mesh)
 
     def release(self) -> None:
         """Free all vertex arrays and index buffers."""
         self._arrays.keep_only([])
-        self._orders.keep_only([])
+        self._sorted.keep_only([])
 
 
 def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip, sample_points
+from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -207,9 +208,9 @@ def frames_of(
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     pose = figure_pose(figure) if base is None else base
     if isinstance(motion, Clip):
-        return _keyed_frames(skeleton, motion, times, pose)
+        return _constrained(figure, _keyed_frames(skeleton, motion, times, pose))
     if isinstance(motion, TransformClip):
-        return _transform_frames(skeleton, motion, times, pose)
+        return _constrained(figure, _transform_frames(skeleton, motion, times, pose))
     if motion.n_joints != skeleton.n_joints:
         raise RigError(
             f"clip {motion.name} has {motion.n_joints} joints, figure {figure.name} has "
@@ -220,7 +221,7 @@ def frames_of(
     place = np.tile(pose.figure_translation, (count, 1))
     weights = pose.shape_weights[None] if rows.shape_weights is None else rows.shape_weights
     scales = np.full(count, pose.figure_scale)
-    return Frames(
+    found = Frames(
         times,
         rows.present,
         rows.rotations,
@@ -230,6 +231,20 @@ def frames_of(
         place if rows.figure_translations is None else rows.figure_translations,
         scales if rows.figure_scales is None else rows.figure_scales,
     )
+    return _constrained(figure, found)
+
+
+def _constrained(figure: Figure, frames: Frames) -> Frames:
+    """Return frames in which joints with a constraint follow their sources."""
+    skeleton = figure.require_skeleton()
+    if not skeleton.constraints:
+        return frames
+    places = rest_translations_of(figure, frames.shape_weights) + frames.translations
+    # Rows of frames in which nobody is present may be zeros.
+    lengths = np.linalg.norm(frames.rotations, axis=-1, keepdims=True)
+    turns = frames.rotations / np.where(lengths > 0.0, lengths, 1.0)
+    first = (np.swapaxes(rows, 0, 1) for rows in (turns, places, frames.scales))
+    return replace(frames, rotations=np.swapaxes(constrained(skeleton, *first), 0, 1))
 
 
 def _shared(rows: Floats) -> Floats:
@@ -334,7 +349,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
         Joint space to figure space, including the figure's own scale and translation.
     """
     skeleton = figure.require_skeleton()
-    count = frames.n_frames
+    frames, count = _constrained(figure, frames), frames.n_frames
     # The joint axis comes first, as forward_kinematics multiplies a joint's matrices of all frames
     # at once.
     local = np.zeros((skeleton.n_joints, count, 4, 4))

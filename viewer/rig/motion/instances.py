@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_euler, quaternion_to_matrix
 from viewer.rig.kinematics import (
@@ -172,8 +173,7 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
     # The joint axis comes first, as forward_kinematics multiplies whole rows of matrices per joint.
     local = np.zeros((skeleton.n_joints, len(poses), 4, 4))
     local[..., 3, 3] = 1.0
-    scales = np.stack([pose.scales for pose in poses])
-    local[..., :3, :3] = np.swapaxes(rotations * scales[:, :, None, :], 0, 1)
+    scales = np.swapaxes(np.stack([pose.scales for pose in poses]), 0, 1)
     shifts = np.stack([pose.translations for pose in poses])
     moves = np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION)
     if len(moves):
@@ -181,6 +181,9 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
         every = np.arange(len(poses))[:, None]
         np.add.at(shifts, (every, skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), dofs)
     local[..., :3, 3] = np.swapaxes(skeleton.rest_translations + shifts, 0, 1)
+    turns = np.swapaxes(rotations, 0, 1)
+    turns = constrained_matrices(skeleton, turns, local[..., :3, 3], scales)
+    local[..., :3, :3] = turns * scales[:, :, None, :]
     return np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
 
 

@@ -14,10 +14,14 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def has_own_animations(actor: Actor) -> bool:
-    """Return whether an actor has animations, and plays one of them, an edit of one, or none."""
-    clip, figure = actor.clip, actor.figure
-    is_keyed = clip is None or isinstance(clip, TransformClip)
-    return is_keyed and figure.skeleton is not None and bool(clip or figure.animations)
+    """Return whether an actor has animations, and plays one of them, an edit of one, or none.
+
+    False if constraints move its joints besides, as keys do not contain their effect.
+    """
+    clip, skeleton = actor.clip, actor.figure.skeleton
+    if skeleton is None or skeleton.constraints:
+        return False
+    return isinstance(clip, TransformClip) or (clip is None and bool(actor.figure.animations))
 
 
 def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformClip, ...]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.errors import RigError
+from viewer.rig.constraints.evaluation import constrained
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.motion.clip import Clip, is_course_rig
@@ -126,7 +127,9 @@ def pose_frames(
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         scales = pose.scales[None].copy()
-        moved = (local_matrices(skeleton, pose)[:, :3, 3] - skeleton.rest_translations)[None]
-        rotated = matrix_to_quaternion(joint_rotations(skeleton, pose))[None]
+        places = local_matrices(skeleton, pose)[:, :3, 3]
+        moved = (places - skeleton.rest_translations)[None]
+        turns = matrix_to_quaternion(joint_rotations(skeleton, pose))
+        rotated = constrained(skeleton, turns, places, pose.scales)[None]
     present, times = np.array([is_present]), np.array([time])
     return figure, Frames(times, present, rotated, moved, scales, weights, place, scale)

@@ -2,9 +2,9 @@
 
 The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
 MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds
-Max's Biped, Unreal, VRM, Xsens, and Blender's Rigify. Sides are detected as ``L``, ``R``, ``Left``
-or ``Right`` at either end of a name; prefixes that most joints have (``mixamorig:``, ``Bip01 ``,
-``m_avg_``) are dropped.
+Max's Biped, Unreal, VRM, MakeHuman, Xsens, and Blender's Rigify. Sides are detected as ``L``,
+``R``, ``Left`` or ``Right`` at either end of a name; prefixes that most joints have
+(``mixamorig:``, ``Bip01 ``, ``m_avg_``) are dropped.
 """
 
 from __future__ import annotations
@@ -282,6 +282,9 @@ def _key(tokens: list[str]) -> _Key:
 
 
 def _word(tokens: list[str]) -> str:
+    if len(tokens) == 3 and tokens[0] == "finger" and tokens[1] in "12345":
+        # finger2-1.L of MakeHuman is an index finger, Finger21 of Biped a middle one.
+        return _BIPED_FINGERS[int(tokens[1]) - 1] + tokens[2]
     return "".join(tokens)
 
 

@@ -27,6 +27,7 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, q
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
 from viewer.rig.skeleton import Skeleton, joint_label
@@ -257,8 +258,21 @@ def _shifts(
         rotation = quaternion_to_matrix(rotations[:, joint])
         linear = linear @ rotation * job.target.rest_scales[joint]
     wanted = scale * places[:, job.matches.partners[anchor]] @ job.to_target.T
-    shifts[:, path[0]] = wanted - reached
+    shifts[:, path[0]] = wanted + _ground_offset(job, scale) - reached
     return shifts, _dropped_translations(job)
+
+
+def _ground_offset(job: _Job, scale: float) -> Floats:
+    """Return ``ground_offset`` of the two skeletons, both in the source's rest pose."""
+    still = matrix_to_quaternion(job.rests[0].rotations)[None]
+    local = np.zeros((job.target.n_joints, 4, 4))
+    rotations = quaternion_to_matrix(_target_rotations(job, still)[0])
+    local[:, :3, :3] = rotations * job.target.rest_scales[:, None, :]
+    local[:, :3, 3] = job.target.rest_translations
+    local[:, 3, 3] = 1.0
+    points = forward_kinematics(job.target.parents, local)[:, :3, 3]
+    source, _ = job.rests
+    return ground_offset(source.points, points, job.matches, source.up, scale)
 
 
 def _source_places(job: _Job, worlds: Floats) -> Floats:

@@ -99,44 +99,42 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
 
 def _places(timelines: Timelines, times: Floats) -> tuple[Ints, Floats]:
     """Return the key before each time, and the fraction of the span that has passed: (T, U)."""
-    count = len(timelines.first)
     passed = np.searchsorted(timelines.union, times, side="right")
-    wanted = np.arange(count) * (len(timelines.union) + 1) + passed[:, None]
-    keys = np.searchsorted(timelines.ranks, wanted, side="right") - 1
+    keys = np.searchsorted(timelines.ranks, timelines.ends + passed[:, None], side="right") - 1
     keys = np.maximum(keys, timelines.first)
     spans = keys - timelines.first
-    fractions = (times[:, None] - timelines.times[keys]) / timelines.durations[keys]
+    fractions = (times[:, None] - timelines.times.take(keys)) / timelines.durations.take(keys)
     # Before the first key the difference is negative; after the last one the duration is infinite.
     return spans, np.maximum(fractions, 0.0)
 
 
 def _arcs(arcs: Arcs, spans: Ints, fractions: Floats) -> Floats:
     """Return rotations by (sin((1 - u) t) q0 + sin(u t) q1) / sin(t): (T, R, 4)."""
-    rows = arcs.bases + spans[:, arcs.timelines]
-    angles, sines = arcs.angles[rows], arcs.sines[rows]
-    after = fractions[:, arcs.timelines] * arcs.slopes * angles
+    rows = arcs.bases + spans.take(arcs.timelines, axis=1)
+    angles, sines = arcs.angles.take(rows), arcs.sines.take(rows)
+    after = fractions.take(arcs.timelines, axis=1) * arcs.slopes * angles
     first, second = np.sin(angles - after) / sines, np.sin(after) / sines
-    following = np.minimum(rows + 1, len(arcs.keys) - 1)
-    return first[..., None] * arcs.keys[rows] + second[..., None] * arcs.keys[following]
+    before, following = arcs.keys.take(rows, axis=0), arcs.keys.take(rows + 1, axis=0)
+    return first[..., None] * before + second[..., None] * following
 
 
 def _lines(curves: Curves, spans: Ints, fractions: Floats) -> Floats:
     """Return lines and steps: (T, C)."""
-    rows = curves.bases + spans[:, curves.timelines] * curves.strides
-    start = curves.values[rows]
-    rise = curves.values[rows + curves.strides] - start
-    return start + fractions[:, curves.timelines] * curves.slopes * rise
+    rows = curves.bases + spans.take(curves.timelines, axis=1) * curves.strides
+    start = curves.values.take(rows)
+    rise = curves.values.take(rows + curves.strides) - start
+    return start + fractions.take(curves.timelines, axis=1) * curves.slopes * rise
 
 
 def _cubics(curves: Curves, timelines: Timelines, spans: Ints, fractions: Floats) -> Floats:
     """Return cubic Hermite splines: (T, C)."""
     durations = timelines.durations[timelines.first + spans]
     durations = np.where(np.isfinite(durations), durations, 0.0)[:, curves.timelines]
-    rows = curves.bases + spans[:, curves.timelines] * curves.strides
+    rows = curves.bases + spans.take(curves.timelines, axis=1) * curves.strides
     following = rows + curves.strides
-    u = fractions[:, curves.timelines]
-    start, rise = curves.values[rows], curves.values[following] - curves.values[rows]
-    leaving, arriving = curves.outgoing[rows], curves.incoming[following]
+    u, start = fractions.take(curves.timelines, axis=1), curves.values.take(rows)
+    rise = curves.values.take(following) - start
+    leaving, arriving = curves.outgoing.take(rows), curves.incoming.take(following)
     # The basis functions of both keys sum to 1, so p0 is exact at u = 0.
     bend = (u - 1.0) * (u - 1.0) * leaving + u * (u - 1.0) * arriving
     return start + u * u * (3.0 - 2.0 * u) * rise + durations * u * bend

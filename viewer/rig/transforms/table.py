@@ -30,8 +30,10 @@ class Timelines:
         Seconds until the next key of the timeline, inf after its last.
     union : (M,)
         All different times, increasing.
+    ends : (U,) int64
+        u (M + 1) of each timeline u.
     ranks : (K,) int64
-        u (M + 1) + the number of times of ``union`` up to the key, for a key of timeline u:
+        ``ends`` + the number of times of ``union`` up to the key, for a key of timeline u:
         increasing, so that one search finds the spans of all timelines.
     """
 
@@ -40,6 +42,7 @@ class Timelines:
     last: Ints
     durations: Floats
     union: Floats
+    ends: NDArray[np.int64]
     ranks: NDArray[np.int64]
 
 
@@ -158,10 +161,10 @@ def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
     durations = np.append(np.diff(times), np.inf)[: len(times)]
     durations[last] = np.inf
     union = np.unique(times)
-    owners = np.repeat(np.arange(len(parts), dtype=np.int64), counts)
-    ranks = owners * (len(union) + 1) + np.searchsorted(union, times, side="right")
+    ends = np.arange(len(parts), dtype=np.int64) * (len(union) + 1)
+    ranks = np.repeat(ends, counts) + np.searchsorted(union, times, side="right")
     as_ints = first.astype(np.int32), last.astype(np.int32)
-    return Timelines(times, *as_ints, durations, union, ranks), of_channel
+    return Timelines(times, *as_ints, durations, union, ends, ranks), of_channel
 
 
 def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:

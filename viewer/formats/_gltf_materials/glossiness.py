@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.images import DecodedImage
-from viewer.formats._gltf.lenient import bounded, bounded_rows
-from viewer.formats._gltf.textures import Slot, read_slot
+from viewer.formats._gltf_materials.images import DecodedImage
+from viewer.formats._gltf_materials.lenient import bounded, bounded_rows
+from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.rig.arrays import Bytes
 from viewer.rig.srgb import decode_srgb, encode_srgb
 

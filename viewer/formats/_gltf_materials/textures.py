@@ -11,8 +11,8 @@ import numpy as np
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.images import DecodedImage
-from viewer.formats._gltf.lenient import bounded, lenient
+from viewer.formats._gltf_materials.images import DecodedImage
+from viewer.formats._gltf_materials.lenient import bounded, lenient
 from viewer.rig.arrays import Floats
 from viewer.rig.material import MINIFICATIONS, Texture
 

@@ -13,10 +13,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 from viewer.formats._gltf.document import open_document
-from viewer.formats._gltf.glossiness import Glossiness, from_glossiness
-from viewer.formats._gltf.images import DecodedImage
-from viewer.formats._gltf.materials import DEFAULT_MATERIAL, read_materials
-from viewer.formats._gltf.textures import Slot, transform_matrix
+from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness
+from viewer.formats._gltf_materials.images import DecodedImage
+from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._gltf_materials.textures import Slot, transform_matrix
 from viewer.formats._source import Source
 
 PIXELS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [9, 8, 7]]], dtype=np.uint8)

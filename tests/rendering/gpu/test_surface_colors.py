@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,8 @@ from rendering.front_view import (
     texture,
 )
 
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.surfaces import upload_surfaces
 from viewer.rendering.offscreen import Offscreen
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
@@ -65,6 +68,20 @@ def test_reduced_textures_are_averaged_unless_the_sampler_says_otherwise(
         assert set(np.unique(inner)) <= set(wanted)
     else:
         assert np.abs(inner - wanted).max() <= 2
+
+
+def test_an_image_is_uploaded_once_per_sampler(offscreen):
+    """Three materials, three maps each: one image, two ways to wrap it, colours and data apart."""
+    made = texture([(1, 2, 3)], wrap=("repeat", "repeat"))
+    clamped = replace(made, wrap=("clamp", "clamp"))
+    data = {"metallic_texture": made, "roughness_texture": made}
+    materials = [Material("", base, **data) for base in (made, made, clamped)]
+    with offscreen.context, ExitStack() as stack:
+        owner = Owner()
+        stack.callback(owner.release)
+        surfaces = upload_surfaces(offscreen.context, materials, (0,), [], owner)
+        used = {map.glo for surface in surfaces for _, map in surface.textures}
+    assert [len(surface.textures) for surface in surfaces] == [3, 3, 3] and len(used) == 3
 
 
 # Vertex colours

@@ -15,10 +15,10 @@ from typing import Any
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._gltf.glossiness import Glossiness, from_glossiness, read_glossiness
-from viewer.formats._gltf.images import DecodedImage, decoded_images
-from viewer.formats._gltf.lenient import bounded, bounded_rows, chosen, lenient
-from viewer.formats._gltf.textures import Slot, read_slot
+from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
+from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
+from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
+from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.rig.material import ALPHA_MODES, Material
 
 __all__ = ["DEFAULT_MATERIAL", "DRAWN_EXTENSIONS", "read_materials"]
@@ -32,7 +32,7 @@ DRAWN_EXTENSIONS = (
 """Extensions of materials and textures that have an effect."""
 
 _WHITE = (1.0, 1.0, 1.0, 1.0)
-_INFINITE = float("inf")
+_LARGEST = 1e6  # factors beyond it have no visible effect, and their products no limit
 _FACTORED = (("normalTexture", "normal_texture"), ("occlusionTexture", "occlusion_texture"))
 _MODES = {mode.upper(): mode for mode in ALPHA_MODES}
 _NEUTRAL: dict[str, dict[str, Any]] = {
@@ -119,7 +119,7 @@ def _stated(document: Document, element: Element) -> _Stated:
         "roughness": bounded(surface, "roughnessFactor", 1.0),
         "emissive": _emissive(element),
         "alpha_mode": _MODES[chosen(element, "alphaMode", tuple(_MODES), "OPAQUE")],
-        "alpha_cutoff": bounded(element, "alphaCutoff", 0.5, 0.0, _INFINITE),
+        "alpha_cutoff": bounded(element, "alphaCutoff", 0.5, 0.0, _LARGEST),
         "double_sided": lenient(source, lambda: element.flag("doubleSided"), False),
         "unlit": lenient(source, lambda: element.extension("KHR_materials_unlit"), None)
         is not None,
@@ -134,7 +134,7 @@ def _stated(document: Document, element: Element) -> _Stated:
     }
     normal, occlusion = (element.part(name) if slots[field] else None for name, field in _FACTORED)
     if normal is not None:
-        values["normal_scale"] = bounded(normal, "scale", 1.0, -_INFINITE, _INFINITE)
+        values["normal_scale"] = bounded(normal, "scale", 1.0, -_LARGEST, _LARGEST)
     if occlusion is not None:
         values["occlusion_strength"] = bounded(occlusion, "strength", 1.0)
     return _Stated(values, {name: slot for name, slot in slots.items() if slot}, glossiness)
@@ -147,7 +147,7 @@ def _emissive(element: Element) -> tuple[float, ...]:
     )
     strength = 1.0
     if extension is not None:
-        strength = bounded(extension, "emissiveStrength", 1.0, 0.0, _INFINITE)
+        strength = bounded(extension, "emissiveStrength", 1.0, 0.0, _LARGEST)
     factor = bounded_rows(element, "emissiveFactor", (0.0, 0.0, 0.0))
     return tuple(strength * channel for channel in factor)
 

@@ -1,0 +1,65 @@
+"""--animation in the commands, on a file with two animations that move a cube's node."""
+
+import json
+
+import numpy as np
+import pytest
+from formats.gltf.files import File
+
+from viewer.cli import run
+
+
+@pytest.fixture
+def box(tmp_path) -> str:
+    """Path of a triangle that slides along x by 1 in a second, or along y by 2 from 1 to 3 s."""
+    file = File(nodes=[{"mesh": 0, "name": "box"}])
+    file.mesh()
+    for name, times, end in (("Slide", [0.0, 1.0], [1, 0, 0]), ("Rise", [1.0, 3.0], [0, 2, 0])):
+        keys = file.accessor([[0, 0, 0], end])
+        sampler = {"input": file.times(times), "output": keys}
+        channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+        file.add("animations", {"name": name, "samplers": [sampler], "channels": [channel]})
+    path = tmp_path / "box.glb"
+    path.write_bytes(file.glb())
+    return str(path)
+
+
+def info(capsys, *arguments):
+    assert run(["info", "--json", *arguments]) == 0
+    (actor,) = json.loads(capsys.readouterr().out)["actors"]
+    return actor
+
+
+def test_info_lists_animations_and_plays_the_requested_one(capsys, box):
+    actor = info(capsys, box)
+    assert [one["name"] for one in actor["animations"]] == ["Slide", "Rise"]
+    assert actor["clip"]["name"] == "Slide" and actor["clip"]["kind"] == "transforms"
+    for text in ("rise", "2"):
+        found = info(capsys, box, "--animation", text)
+        assert found["clip"]["range"] == [1.0, 3.0]
+        assert [one["plays"] for one in found["animations"]] == [False, True]
+    assert "clip" not in info(capsys, box, "--animation", "none")
+    # Times are those of the file.
+    low, high = info(capsys, box, "--animation", "rise", "--time", "2")["box"]
+    np.testing.assert_allclose([low[1], high[1]], [1.0, 2.0], atol=1e-6)
+
+
+def test_an_unknown_animation_ends_with_2(capsys, box, tmp_path):
+    out = str(tmp_path / "out.glb")
+    for command in (["info"], ["convert", "-o", out], ["diff", box]):
+        assert run([*command, box, "--animation", "Slice"]) == 2
+        assert "did you mean Slide?" in capsys.readouterr().err
+    run(["lint", box, "--animation", "Slice"])
+    assert "did you mean Slide?" in capsys.readouterr().out
+
+
+def test_conversion_writes_the_requested_animation(capsys, box, tmp_path):
+    out = str(tmp_path / "out.npz")
+    assert run(["convert", box, "--animation", "Rise", "--fps", "2", "-o", out]) == 0
+    with np.load(out) as arrays:
+        np.testing.assert_allclose(arrays["vertices"][:, 0, 1], [0, 0.5, 1, 1.5, 2], atol=1e-6)
+        np.testing.assert_allclose(arrays["times"], [1, 1.5, 2, 2.5, 3])
+    copy = str(tmp_path / "copy.glb")
+    assert run(["convert", box, "--animation", "Rise", "-o", copy]) == 0
+    capsys.readouterr()
+    assert run(["diff", box, copy, "--animation", "Rise", "--tolerance", "1e-6"]) == 0

@@ -1,0 +1,115 @@
+"""Figures that come back from a ``.glb`` as they were: parts, colours, textures and materials."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import fields, replace
+
+import numpy as np
+from export.seamed import UVS, seamed_mesh
+from numpy.testing import assert_allclose, assert_array_equal
+from PIL import Image
+
+import viewer
+from viewer.export import export
+from viewer.formats._gltf.node_file import read_nodes
+from viewer.formats._source import Source
+from viewer.rig.figure import Figure
+from viewer.rig.material import Material, Texture
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+
+PIXELS = np.arange(48, dtype=np.uint8).reshape(3, 4, 4) | 128
+
+
+def jpeg() -> Texture:
+    """Return a texture that was embedded as a JPEG, with every property of a sampler."""
+    stream = io.BytesIO()
+    Image.fromarray(PIXELS[..., :3]).save(stream, "JPEG")
+    with Image.open(stream) as picture:
+        pixels = np.array(picture.convert("RGBA"))
+    return Texture(
+        "skin",
+        pixels,
+        uv_set=2,
+        transform=np.array([[1.5, -0.5, 0.25], [0.5, 1.5, 0.125]]),
+        wrap=("mirror", "clamp"),
+        is_smooth=False,
+        minification="linear_mipmap_nearest",
+        encoded=stream.getvalue(),
+    )
+
+
+def two_parts() -> Mesh:
+    """Return a roof whose triangles are of two parts and two materials."""
+    painted = Material(
+        "painted", jpeg(), (1.0, 1.0, 1.0, 1.0), 0.5, 0.25, double_sided=False, is_physical=True
+    )
+    lamp = Material(
+        "lamp", None, (0.5, 0.25, 0.0, 1.0), emissive=(4.0, 2.0, 0.0), unlit=True, is_physical=True
+    )
+    return replace(
+        seamed_mesh(),
+        materials=(painted, lamp),
+        triangle_materials=np.array([0, 1, 0]),
+        other_uvs=(UVS[::-1], UVS * 2.0),
+        colors=np.linspace(0.0, 1.0, 20).reshape(5, 4),
+        parts=("hull", "lid"),
+        triangle_parts=np.array([1, 0, 1]),
+    )
+
+
+def corners(mesh: Mesh, name: str) -> np.ndarray:
+    """Return the values at the corners of all triangles."""
+    if name == "uvs":
+        index = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
+        return np.stack([uvs[index] for uvs in (mesh.uvs, *mesh.other_uvs)])
+    return getattr(mesh, name)[mesh.triangles]
+
+
+def test_parts_colours_and_materials_come_back(tmp_path):
+    wanted = two_parts()
+    export(Actor(Figure("roof", wanted, unit="m")), tmp_path / "roof.glb")
+    found = viewer.load(tmp_path / "roof.glb").actors[0].figure.mesh
+    assert found.parts == ("hull", "lid")
+    order = [1, 0, 2]  # by part, then by material
+    assert found.part_indices.tolist() == [0, 1, 1]
+    for name in ("positions", "colors", "uvs"):
+        expected = corners(wanted, name)
+        expected = expected[:, order] if name == "uvs" else expected[order]
+        assert_allclose(corners(found, name), expected, atol=1e-6)
+    names = [found.materials[index].name for index in found.material_indices]
+    assert names == ["lamp", "painted", "painted"]
+    by_name = {material.name: material for material in found.materials}
+    for material in wanted.materials:
+        other = by_name[material.name]
+        for field in fields(Material):
+            if field.name != "base_texture":
+                assert getattr(other, field.name) == getattr(material, field.name), field.name
+    texture, image = by_name["painted"].base_texture, wanted.materials[0].base_texture
+    for field in fields(Texture):
+        one, other = getattr(texture, field.name), getattr(image, field.name)
+        if isinstance(other, np.ndarray):
+            assert_allclose(one, other, atol=1e-12)
+        else:
+            assert one == other, field.name
+
+
+def test_parts_are_meshes_and_nodes_of_their_own(tmp_path):
+    export(Actor(Figure("roof", two_parts(), unit="m")), tmp_path / "roof.glb")
+    file = read_nodes(Source.open(tmp_path / "roof.glb"))
+    assert [mesh.name for mesh in file.meshes] == ["hull", "lid"]
+    names = [file.tree.names[node] for node in np.flatnonzero(file.tree.meshes >= 0)]
+    assert names == ["hull", "lid"]
+    triangles = [sum(len(p.triangles) for p in mesh.primitives) for mesh in file.meshes]
+    assert triangles == [1, 2]
+    assert {len(primitive.positions) for primitive in file.meshes[0].primitives} == {3}
+
+
+def test_vertex_colours_are_not_tinted_by_the_colour_of_the_figure(tmp_path):
+    mesh = replace(seamed_mesh(), colors=np.full((5, 4), 0.5))
+    actor = Actor(Figure("roof", mesh, unit="m"), color=(1.0, 0.0, 0.0))
+    export(actor, tmp_path / "roof.glb")
+    (material,) = viewer.load(tmp_path / "roof.glb").actors[0].figure.mesh.materials
+    assert material.base_color == (1.0, 1.0, 1.0, 1.0)
+    assert_array_equal(mesh.colors, 0.5)

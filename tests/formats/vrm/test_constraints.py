@@ -1,0 +1,80 @@
+"""Constraints of nodes in glTF files."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from formats.gltf.files import File, source_of
+
+from viewer.errors import FormatError
+from viewer.formats.gltf import read
+from viewer.rig.constraints.constraint import Constraint
+
+NAME = "VRMC_node_constraint"
+AT = f"/extensions/{NAME}"
+
+
+def file_of(*constraints: dict[str, Any] | None) -> File:
+    """Return a file of a chain of nodes, a constraint or none for each."""
+    file = File(extensionsUsed=[NAME])
+    for node, constraint in enumerate(constraints):
+        item: dict[str, Any] = {"name": f"n{node}"}
+        if node + 1 < len(constraints):
+            item["children"] = [node + 1]
+        if constraint is not None:
+            item["extensions"] = {NAME: {"specVersion": "1.0", "constraint": constraint}}
+        file.add("nodes", item)
+    return file
+
+
+def test_constraints_are_read_in_the_order_of_evaluation() -> None:
+    source = source_of(
+        file_of(
+            None,
+            {"rotation": {"source": 2, "weight": 0.25}},
+            {"roll": {"source": 0, "rollAxis": "Y"}},
+            {"aim": {"source": 0, "aimAxis": "NegativeX"}},
+        )
+    )
+    skeleton = read(source).figures[0].require_skeleton()
+    assert skeleton.constraints == (
+        Constraint(2, 0, "roll", (0.0, 1.0, 0.0)),
+        Constraint(1, 2, "rotation", weight=0.25),
+        # It depends on its ancestors.
+        Constraint(3, 0, "aim", (-1.0, 0.0, 0.0)),
+    )
+    assert not source.diagnostics
+
+
+@pytest.mark.parametrize(
+    "constraints",
+    [
+        (None, {"rotation": {"source": 2}}, {"rotation": {"source": 1}}),
+        # The source's place depends on the joint that aims at it.
+        (None, {"aim": {"source": 2, "aimAxis": "PositiveX"}}, None),
+    ],
+)
+def test_cycles_are_refused(constraints: tuple[dict[str, Any] | None, ...]) -> None:
+    with pytest.raises(FormatError) as caught:
+        read(source_of(file_of(*constraints)))
+    assert caught.value.diagnostic.key == "F002.constraint-cycle"
+    assert caught.value.diagnostic.pointer == f"/nodes/1{AT}"
+
+
+@pytest.mark.parametrize(
+    ("constraint", "expected"),
+    [
+        ({}, "one of roll, aim and rotation"),
+        ({"rotation": {"source": 1}}, "the index of another node as source"),
+        ({"rotation": {"source": 9}}, "the index of another node as source"),
+        ({"roll": {"source": 0, "rollAxis": "W"}}, "rollAxis X, Y, Z"),
+        ({"rotation": {"source": 0, "weight": "1"}}, "a weight from 0 to 1"),
+    ],
+)
+def test_invalid_constraints_are_ignored(constraint: dict[str, Any], expected: str) -> None:
+    source = source_of(file_of(None, constraint))
+    assert read(source).figures[0].require_skeleton().constraints == ()
+    found = next(iter(source.diagnostics))
+    assert (found.key, found.pointer) == ("G006.constraint", f"/nodes/1{AT}/constraint")
+    assert found.values["expected"] == expected

@@ -1,0 +1,58 @@
+"""Images decoded together: contents, errors in their place, and a common limit of pixels."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from viewer.errors import FormatError
+from viewer.media import image
+from viewer.media.image import decode_picture, decode_pictures
+
+
+def png(pixels: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def file(number: int) -> tuple[Path, bytes]:
+    return Path(f"{number}.png"), png(np.full((2, 3, 4), number, np.uint8))
+
+
+def test_images_are_returned_in_order_and_errors_in_their_place():
+    files = [file(number) for number in range(20)]
+    files[7] = Path("7.png"), files[7][1][:45]
+    files[9] = Path("9.png"), b"nothing"
+    filters = list(warnings.filters)
+    found = decode_pictures(files)
+    assert warnings.filters == filters
+    for number, pixels in enumerate(found):
+        if number in (7, 9):
+            assert isinstance(pixels, FormatError)
+            assert pixels.diagnostic.path == files[number][0]
+        else:
+            assert (pixels == number).all() and pixels.shape == (2, 3, 4)
+            assert not pixels.flags.writeable
+
+
+def test_no_images_are_decoded_to_none():
+    assert decode_pictures([]) == []
+
+
+def test_images_share_a_limit_of_pixels(monkeypatch):
+    monkeypatch.setattr(image, "_MAX_PIXELS", 15)
+    found = decode_pictures([file(1), file(2), file(3)])
+    assert [isinstance(one, FormatError) for one in found] == [False, False, True]
+    assert decode_picture(*file(3)).shape == (2, 3, 4)
+
+
+@pytest.mark.parametrize(("grey", "byte"), [(0, 0), (32768, 128), (65535, 255), (257 * 7, 7)])
+def test_grey_images_with_16_bits_are_scaled(grey, byte):
+    pixels = decode_picture(Path("a.png"), png(np.array([[grey]], np.uint16)))
+    assert pixels.tolist() == [[[byte, byte, byte, 255]]]

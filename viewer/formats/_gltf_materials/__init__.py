@@ -1,0 +1,1 @@
+"""Materials of glTF files: their surfaces, textures and images."""

@@ -1,0 +1,1 @@
+"""Constraints: joints whose rotations follow other joints."""

@@ -1,0 +1,36 @@
+"""A joint whose rotation is determined by another joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+__all__ = ["Constraint", "ConstraintKind"]
+
+ConstraintKind: TypeAlias = Literal["roll", "aim", "rotation"]
+
+
+@dataclass(frozen=True, slots=True)
+class Constraint:
+    """Rotation of a joint by a source, as in ``VRMC_node_constraint`` 1.0.
+
+    Attributes
+    ----------
+    joint : int
+        Joint that is rotated; what a pose says about its rotation has no effect.
+    source : int
+        Joint that determines the rotation.
+    kind : str
+        ``"roll"`` takes over the source's rotation about one axis, ``"rotation"`` all of it, and
+        ``"aim"`` points an axis at the source.
+    axis : (float, float, float)
+        Unit vector in the joint's own axes; unused by ``"rotation"``.
+    weight : float
+        0 leaves the joint in its rest pose, 1 rotates it completely.
+    """
+
+    joint: int
+    source: int
+    kind: ConstraintKind
+    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    weight: float = 1.0
