@@ -98,6 +98,8 @@ class Primitive:
         Offsets of the positions for each morph target of the mesh.
     normal_targets : (S, V, 3) or None
         Offsets of the normals; None if the file has none.
+    pointer : str
+        JSON pointer to it; empty in other files.
     """
 
     positions: Floats
@@ -110,6 +112,7 @@ class Primitive:
     material: int = -1
     targets: Floats | None = None
     normal_targets: Floats | None = None
+    pointer: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,6 +204,8 @@ class NodeAnimation:
         Nodes that it moves.
     read : callable
         Returns the channels; called at most once, may raise a ``FormatError``.
+    pointer : str
+        JSON pointer to it; empty in other files.
     """
 
     name: str
@@ -208,6 +213,7 @@ class NodeAnimation:
     end: float
     nodes: frozenset[int]
     read: Callable[[], tuple[NodeChannel, ...]]
+    pointer: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -291,6 +297,8 @@ class NodeFile:
         The views for which the meshes of some nodes are meant.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
+    has_pointers : bool
+        Whether elements have JSON pointers, ``/nodes/3`` for instance.
     """
 
     name: str
@@ -311,3 +319,4 @@ class NodeFile:
     constraints: tuple[Constraint, ...] = ()
     part_views: Mapping[int, PartView] = field(default_factory=dict)
     facts: tuple[tuple[str, str], ...] = ()
+    has_pointers: bool = False
