@@ -45,6 +45,8 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
         Constraint(3, 0, "aim", (-1.0, 0.0, 0.0)),
     )
     assert not source.diagnostics
+    # Sliders of joints that follow others would have no effect.
+    assert skeleton.dof_joints[skeleton.locked].tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
 
 
 @pytest.mark.parametrize(
