@@ -183,6 +183,7 @@ PHRASES = {
     "part-symmetry": "the symmetry map",
     "part-reduced": "the reduced mesh",
     "part-regressor": "the joint regressor",
+    "part-constraints": "{n:#constraint} (the joints have their rotations)",
     "part-limits": "limits of joints",
     "part-all-materials": "materials and textures",
     "part-materials": "material properties except one texture each",
