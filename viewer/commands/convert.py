@@ -12,10 +12,10 @@ from viewer.commands._motion_export import (
     check_kind,
     check_numbered,
     is_motion,
-    keeps_keys,
     left_out_notes,
     pose_or_point_actors,
     write_motions,
+    writes_keys,
 )
 from viewer.commands._one_pose import check_frame_options
 from viewer.commands._output import inputs_of
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
-    if keeps_keys(arguments, output, scene):
+    if writes_keys(arguments, output, scene):
         write = _write_clips
     notes = write(arguments, scene, output, skinning)
     print("\n".join(map(str, notes)), file=summary_stream(output))
