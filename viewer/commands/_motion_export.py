@@ -68,6 +68,12 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         "--rest-frame", action="store_true", help="BVH: begin with a rest pose frame"
     )
     group.add_argument(
+        "--optimize",
+        action="store_true",
+        help="glTF: quantise positions, normals, texture coordinates and weights to 16 bits "
+        "(KHR_mesh_quantization); the errors are printed",
+    )
+    group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
     )
 
@@ -122,6 +128,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         rest_frame=arguments.rest_frame,
         digits=digits,
         skinning=skinning,
+        optimizes=arguments.optimize,
     )
 
 
