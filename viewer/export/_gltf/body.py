@@ -119,8 +119,8 @@ def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
 def _add_meshes(encoding: Encoding, body: Body, tree: Tree, color: Color | None) -> list[Placed]:
     """Add the parts of a figure, each with its node."""
     figure, meshes, document = body.figure, list[Placed](), encoding.document
-    materials = Materials(document, figure.require_mesh(), color)
     record = figure.record
+    materials = Materials(document, figure.require_mesh(), color, record is not None)
     for part in parts_of(f"{figure.name} mesh", body.shape, body.influences):
         mesh = add_mesh(encoding, materials, part, body.shape, body.influences)
         if part.joint >= 0:
