@@ -12,7 +12,6 @@ from viewer.formats._nodes.content import NodeFile, Primitive
 from viewer.formats._nodes.flat_normals import flat_shaded
 from viewer.formats._nodes.influences import Influences, divided, of_rows, on_joint
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import Mesh, PartView
 from viewer.rig.skin import Skin
 
