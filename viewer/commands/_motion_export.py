@@ -30,6 +30,7 @@ from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.captures.sampled_points import SampledPoints, sample_upright_points
 from viewer.rig.motion.evaluation import JointMotion
+from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
@@ -67,6 +68,12 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         "--rest-frame", action="store_true", help="BVH: begin with a rest pose frame"
     )
     group.add_argument(
+        "--optimize",
+        action="store_true",
+        help="glTF: quantise positions, normals, texture coordinates and weights to 16 bits "
+        "(KHR_mesh_quantization); the errors are printed",
+    )
+    group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
     )
 
@@ -91,6 +98,23 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
     return moves and not wants_one and suffix not in _ONE_A_FRAME
 
 
+def writes_keys(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
+    """Return whether animations are written with their own keys, instead of as frames.
+
+    That is so for formats with keys unless frames, a rate or a single pose are requested, or a
+    figure has another motion.
+    """
+    suffix = output.suffix.lower()
+    kinds = [key for key, kind in EXPORTERS.items() if kind.writes_keys and suffix in kind.suffixes]
+    if not kinds or arguments.kind not in (None, *kinds) or arguments.gaps is not None:
+        return False
+    options = arguments.frames, arguments.frame, arguments.time, arguments.fps
+    if any(option is not None for option in options):
+        return False
+    moving = [actor for actor in scene.actors if actor.clip is not None]
+    return bool(moving) and all(keeps_keys(scene, actor) for actor in moving)
+
+
 def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionOptions:
     """Return the requested options of motion export."""
     digits = int(arguments.digits)
@@ -104,6 +128,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         rest_frame=arguments.rest_frame,
         digits=digits,
         skinning=skinning,
+        optimizes=arguments.optimize,
     )
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from formats.gltf.files import animated, skinned
-from formats.gltf.planted import PLANTED
+from formats.gltf.planted_gltf import PLANTED
 from formats.gltf.validator_faults import FAULTS
 
 from viewer.lint import lint_files

@@ -15,6 +15,7 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.material import Material
+from viewer.rig.mesh import PartView
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
 
 __all__ = [
@@ -292,6 +293,8 @@ class NodeFile:
         Facial expressions.
     constraints : tuple of Constraint
         Nodes (instead of joints) that follow others, in the order of evaluation.
+    part_views : dict of PartView
+        The views for which the meshes of some nodes are meant.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
     has_pointers : bool
@@ -314,5 +317,6 @@ class NodeFile:
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()
     constraints: tuple[Constraint, ...] = ()
+    part_views: Mapping[int, PartView] = field(default_factory=dict)
     facts: tuple[tuple[str, str], ...] = ()
     has_pointers: bool = False

@@ -11,6 +11,7 @@ from viewer.formats._nodes.grouping import Members, group_nodes, is_skinned, sce
 from viewer.formats._nodes.joints import make_joints, skeleton_of
 from viewer.formats._nodes.motions import Reader, animations_of, read_once
 from viewer.formats._nodes.pointers import remember_pointers
+from viewer.formats._nodes.records import record_of
 from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
 from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
 from viewer.formats._nodes.views import views_of
@@ -78,6 +79,7 @@ def _figure(
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
         facts=facts_of(file, pieces),
         animations=animations_of(file.animations, readers, joints.own, columns),
+        record=record_of(file, joints, members.meshes, columns),
     )
     remember_pointers(source, figure.skeleton, file, members, joints, pieces)
     return figure, pieces

@@ -1,0 +1,121 @@
+"""Motions of humanoids in ``.vrma`` files, alone and on a character."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from formats.gltf.files import File
+from formats.vrm.humanoids import ABOUT_Y, ABOUT_Z, character, humanoid
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.errors import FormatError
+from viewer.loading import MotionSettings
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.skinning import joint_matrices
+
+
+def motion(**more: Any) -> File:
+    """Return a motion of one second: hips and left arm rotate by 90 degrees, and the face moves."""
+    expressions = {"preset": {"happy": {"node": 6}}}
+    file = humanoid("VRMC_vrm_animation", "m", expressions=expressions, **more)
+    file.add("nodes", {"name": "happy"})
+    still = [0, 0, 0, 1]
+    rows = [
+        (0, "rotation", [still, ABOUT_Y]),
+        (0, "translation", [[0, 1, 0], [0.4, 1, 0]]),
+        (3, "rotation", [still, ABOUT_Z]),
+        (6, "translation", [[0, 0, 0], [2, 0, 0]]),
+    ]
+    times = file.times([0.0, 1.0])
+    channels, samplers = [], []
+    for index, (node, path, values) in enumerate(rows):
+        channels.append({"sampler": index, "target": {"node": node, "path": path}})
+        samplers.append({"input": times, "output": file.accessor(values)})
+    file.add("animations", {"name": "wave", "channels": channels, "samplers": samplers})
+    return file
+
+
+def written(folder: Path, name: str, file: File) -> Path:
+    path = folder / name
+    path.write_bytes(file.glb())
+    return path
+
+
+def test_a_motion_alone_is_a_skeleton(tmp_path: Path) -> None:
+    scene = viewer.load(written(tmp_path, "wave.vrma", motion()))
+    (actor,) = scene.actors
+    skeleton = actor.figure.require_skeleton()
+    assert skeleton.names == ("m0", "m1", "m2", "m3", "m5", "m4")
+    assert actor.clip is not None and (actor.clip.start, actor.clip.end) == (0.0, 1.0)
+    pose_actor(actor, 1.0)
+    arm = joint_matrices(actor.figure, actor.require_pose())[skeleton.names.index("m4"), :3, 3]
+    # 0.4 along x; the chain 0, 0.5, 0 is vertical; 0.2 along x points backwards.
+    assert_allclose(arm, [0.4, 1.5 + 0.3, -0.2], atol=1e-6)
+
+
+def test_a_character_plays_a_motion_with_its_face(tmp_path: Path) -> None:
+    paths = (written(tmp_path, "a.vrm", character()), written(tmp_path, "wave.vrma", motion()))
+    scene = viewer.load(*paths)
+    (actor,) = scene.actors
+    figure = actor.figure
+    assert figure.blend_shapes is not None
+    for time, weight in ((0.25, 0.5), (1.0, 1.0)):
+        pose_actor(actor, time)
+        pose = actor.require_pose()
+        column = figure.blend_shapes.names.index("happy")
+        # Weights above 1 are clamped; the keys are sampled at 30 frames per second.
+        assert_allclose(pose.shape_weights[column], weight, atol=0.02)
+    worlds = joint_matrices(figure, actor.require_pose())
+    names = figure.require_skeleton().names
+    arm, below = (worlds[names.index(name)] for name in ("c3", "c4"))
+    # Hips and arm, then the rest pose: Ry Rz Rx, each by 90 degrees.
+    turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]) @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    assert_allclose(arm[:3, :3], turn @ quarter, atol=1e-6)
+    # The lower arm is above the upper arm now; half the size, so half the way.
+    assert_allclose(below[:3, 3] - arm[:3, 3], turn @ quarter @ [0.15, 0, 0], atol=1e-6)
+    assert_allclose(worlds[names.index("c0"), :3, 3], [0.2, 0.5, 0.0], atol=1e-6)
+
+
+def test_a_captured_body_drives_a_character(tmp_path: Path) -> None:
+    poses = np.random.default_rng(2).uniform(-0.3, 0.3, (3, 156))
+    path = tmp_path / "walk.npz"
+    still = {"trans": np.zeros((3, 3)), "betas": np.zeros(10), "gender": "neutral"}
+    np.savez(path, poses=poses, mocap_framerate=30.0, **still)
+    hero, up = written(tmp_path, "a.vrm", character()), MotionSettings(up="y")
+    (driven,) = viewer.load(path, hero, motion=up).actors
+    (body,) = viewer.load(path, motion=up).actors
+    beside = viewer.load(path, hero, motion=MotionSettings(up="y", drives=False))
+    assert [actor.clip is None for actor in beside.actors] == [True, False]
+    for time in (0.0, 2 / 30):
+        ways = []
+        for actor, pair in ((driven, ("c3", "c4")), (body, ("left_shoulder", "left_elbow"))):
+            pose_actor(actor, time)
+            names = actor.figure.require_skeleton().names
+            places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
+            way = places[names.index(pair[1])] - places[names.index(pair[0])]
+            ways.append(way / np.linalg.norm(way))
+        assert_allclose(ways[0], ways[1], atol=1e-9)
+
+
+def test_a_model_of_a_character_file_is_driven(tmp_path: Path) -> None:
+    settings = MotionSettings(model=written(tmp_path, "a.vrm", character()))
+    (actor,) = viewer.load(written(tmp_path, "wave.vrma", motion()), motion=settings).actors
+    assert actor.figure.mesh is not None and actor.clip is not None
+
+
+def test_motions_without_bones_or_keys_are_refused(tmp_path: Path) -> None:
+    empty = motion()
+    del empty.root["animations"]
+    bare = motion(humanoid={})
+    for name, file, key in (
+        ("empty.vrma", empty, "F002.vrma-animation"),
+        ("bare.vrma", bare, "F002.vrma-bones"),
+    ):
+        with pytest.raises(FormatError) as caught:
+            viewer.load(written(tmp_path, name, file))
+        assert caught.value.diagnostic.key == key
