@@ -106,7 +106,7 @@ def _plain_channels(
         inputs = {samplers[index]["input"] for index in used}
     except (KeyError, TypeError, IndexError):
         return None
-    if not all(targets.moves(node, path) for node, path in moved):
+    if not targets.moves_all(moved):
         return None
     return {node for node, _ in moved}, inputs
 

@@ -16,6 +16,8 @@ _NODE_POINTER = re.compile(r"/nodes/([0-9]{1,9})/(translation|rotation|scale|wei
 _MESH_POINTER = re.compile(r"/meshes/([0-9]{1,9})/weights")
 _INDEX = re.compile(r"/[0-9]+")
 
+_OF_NODES = frozenset(TRANSFORM_PATHS) - {"weights"}
+
 
 @dataclass(frozen=True, slots=True)
 class Moved:
@@ -72,6 +74,16 @@ class Targets:
         if type(node) is not int or not 0 <= node < self._tree.n_nodes:
             return False
         return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
+
+    def moves_all(self, moved: set[tuple[Any, Any]]) -> bool:
+        """Return whether all nodes and paths name something that is shown.
+
+        Files have tens of thousands of them, most of which are transforms.
+        """
+        nodes, paths = {node for node, _ in moved}, {path for _, path in moved}
+        if set(map(type, nodes)) == {int} and paths.issubset(_OF_NODES):
+            return min(nodes) >= 0 and max(nodes) < self._tree.n_nodes
+        return all(self.moves(node, path) for node, path in moved)
 
     def of(self, channel: Element) -> Moved:
         """Return what a channel moves.
