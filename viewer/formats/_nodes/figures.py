@@ -33,9 +33,9 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     Parameters
     ----------
     file : NodeFile
-        As read.
+        The contents, as read.
     source : Source
-        Receives notes.
+        Records notes.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
 
 
 def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Figure, list[Piece]]:
-    """Return one figure, and the primitives of which it consists."""
+    """Return one figure, and its primitives."""
     joints = make_joints(file.tree, members.nodes)
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
@@ -84,7 +84,7 @@ def _is_skinned(file: NodeFile, node: int) -> bool:
 
 
 def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Refuse a file whose meshes, repeated by many nodes, would fill the memory."""
+    """Refuse a file whose meshes, repeated at many nodes, would exhaust the memory."""
     sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
     meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
     count = sum(sizes[mesh] for mesh in meshes)
@@ -93,7 +93,7 @@ def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> No
 
 
 def _note_normals(pieces: list[Piece], source: Source) -> None:
-    """Record which primitives have no normals, and how many vertices flat shading adds."""
+    """Report primitives without normals, and the number of vertices that flat shading adds."""
     split = [piece for piece in pieces if piece.shading == "flat"]
     added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
     if added:
@@ -104,7 +104,7 @@ def _note_normals(pieces: list[Piece], source: Source) -> None:
 
 
 def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Record skins that the file deforms by another method than LBS, which is chosen by hand."""
+    """Report skins that the file deforms by a method other than LBS, which the user selects."""
     used = (file.skins[skin] for members in groups for skin in members.skins)
     others: dict[str, list[str]] = {}
     for skin in used:
@@ -115,7 +115,7 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights."""
+    """Report sums of weights that are not 1, and vertices without weights."""
     influences = [piece.influences for piece in pieces]
     deviating = sum(each.n_deviating for each in influences)
     if deviating:

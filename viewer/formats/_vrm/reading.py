@@ -25,7 +25,7 @@ __all__ = ["with_vrm"]
 _PERCENT = 100.0
 _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
-# Heading for each property, under its names in versions 1.0 and 0.x.
+# Heading of each property, and the property's names in versions 1.0 and 0.x.
 _META = {
     "title": ("name", "title"),
     "authors": ("authors", "author"),
@@ -44,18 +44,18 @@ _META = {
     "political or religious use": ("allowPoliticalOrReligiousUsage",),
     "antisocial use": ("allowAntisocialOrHateUsage",),
 }
-_LONGEST = 200  # characters of a property
+_LONGEST = 200  # maximum number of characters of a property
 
 
 def with_vrm(file: NodeFile, source: Source) -> NodeFile:
-    """Return a file with what its VRM extensions say about its characters, if any.
+    """Return a file with the humanoid, expressions and constraints of its VRM extensions, if any.
 
     Parameters
     ----------
     file : NodeFile
         As read by the glTF reader.
     source : Source
-        Receives messages.
+        Records messages.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def _modern(bone: str) -> str:
 def _expressions(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> tuple[NodeExpression, ...]:
-    """Return the expressions that bind morph targets; say which change materials only."""
+    """Return the expressions that bind morph targets; report those that only change materials."""
     if version == 0:
         groups = part(told, "blendShapeMaster", "blendShapeGroups")
         named = [(each.get("name"), each) for each in groups or () if isinstance(each, dict)]
