@@ -18,7 +18,7 @@ MESSAGES = {
     "ignored",
     "G006.bind": "expected a morph target and its weight, found target {found}: ignored",
     "G006.constraint": "invalid constraint ignored: expected {expected}",
-    "F002.constraint-cycle": "expected constraints without a cycle, found a cycle of "
+    "F002.constraint-cycle": "expected constraints without cycles, found a cycle of "
     "nodes {nodes:list12}",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
@@ -119,7 +119,7 @@ MESSAGES = {
     "G004.influence-sets": "sets {sets:list} have joints without weights or weights without "
     "joints: ignored",
     # Animations
-    "F002.gltf-no-keys": "expected times of at least one key, found none",
+    "F002.gltf-no-keys": "expected at least one key time, found none",
     "F002.gltf-times": "key {index}: expected ascending times, found {found:.6g} after "
     "{before:.6g}",
     "F002.gltf-outputs": "expected {expected:#element} for {keys:#key}, found {found}",

@@ -1,4 +1,4 @@
-"""Named animations of a figure, whose keys are read when they are first played."""
+"""Named animations of a figure, whose keys are read on first playback."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Animation"]
 
 
 class Animation:
-    """One of the animations of a figure.
+    """An animation of a figure.
 
     Parameters
     ----------
