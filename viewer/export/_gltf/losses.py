@@ -1,4 +1,4 @@
-"""Parts of a figure that glTF cannot store, and measured errors of a file that is read back."""
+"""Parts of a figure that glTF cannot store, and errors measured by reading a file back."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Written:
     mesh_nodes : list of int
         Indices of the nodes of the meshes, which share their vertices.
     start : int
-        Frame of the figure that is the first in the file.
+        Frame of the figure that comes first in the file.
     """
 
     path: Path
@@ -58,7 +58,7 @@ def gltf_losses(
     influences: Influences | None,
     first_frame: int | None,
 ) -> list[Diagnostic]:
-    """Return notes with the largest distances between the posed figure and a file.
+    """Return notes with the largest distances between a file and the posed figure.
 
     ``written``: the file.
     ``figure``: the original, without its shape applied.
@@ -94,7 +94,7 @@ def gltf_losses(
 
 
 def _split(side: Side, sources: Ints) -> Side:
-    """Return a side whose vertices are duplicated as in the file."""
+    """Return a side with vertices duplicated as in the file."""
     whole = side.exact
     assert side.body is not None  # the caller checked for a mesh
     body = body_rows(side.body, sources)
@@ -106,7 +106,7 @@ def _split(side: Side, sources: Ints) -> Side:
 def _first_set(
     expected: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
 ) -> list[Diagnostic]:
-    """Return a note about the error of programs that read four influences per vertex."""
+    """Return a note about the error in programs that read only four influences per vertex."""
     found = apart(expected, cut, rows, least)
     most, worst = int(influences.most), found.vertices
     if worst is None:
@@ -156,7 +156,7 @@ def _weights_phrase(influences: Influences) -> Phrase:
 
 
 def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
-    """Return a note that lists the parts of a figure that the file does not hold."""
+    """Return a note that lists the parts of a figure that the file does not contain."""
     unused = figure.n_shapes - len(shape.targets)
     skeleton, lost = figure.skeleton, []
     if shape.baked is not None:

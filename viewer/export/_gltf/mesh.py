@@ -1,6 +1,6 @@
 """Meshes in glTF form: one per part, with a primitive per material, and shared vertices.
 
-Vertices are split at seams. Morph targets are those of all parts.
+Vertices are split at seams. Every part has all morph targets of the figure.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from viewer.rig.mesh import Mesh, split_seams, vertex_normals
 
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
-_NOT_UNIT = 1e-3  # tolerance of unit length; normals may under- or overflow when squared
+_NOT_UNIT = 1e-3  # tolerance of unit length; squares of normals may underflow or overflow
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenMeshes:
-    """Indices and names of a figure's meshes, and their number of vertices together."""
+    """Indices and names of a figure's meshes, and their total number of vertices."""
 
     meshes: list[int]
     names: list[str]
@@ -83,7 +83,7 @@ def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints)
         "NORMAL": document.array(_normals(mesh)[sources], "VEC3", VERTICES),
     }
     if mesh.uvs is not None and len(mesh.uvs):
-        # In glTF, the first image row is at v = 0, in this program at v = 1.
+        # In glTF, the first image row is at v = 0; in this program, at v = 1.
         for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
             flipped = uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
             attributes[f"TEXCOORD_{number}"] = document.array(flipped, "VEC2", VERTICES)

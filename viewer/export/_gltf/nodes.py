@@ -88,13 +88,13 @@ def add_nodes(
     still: Locals | None,
     fixes: bool,
 ) -> Tree:
-    """Add all nodes except that of the mesh.
+    """Add all nodes except the mesh's.
 
     ``document``: modified in place.
     ``name``: name of the figure.
     ``up``: up axis of the figure's world.
     ``unit``: as in ``Figure.unit``.
-    ``skeleton``, ``still``: the joints and their transforms.
+    ``skeleton``, ``still``: the skeleton, and transforms of its joints at rest.
     ``pose``: pose with the figure's placement.
     ``fixes``: whether vertices need a node that never moves.
     Raises RigError if a number is not finite.

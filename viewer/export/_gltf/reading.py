@@ -1,7 +1,7 @@
 """Reader of glTF files written here: arrays, nodes in every frame, the mesh and its skin.
 
 Only the output of ``viewer.export.gltf`` is supported: one buffer without strides, and samplers
-whose keys are the frames. Joints and vertices are returned in the figure's space, below the node
+with one key per frame. Joints and vertices are returned in the figure's space, below the node
 that rotates and scales the whole figure.
 """
 
@@ -68,12 +68,12 @@ def read_back(
     start: int,
     sets: int | None = None,
 ) -> Side:
-    """Return the contents of a file as a comparable body.
+    """Return the contents of a file in a form that can be compared with the figure.
 
     ``file``: the written file.
-    ``tree``: indices of the nodes of joints and figure.
+    ``tree``: indices of the nodes.
     ``node``: index of the mesh's node.
-    ``sources`` (M,): indices of the file's morph targets that change over time.
+    ``sources`` (M,): indices of the morph targets that change over time.
     ``start``: frame of the figure that is the first in the file.
     ``sets``: number of influence sets to use, normalised to a sum of 1; all if omitted.
     """
@@ -148,7 +148,7 @@ def _body(
     changing: Rows,
     sets: int | None,
 ) -> tuple[Body, Floats]:
-    """Return the mesh in the first frame's shape, and the weights that change it: (F, M)."""
+    """Return the mesh in the shape of the first frame, and the weights that change it: (F, M)."""
     mesh = file.root["meshes"][file.root["nodes"][node]["mesh"]]
     primitive = mesh["primitives"][0]  # all primitives share their vertices
     attributes = primitive["attributes"]
@@ -165,7 +165,7 @@ def _body(
 
 
 def _skin(file: GltfFile, attributes: dict[str, int], n_joints: int, sets: int | None) -> Skin:
-    """Return the influences of a mesh; an unskinned mesh follows the last joint, its own node."""
+    """Return the influences of a mesh; an unskinned mesh follows the last joint, its node."""
     count = file.root["accessors"][attributes["POSITION"]]["count"]
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]

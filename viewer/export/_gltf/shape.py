@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.shape import shaped
 
-_MOST_TARGETS = 64  # limit: each target takes 12 bytes per vertex, and programs support few
+_MOST_TARGETS = 64  # maximum number: each takes 12 bytes per vertex, and programs support few
 
 
 @dataclass(frozen=True, slots=True, eq=False)

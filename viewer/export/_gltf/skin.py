@@ -20,8 +20,8 @@ from viewer.rig.skin import (
 )
 
 PER_SET = 4
-_SUM = 1e-6  # smaller deviations from 1 are rounding errors of the original file
-_MOST_JOINTS = 65536  # joint indices have 16 bits
+_SUM = 1e-6  # smaller deviations of weight sums from 1 are rounding errors of the original file
+_MOST_JOINTS = 65536  # maximum number of joints, as indices have 16 bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class Influences:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints that the file's skin lists: one more if vertices are fixed."""
+        """Number of joints that the file's skin lists: one more if some vertices are fixed."""
         return self.skin.n_joints + bool(self.n_fixed)
 
 
@@ -116,5 +116,5 @@ def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Float
     origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
-    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exact, as readers expect
+    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # set exactly, as readers expect
     return matrices.transpose(0, 2, 1).reshape(-1, 16)
