@@ -38,7 +38,7 @@ class _Unlocked:
     joints : frozenset of int
         Indices of the joints.
     n_choices : int
-        The state's ``n_choices`` for which they are valid.
+        The state's ``n_choices`` for which the indices are valid.
     """
 
     joints: frozenset[int] = frozenset()
@@ -46,7 +46,7 @@ class _Unlocked:
 
 
 def unlocked_joints(state: AppState) -> frozenset[int]:
-    """Return the joints whose translation and scale the user wants to see."""
+    """Return the joints whose translation and scale the user has shown."""
     unlocked = state.of(_Unlocked)
     return unlocked.joints if unlocked.n_choices == state.n_choices else frozenset()
 
@@ -72,7 +72,7 @@ def _animated_joints(clip: TransformClip) -> frozenset[int]:
 
 
 def draw_translation(state: AppState, pose: Pose, joint: int, label: str) -> None:
-    """Draw the translation of a joint relative to its rest, along the axes of its parent."""
+    """Draw a joint's translation relative to its rest position, along the parent's axes."""
     speed = 0.002 * (box_size(state.box) or 1.0)
 
     def draw_axis(hidden: str, axis: int) -> None:
@@ -122,7 +122,7 @@ def _draw_row(
 
 
 def _is_reset(text: str) -> bool:
-    """Explain the last row, and return whether a double click resets it."""
+    """Show the tooltip of the last row, and return whether a double-click resets the row."""
     if not imgui.is_item_hovered():
         return False
     show_tooltip(f"{text}\ndrag, or Ctrl+click to type a value; double-click to reset")
