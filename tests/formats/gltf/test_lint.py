@@ -1,4 +1,4 @@
-"""Findings of lint in glTF files: every code of their reader, at its JSON pointer."""
+"""Findings of lint in glTF files: every code of the reader, at its JSON pointer."""
 
 from pathlib import Path
 
