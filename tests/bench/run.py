@@ -19,6 +19,7 @@ NAMES = [
     "motion",
     "read",
     "gltf",
+    "nodes",
     "captures",
     "observing",
     "losses",

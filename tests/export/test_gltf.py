@@ -222,7 +222,7 @@ def test_skeleton_alone(tmp_path):
     skeleton = ball_skeleton(("a", "a", ""), np.array([-1, 0, -1]), np.eye(3))
     gltf, notes = write(tmp_path, Actor(Figure("bare", skeleton=skeleton, unit="m")))
     assert "meshes" not in gltf.root and "buffers" not in gltf.root
-    names = [node["name"] for node in gltf.nodes]
+    names = [node.get("name", "") for node in gltf.nodes]
     assert names == ["bare", "a", "a", ""]
     assert_allclose(gltf.world()[1:, :3, 3], np.eye(3), rtol=0, atol=0)
     size = (tmp_path / "out.glb").stat().st_size

@@ -230,7 +230,7 @@ def test_a_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
 
 
 def test_every_code_is_planted_somewhere() -> None:
-    from formats.gltf.planted import PLANTED as GLTF
+    from formats.gltf.planted_gltf import PLANTED as GLTF
     from lint.planted import FAULTS as FIGURES
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}

@@ -30,6 +30,7 @@ from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.captures.sampled_points import SampledPoints, sample_upright_points
 from viewer.rig.motion.evaluation import JointMotion
+from viewer.rig.motion.own_animations import has_own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
@@ -89,6 +90,23 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
         moves = moves or all(isinstance(actor.clip, PointClip) for actor in scene.actors)
     wants_one = arguments.time is not None or arguments.frame is not None
     return moves and not wants_one and suffix not in _ONE_A_FRAME
+
+
+def keeps_keys(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
+    """Return whether animations are written with their own keys, instead of as frames.
+
+    That is so for formats with keys unless frames, a rate or a single pose are requested, or a
+    figure has another motion.
+    """
+    suffix = output.suffix.lower()
+    kinds = [key for key, kind in EXPORTERS.items() if kind.writes_keys and suffix in kind.suffixes]
+    if not kinds or arguments.kind not in (None, *kinds) or arguments.gaps is not None:
+        return False
+    options = arguments.frames, arguments.frame, arguments.time, arguments.fps
+    if any(option is not None for option in options):
+        return False
+    moving = [actor for actor in scene.actors if actor.clip is not None]
+    return bool(moving) and all(has_own_animations(actor) for actor in moving)
 
 
 def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionOptions:

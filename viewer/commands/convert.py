@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 from viewer.commands._motion_export import (
@@ -11,6 +12,7 @@ from viewer.commands._motion_export import (
     check_kind,
     check_numbered,
     is_motion,
+    keeps_keys,
     left_out_notes,
     pose_or_point_actors,
     write_motions,
@@ -30,13 +32,14 @@ from viewer.commands._scene import (
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
-from viewer.export import EXPORTERS, export, files_written
+from viewer.export import EXPORTERS, export, export_clips, files_written
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
 from viewer.phrases import printable
+from viewer.rig.motion.own_animations import has_own_animations, own_animations
 from viewer.rig.motion.upright import upright_actor
-from viewer.rig.scene import Scene
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
@@ -75,6 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
+    if keeps_keys(arguments, output, scene):
+        write = _write_clips
     notes = write(arguments, scene, output, skinning)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
@@ -106,6 +111,31 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
 def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
+    """Write the current poses."""
+    return _write_actors(arguments, scene, output, lambda a, path: export(a, path, skinning))
+
+
+def _write_clips(
+    arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
+) -> list[Diagnostic]:
+    """Write figures at rest with their animations, or only with the one that was asked for."""
+    is_chosen = bool(arguments.animation)
+
+    def write(actor: Actor, path: Path) -> list[Diagnostic]:
+        if not has_own_animations(actor):
+            return export(actor, path, skinning)
+        return export_clips(actor, path, skinning, own_animations(actor, is_chosen))
+
+    return _write_actors(arguments, scene, output, write)
+
+
+def _write_actors(
+    arguments: argparse.Namespace,
+    scene: Scene,
+    output: Path,
+    write: Callable[[Actor, Path], list[Diagnostic]],
+) -> list[Diagnostic]:
+    """Write one file per actor that is present."""
     shown = pose_or_point_actors(scene)
     places = dict(zip(shown, motion_paths(output, shown), strict=True))
     actors = [actor for actor in shown if actor.is_present]
@@ -117,7 +147,7 @@ def _write_poses(
     with all_or_none(files):
         for actor in actors:
             with raising():
-                notes += export(upright_actor(scene, actor), places[actor], skinning)
+                notes += write(upright_actor(scene, actor), places[actor])
     away = [actor.name for actor in shown if not actor.is_present]
     notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
     return notes + left_out_notes(scene, shown)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +13,9 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._options import MotionOptions
 from viewer.rig.figure import Figure
+from viewer.rig.motion.own_animations import own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.smpl_family import member_of
@@ -24,6 +27,7 @@ __all__ = [
     "animation_for",
     "export",
     "export_animation",
+    "export_clips",
     "exporter_for",
     "files_written",
     "motion_exporters",
@@ -49,6 +53,9 @@ class Exporter:
         Whether its module has ``export_animation(animation, path, options)``.
     keeps_world : bool
         Whether it keeps the up axis of the motion's own world, even if that is upside down.
+    writes_keys : bool
+        Whether its module has ``export_clips(actor, path, skinning, clips)``, which writes all
+        animations of a figure with their own keys.
     """
 
     title: str
@@ -58,6 +65,7 @@ class Exporter:
     writes_pose: bool = True
     writes_motion: bool = False
     keeps_world: bool = False
+    writes_keys: bool = False
 
 
 EXPORTERS = {
@@ -107,6 +115,7 @@ EXPORTERS = {
         "mesh, weights, materials, shapes, motion",
         "limits of joints, pose correctives",
         writes_motion=True,
+        writes_keys=True,
     ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
@@ -186,6 +195,45 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning())
     if actor.hidden_parts:
         notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
+    return notes
+
+
+def export_clips(
+    actor: Actor,
+    path: str | Path,
+    skinning: Skinning | None = None,
+    clips: Sequence[TransformClip] | None = None,
+) -> list[Diagnostic]:
+    """Write a figure at rest, with animations that keep their own keys.
+
+    Parameters
+    ----------
+    actor : Actor
+        See ``viewer.rig.motion.own_animations.has_own_animations``.
+    path : str or Path
+        As for ``export``; a format that ``writes_keys``.
+    skinning : Skinning, optional
+        Skinning method and options.
+    clips : sequence of TransformClip, optional
+        All of the actor's animations if omitted.
+
+    Returns
+    -------
+    list of Diagnostic
+        As for ``export``.
+
+    Raises
+    ------
+    UnsupportedFormatError
+        If no exporter writes this suffix.
+    RigError
+        If the figure lacks the data that the format needs, or the keys are invalid.
+    OutputError
+        If a file cannot be written.
+    """
+    module = import_module(f"{__name__}.{exporter_for(path)}")
+    chosen = own_animations(actor) if clips is None else clips
+    notes: list[Diagnostic] = module.export_clips(actor, Path(path), skinning or Skinning(), chosen)
     return notes
 
 

@@ -7,60 +7,109 @@ it if it is in another unit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
-from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.body import Body, Built, add_body, body_of
+from viewer.export._gltf.clip_losses import clip_losses, shape_rows, shown_weights
+from viewer.export._gltf.document import Document
+from viewer.export._gltf.keyed import add_clips, first_time
 from viewer.export._gltf.losses import Written, gltf_losses, not_held
-from viewer.export._gltf.materials import Color, material_losses
-from viewer.export._gltf.mesh import add_meshes
+from viewer.export._gltf.materials import material_losses
 from viewer.export._gltf.motion import add_animation, moving, still_locals
-from viewer.export._gltf.nodes import Locals, Tree, add_nodes, locals_of
+from viewer.export._gltf.nodes import locals_of
 from viewer.export._gltf.reading import parsed
-from viewer.export._gltf.shape import Shape, shape_of
-from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
+from viewer.export._gltf.shape import shape_of
 from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
-from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
+from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.single_frame import pose_frames
-from viewer.rig.pose import Pose
+from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
-from viewer.rig.skinning import Skinning, skin_used
+from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["export", "export_animation"]
+__all__ = ["export", "export_animation", "export_clips"]
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write a figure in its current pose; see ``viewer.export.export``."""
     figure, pose = actor.figure, actor.pose
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
-    body = _body_of(figure, shape_of(figure, weights), skinning)
+    body = body_of(figure, shape_of(figure, weights), skinning)
     skeleton, still = body.shape.figure.skeleton, None
     if skeleton is not None and pose is not None:
         still = locals_of(skeleton, pose)
     document = Document(figure.name)
-    built = _add_body(document, body, figure.up, pose, still, actor.color)
+    built = add_body(document, body, figure.up, pose, still, actor.color)
     (data,) = _files([(path, document)])
     written = {"counts": built.counts, "size": len(data[path])}
     notes = [Diagnostic("X001.gltf", path, values=written)]
     notes += _beside(data, path) + _remarks(body, figure.up)
-    file = Written(path, parsed([*data.values()]), built.tree, built.mesh_nodes)
+    file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
     figure, frames = pose_frames(figure, pose)
     rows = np.zeros(1, dtype=np.intp)
     notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
     return notes + not_held(figure, body.shape)
+
+
+def export_clips(
+    actor: Actor, path: Path, skinning: Skinning, clips: Sequence[TransformClip]
+) -> list[Diagnostic]:
+    """Write a figure at rest with animations, which keep their keys and interpolation.
+
+    Parameters
+    ----------
+    actor : Actor
+        Provides the figure, its shape and its placement.
+    path : Path
+        The file.
+    skinning : Skinning
+        Selects influences; the reference for the measured error.
+    clips : sequence of TransformClip
+        Motions of the figure, see ``own_animations``.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes: the written files, then the largest error over all animations.
+
+    Raises
+    ------
+    RigError
+        If numbers do not fit single precision.
+    OutputError
+        If a file cannot be written.
+    """
+    figure, pose = actor.figure, still_pose(actor)
+    weights = shape_rows(clips, shown_weights(figure, pose.shape_weights))
+    shape = shape_of(figure, weights)
+    body = body_of(figure, replace(shape, weights=shape.weights[:1]), skinning)
+    document = Document(figure.name)
+    locals_ = locals_of(body.figure.require_skeleton(), pose)
+    built = add_body(document, body, figure.up, pose, locals_, actor.color)
+    kept = add_clips(document, clips, built.tree, built.meshes, shape.targets, weights[0])
+    (data,) = _files([(path, document)])
+    written = {"counts": built.counts, "n": len(kept), "size": len(data[path])}
+    notes = [Diagnostic("X001.gltf-animations", path, values=written)]
+    notes += _beside(data, path) + _remarks(body, figure.up)
+    file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
+    notes += clip_losses(file, figure, pose, kept, skinning, body)
+    early = [clip.name for clip in kept if first_time(clip) < 0.0]
+    if early:
+        notes.append(Diagnostic("X005.negative-times", values={"names": early, "n": len(early)}))
+    return notes + not_held(figure, shape)
 
 
 def export_animation(
@@ -96,7 +145,7 @@ def export_animation(
     frames = filled(animation.frames, options.closing == "interpolate")
     reference = int(present.argmax())
     shape = shape_of(animation.figure, frames.shape_weights, reference)
-    body = _body_of(animation.figure, shape, options.skinning)
+    body = body_of(animation.figure, shape, options.skinning)
     spans = [(0, frames.n_frames)]
     if options.closing == "split" and not present.all():
         spans = runs(present)
@@ -118,7 +167,7 @@ def export_animation(
             "size": len(data[file]),
         }
         notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
-        written = Written(file, parsed([*data.values()]), made.tree, made.mesh_nodes, start)
+        written = Written(file, parsed([*data.values()]), made.tree, made.meshes, start)
         rows = start + np.flatnonzero(present[start:stop])
         lost += gltf_losses(
             written,
@@ -150,82 +199,14 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
         raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Body:
-    """Data shared by all files of an export."""
-
-    shape: Shape
-    influences: Influences | None  # None if the mesh is not skinned
-
-    @property
-    def figure(self) -> Figure:
-        """The figure as written."""
-        return self.shape.figure
-
-
-@dataclass(frozen=True, slots=True)
-class _Built:
-    """Indices and summary of one file's contents."""
-
-    tree: Tree
-    mesh_nodes: list[int]
-    counts: list[Phrase]
-
-
-def _body_of(figure: Figure, shape: Shape, skinning: Skinning) -> _Body:
-    if figure.mesh is None and figure.skeleton is None:
-        raise RigError(f"figure {figure.name} has neither mesh nor skeleton to write as glTF")
-    if not figure.is_attached or figure.skin is None:
-        return _Body(shape, None)
-    return _Body(shape, influences_of(skin_used(figure.skin, skinning)))
-
-
-def _add_body(
-    document: Document,
-    body: _Body,
-    up: str,
-    pose: Pose | None,
-    still: Locals | None,
-    color: Color | None = None,
-) -> _Built:
-    """Add nodes, mesh and skin of a figure; return their indices and counts."""
-    figure, influences = body.figure, body.influences
-    fixes = influences is not None and influences.n_fixed > 0
-    tree = add_nodes(document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes)
-    scene, counts, nodes = [tree.root], list[Phrase](), list[int]()
-    if figure.mesh is not None and figure.mesh.n_vertices:
-        written = add_meshes(document, figure.name, body.shape, influences, color)
-        bound: dict[str, Any] = {}
-        if influences is not None and figure.skin is not None:
-            matrices = inverse_bind_matrices(influences, figure.skin.inverse_bind)
-            stored = document.array(matrices, "MAT4")
-            joints = tree.joints + tree.fixed
-            skin = {"name": text_of(figure.name), "joints": joints, "inverseBindMatrices": stored}
-            bound["skin"] = document.add("skins", skin)
-        for name, mesh in zip(written.names, written.meshes, strict=True):
-            nodes.append(document.add("nodes", {"name": name, "mesh": mesh, **bound}))
-        if bound:
-            scene += nodes  # glTF ignores the transform of a skinned mesh's own node
-        else:
-            document.root["nodes"][tree.place].setdefault("children", []).extend(nodes)
-        before = figure.mesh.n_vertices
-        key = "written-vertices" if written.n_vertices == before else "split-vertices"
-        counts = [Phrase(key, n=written.n_vertices, before=before)]
-        counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
-    if figure.skeleton is not None:
-        counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
-    document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return _Built(tree, nodes, counts)
-
-
 def _add_animation(
     document: Document,
     animation: SampledAnimation,
-    body: _Body,
+    body: Body,
     frames: Frames,
     span: tuple[int, int],
     up: str,
-) -> _Built:
+) -> Built:
     """Add a figure at rest, and a range of frames as an animation."""
     skeleton = body.figure.require_skeleton()
     part = frames_between(frames, slice(*span))
@@ -237,12 +218,16 @@ def _add_animation(
     if len(weights) > 1:
         weights = weights[slice(*span)]
         body = replace(body, shape=replace(body.shape, weights=weights))
-    built = _add_body(document, body, up, pose, still_locals(skeleton, rest, part))
-    morph = None
-    if built.mesh_nodes and np.ptp(weights, axis=0).any():
-        morph = built.mesh_nodes, weights
+    is_still = not np.ptp(part.figure_translations, axis=0).any() and not np.ptp(part.figure_scales)
+    locals_ = still_locals(skeleton, rest, part)
+    built = add_body(document, body, up, pose, locals_, is_still=is_still)
+    morphs = [
+        (placed.node, own)
+        for placed in built.meshes
+        if np.ptp(own := weights[:, placed.part.targets], axis=0).any()
+    ]
     name = animation.motion.name or animation.name
-    add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morph)
+    add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morphs)
     return built
 
 
@@ -270,7 +255,7 @@ def _beside(data: dict[Path, bytes], path: Path) -> list[Diagnostic]:
     ]
 
 
-def _remarks(body: _Body, up: str) -> list[Diagnostic]:
+def _remarks(body: Body, up: str) -> list[Diagnostic]:
     """Return notes about coordinate space and shape for users of the file."""
     figure, notes = body.figure, list[Diagnostic]()
     if up == "z":
@@ -299,7 +284,7 @@ def _remarks(body: _Body, up: str) -> list[Diagnostic]:
 
 
 def _motion_remarks(
-    animation: SampledAnimation, body: _Body, frames: Frames, options: MotionOptions
+    animation: SampledAnimation, body: Body, frames: Frames, options: MotionOptions
 ) -> list[Diagnostic]:
     """Return notes about gaps, and about joints with translations."""
     skeleton = animation.figure.require_skeleton()

@@ -143,7 +143,7 @@ FORMATS = {
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
     "gltf": Format(
         "glTF 2.0, VRM",
-        (".glb", ".gltf", ".vrm"),
+        (".glb", ".gltf", ".vrm", ".vrma"),
         rb"\AglTF|\A\{(?s:.*?)\"asset\"\s*:\s*\{",
         writes=False,
     ),

@@ -75,6 +75,7 @@ class Source:
         self._data = None if data is None else _without_marks(data)
         self._counted = (0, 1)  # an offset with a known line, and that line
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
+        self._pointers: dict[int, tuple[object, Callable[[str, int], str]]] = {}
 
     @classmethod
     def open(
@@ -256,6 +257,8 @@ class Source:
     def remember(self, kind: str, offset_of: Callable[[int], int]) -> None:
         """Register a function that finds the offset of the index-th element of a kind.
 
+        Readers of JSON register pointers instead, with ``remember_pointers``.
+
         Parameters
         ----------
         kind : str
@@ -265,6 +268,23 @@ class Source:
             Called on demand; may be slow.
         """
         self._offsets[kind] = self, offset_of
+
+    def remember_pointers(self, skeleton: object, pointer_of: Callable[[str, int], str]) -> None:
+        """Register a function that returns JSON pointers of elements of one figure.
+
+        Parameters
+        ----------
+        skeleton : Skeleton
+            Identifies the figure, as a file may have several.
+        pointer_of : callable
+            Takes a kind as of ``remember``, and an index; empty if there is no such element.
+        """
+        self._pointers[id(skeleton)] = skeleton, pointer_of
+
+    def pointer_of(self, skeleton: object, kind: str, index: int) -> str:
+        """Return the JSON pointer of an element of a figure; empty if none is registered."""
+        known = self._pointers.get(id(skeleton))
+        return "" if known is None else known[1](kind, index)
 
     def offset_of(self, kind: str, index: int) -> int:
         """Return the offset of an element of a registered kind; slow, for errors only."""

@@ -42,8 +42,8 @@ __all__ = [
     "worst_first",
 ]
 
-CODES = {name: code for name, code in ALL_CODES.items() if name[0] in "FWBSMYC"}
-"""By code: files, weights, bindings, skeletons, meshes, symmetry and clips; see ``diagnostics``."""
+CODES = {name: code for name, code in ALL_CODES.items() if name[0] in "FGWBSMYC"}
+"""By code: files, glTF files, weights, bindings, skeletons, meshes, symmetry and clips."""
 
 
 def lint_files(

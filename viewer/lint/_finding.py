@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.lint._counting import Counting
 from viewer.lint._track import Track
+from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scalars import length_text
@@ -129,6 +130,11 @@ class Finding:
         return self.diagnostic.line
 
     @property
+    def pointer(self) -> str:
+        """JSON pointer to the element of ``file``; empty if there is none."""
+        return self.diagnostic.pointer
+
+    @property
     def title(self) -> str:
         """Title of the code."""
         return CODES[self.code].title
@@ -139,12 +145,40 @@ class Finding:
         code = CODES[self.code]
         return code.other_hint if code.other_hint and self.line is None else code.hint
 
-    def located(self, file: Path | None, line: int | None = None, severity: str = "") -> Finding:
+    def located(
+        self,
+        file: Path | None,
+        line: int | None = None,
+        severity: str = "",
+        pointer: str | None = None,
+    ) -> Finding:
         """Return the finding with a new location in the files, and a severity if one is given."""
+        known = self.diagnostic
         found = replace(
-            self.diagnostic, path=file, line=line, level=severity or self.diagnostic.level
+            known,
+            path=file,
+            line=line,
+            level=severity or known.level,
+            pointer=known.pointer if pointer is None else pointer,
         )
         return replace(self, diagnostic=found)
+
+    def place(self, longest: int = 300, is_short: bool = False) -> str:
+        """Return ``file:line`` or ``file#pointer``, or the known part of it.
+
+        Parameters
+        ----------
+        longest : int
+            Maximum length of the file's path.
+        is_short : bool
+            Whether the folder is omitted.
+        """
+        if self.file is None or self.file == Path():
+            return ""
+        path = printable(self.file.name if is_short else self.file, longest)
+        if self.pointer:
+            return f"{path}#{printable(self.pointer, 120)}"
+        return path if self.line is None else f"{path}:{self.line}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

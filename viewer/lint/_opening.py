@@ -274,7 +274,8 @@ def with_files(
         # locations.
         severity = max(remark.severity, placed[twin].severity, key=SEVERITIES.index)
         line = remark.line if placed[twin].at is None else None
-        placed[twin] = placed[twin].located(placed[twin].file, line, severity)
+        file, pointer = placed[twin].file, remark.pointer or None
+        placed[twin] = placed[twin].located(file, line, severity, pointer)
     return remarks + [_with_line(finding, opened) for finding in placed]
 
 
@@ -301,8 +302,21 @@ def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Findi
     owner = None if finding.actor is None else owners[finding.actor].get(finding.part or "mesh")
     if owner is None:
         return finding
-    paths = _files_of(opened.scene.actors[owner], finding.part, opened.contents)
-    return finding.located(paths[0], finding.line) if paths else finding
+    actor = opened.scene.actors[owner]
+    paths = _files_of(actor, finding.part, opened.contents)
+    if not paths:
+        return finding
+    pointer = _pointer(finding, actor, opened.sources[paths[0]])
+    return finding.located(paths[0], finding.line, pointer=pointer)
+
+
+def _pointer(finding: Finding, actor: Actor, source: Source) -> str | None:
+    """Return the JSON pointer to the first item of a finding, if the reader recorded it."""
+    if finding.part == "clip":
+        return next((one.place for one in actor.figure.animations if one.plays(actor.clip)), None)
+    if finding.at is None:
+        return None
+    return source.pointer_of(actor.figure.skeleton, *finding.at)
 
 
 def _aimed(opened: Opened, scene: Scene, owners: Sequence[Owners]) -> list[Finding]:
@@ -330,6 +344,11 @@ def _files_of(actor: Actor, part: str, contents: Contents) -> list[Path]:
     if part == "clip":
         # Motions become separate clips, except for keyed ones, which are kept as read.
         paths = [path for path, clip in contents.clips if clip is actor.clip]
+        paths += [
+            path
+            for path, figure in contents.figures
+            if any(animation.plays(actor.clip) for animation in figure.animations)
+        ]
         moving = [*contents.body_motions, *contents.skeleton_motions, *contents.captures]
         return paths + ([moving[0][0]] if len(moving) == 1 and not paths else [])
     if part == "skeleton" and skeleton is not None:

@@ -31,8 +31,7 @@ def finding_text(finding: Finding) -> str:
     """
     place, who = "", ""
     if finding.file is not None and finding.file != Path():
-        place = printable(finding.file, 300)
-        place += f":{finding.line}" if finding.line is not None else ""
+        place = finding.place()
         # A folder's figure has the folder's name, whereas its findings name the file inside.
         folders = finding.file.parent.name, folder_name(finding.file.parent)
         known = (finding.file.stem, finding.file.name, *folders, "")
@@ -86,6 +85,7 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
         "hint": finding.hint,
         "file": printable(finding.file, 1000) if has_file else None,
         "line": finding.line,
+        "pointer": finding.pointer,
         "actor": finding.actor,
         "name": printable(finding.name),
         **_data(finding.diagnostic),

@@ -12,6 +12,7 @@ from viewer.lint._soles import soles_of
 from viewer.lint._track import Track
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
+from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (
@@ -29,6 +30,7 @@ __all__ = ["frame_numbers", "key_times", "track_of"]
 
 _TOGETHER = 1000  # frames per batch, whose matrices are in memory together
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
+_PROP = 0.1  # size of a skeleton relative to its mesh, below which the mesh determines the size
 _ON_STEP = 1e-6  # fraction of a step
 
 
@@ -76,11 +78,17 @@ def _track(subject: Subject) -> Track | None:
         present=frames.present & _known(subject, clip, count),
         positions=placed,
         rotations=frames.rotations,
-        size=scale * box_size(bounding_box(rest_joints(figure))),
+        size=scale * _size(subject, figure),
         scale=scale,
         feet=feet,
         soles=lowest,
     )
+
+
+def _size(subject: Subject, figure: Figure) -> float:
+    """Return the size of the skeleton, or of the mesh if that is much larger: a prop on a joint."""
+    joints, mesh = box_size(bounding_box(rest_joints(figure))), subject.size()
+    return joints if joints > _PROP * mesh else mesh
 
 
 def key_times(subject: Subject, clip: Clip | TransformClip) -> Floats:

@@ -133,6 +133,8 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
 def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     limit = subject.options.max_speed
     limit = _SIZES * track.size if limit is None else limit * track.scale
+    if limit == 0.0:  # a single joint without a mesh has no size
+        return []
     speeds = np.zeros((len(track.times), skeleton.n_joints))
     steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=2)
     speeds[1:] = steps / np.diff(track.times)[:, None]

@@ -44,8 +44,9 @@ def load(
     Parameters
     ----------
     *paths : str or Path
-        ``.skel``, ``.skin``, ``.anim``, ``.bvh``, ``.glb``, ``.gltf``, ``.vrm``, body models, PIG
-        folders, AMASS files, EasyMocap folders, poses and images, in any order.
+        ``.skel``, ``.skin``, ``.anim``, ``.bvh``, ``.glb``, ``.gltf``, ``.vrm``, ``.vrma``,
+        ``.fbx``, body models, PIG folders, AMASS files, EasyMocap folders, poses and images, in
+        any order.
     max_size : int
         Larger files, in bytes, are rejected before they are read.
     motion : MotionSettings, optional

@@ -17,6 +17,7 @@ from viewer.loading.placing import place_side_by_side, placed_views, stand_up
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import first_person_parts
 from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
@@ -73,7 +74,12 @@ def begin(
         figure = _join([figures[index] for index in pair])
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
         origin = figures[pair[-1]][0]
-        actor = Actor(figure, called=cast.free_title(called), origin=origin)
+        actor = Actor(
+            figure,
+            called=cast.free_title(called),
+            origin=origin,
+            hidden_parts=first_person_parts(figure.mesh),
+        )
         cast.add(actor, figure.up, placed=False, group=group_of.get(figure))
     _give_morphs(contents, cast)
     _move(contents, cast, settings or MotionSettings())
@@ -157,7 +163,7 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
                     figure = on_one_joint(figure)
                     cast.note("F007.only-morphs", figure=figure.name)
                 figure = with_morphs(figure, [target])
-                actors[index] = Actor(figure, called=actor.called, origin=actor.origin)
+                actors[index] = replace(actor, figure=figure, pose=None)
                 break
             except RigError as refused:
                 problem = problem or refused

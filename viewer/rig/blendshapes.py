@@ -71,6 +71,10 @@ class BlendShapes:
         """Number of vertices, V."""
         return self.offsets.shape[1]
 
+    def is_expression(self, row: int) -> bool:
+        """Return whether a blend shape is a combination of others, governed by ``rules``."""
+        return self.rules is not None and bool((self.rules.rows == row).any())
+
     def displacement(self, weights: Floats) -> Floats:
         """Return sum_s w_s d_s.
 

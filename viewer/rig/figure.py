@@ -12,6 +12,7 @@ from viewer.errors import RigError
 from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
+from viewer.rig.file_record import FileRecord
 from viewer.rig.hands import Hand
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
@@ -76,6 +77,8 @@ class Figure:
         Findings of the reader for ``viewer info``, each a heading and a text.
     animations : tuple of Animation
         Motions from the figure's own file, in file order.
+    record : FileRecord or None
+        What its file of nodes states besides, to be written back.
     """
 
     name: str
@@ -97,6 +100,7 @@ class Figure:
     fields: tuple[VertexField, ...] = ()
     facts: tuple[tuple[str, str | Diagnostic], ...] = ()
     animations: tuple[Animation, ...] = ()
+    record: FileRecord | None = None
 
     def __post_init__(self) -> None:
         if self.mesh is None and self.skeleton is None and self.points is None:

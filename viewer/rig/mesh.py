@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from viewer.rig.material import Material
 
 __all__ = [
     "Mesh",
+    "PartView",
     "bounding_box",
     "box_size",
+    "first_person_parts",
     "split_seams",
     "triangle_areas",
     "vertex_normals",
@@ -23,6 +26,12 @@ __all__ = [
     "volume",
     "without_seams",
 ]
+
+PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person"]
+"""Whether a part is drawn from outside, from the character's own eyes, or in both views.
+
+``"auto"`` parts are drawn from outside; from the eyes, without what moves with the head.
+"""
 
 _ROW = 64  # points per row of a reduction, see bounding_box
 
@@ -54,6 +63,8 @@ class Mesh:
         Names of the parts that can be hidden; may repeat or be empty.
     triangle_parts : (T,) int32
         Index into ``parts``, -1 for none.
+    part_views : tuple of P PartView
+        The views for which the parts are meant; empty if all are for both.
     """
 
     positions: Floats
@@ -67,6 +78,7 @@ class Mesh:
     colors: Floats | None = None
     parts: tuple[str, ...] = ()
     triangle_parts: Ints | None = None
+    part_views: tuple[PartView, ...] = ()
 
     def __post_init__(self) -> None:
         def put(name: str, values: object) -> None:
@@ -279,6 +291,7 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
         colors=None if mesh.colors is None else mesh.colors[sources],
         parts=mesh.parts,
         triangle_parts=mesh.triangle_parts,
+        part_views=mesh.part_views,
     ), sources
 
 
@@ -341,3 +354,9 @@ def _area_vectors(positions: Floats, triangles: Ints) -> Floats:
     """Return (b - a) x (c - a) of each triangle: along its normal, twice its area long."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return np.cross(b - a, c - a)
+
+
+def first_person_parts(mesh: Mesh | None) -> frozenset[int]:
+    """Return the parts that are not meant to be seen from outside, and therefore start hidden."""
+    views = () if mesh is None else mesh.part_views
+    return frozenset(part for part, view in enumerate(views) if view == "first-person")

@@ -45,9 +45,11 @@ def test_reset_of_a_joint_covers_translation_and_scale(unlocked):
     assert not pose.translations.any() and (pose.scales == 1.0).all()
 
 
-def test_animated_joints_are_listed(hand):
-    times = np.array([0.0, 1.0])
-    moved = TransformChannel(0, "translation", times, np.zeros((2, 3)))
+def test_joints_that_an_animation_moves_or_scales_are_listed(hand):
+    times, skeleton = np.array([0.0, 1.0]), hand.state.actor.figure.skeleton
+    rest = np.tile(skeleton.rest_translations[0], (2, 1))
+    moved = TransformChannel(0, "translation", times, np.add(rest, [[0, 0, 0], [0, 1, 0]]))
+    still = TransformChannel(1, "scale", times, np.tile(skeleton.rest_scales[1], (2, 1)))
     turned = TransformChannel(1, "rotation", times, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
-    hand.state.actor.clip = TransformClip("walk", (moved, turned), 0.0, 1.0)
+    hand.state.actor.clip = TransformClip("walk", (moved, still, turned), 0.0, 1.0)
     assert moved_joints(hand.state) == {0}

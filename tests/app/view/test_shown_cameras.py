@@ -10,7 +10,7 @@ from formats.filmed_capture import write_filmed
 @pytest.fixture
 def filmed(drive, tmp_path):
     """A driver with the Camera panel of a capture: one camera, grey images of 100 of 255."""
-    driver = drive(write_filmed(tmp_path / "take"), size=(1000, 900))
+    driver = drive(write_filmed(tmp_path / "take"), size=(1000, 900), pixels_per_point=1.0)
     driver.state.options.grid = False
     driver.state.options.background = "white"
     driver.show_panel("Camera")

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-from formats.gltf.files import skinned
-from formats.gltf.planted import PLANTED
+from formats.gltf.files import animated, skinned
+from formats.gltf.planted_gltf import PLANTED
 
 from viewer.lint import lint_files
 
@@ -35,3 +35,29 @@ def test_several_errors_are_found(tmp_path: Path) -> None:
     found = {(one.code, one.diagnostic.pointer) for one in lint_files([path])[1]}
     assert ("F002", "/nodes/1/children") in found
     assert ("F002", "/meshes/1/primitives/0/attributes/POSITION") in found
+
+
+def test_findings_of_checks_name_the_element(tmp_path: Path) -> None:
+    file = skinned()
+    file.root["nodes"][2]["name"] = "hip"
+    # The first joint of the skin, node 1, has no name; its rest pose is 2 m above its bind pose.
+    file.root["nodes"][1]["translation"] = [0, 2, 0]
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    found = {finding.code: finding for finding in lint_files([path])[1]}
+    assert found["S007"].place() == f"{path}#/nodes/1"
+    assert found["B004"].place() == f"{path}#/skins/0/joints/0"
+    assert found["M005"].place(is_short=True) == "a.gltf#/meshes/0/primitives/0/attributes/POSITION"
+
+
+def test_findings_about_motion_name_the_animation(tmp_path: Path) -> None:
+    # The node jumps by 1000 times the size of its mesh within a second.
+    file = animated("translation", [[0, 0, 0], [1000, 0, 0]])
+    file.mesh()
+    file.root["nodes"][0]["mesh"] = 0
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    (found,) = [finding for finding in lint_files([path])[1] if finding.code == "C003"]
+    assert found.place() == f"{path}#/animations/0"
+    # At 15 sizes per second, the diagonal of the triangle's box being the root of 2.
+    assert found.diagnostic.values["limit"] == "21.2 m/s"

@@ -166,9 +166,9 @@ def test_weights_are_divided_by_their_sum_and_the_deviation_is_reported():
     notes = source()
     (figure,) = figure_group(file, notes).figures
     found = {note.key: note.values for note in notes.diagnostics.warnings}
-    assert found["F007.weight-sums"]["n"] == 1
-    assert found["F007.weight-sums"]["most"] == pytest.approx(0.8)
-    assert found["F007.no-weights"]["n"] == 1
+    assert found["W001.divided"]["n"] == 1
+    assert found["W001.divided"]["most"] == pytest.approx(0.8)
+    assert found["W004.first-joint"]["n"] == 1
     # The last vertex follows the joint of its first slot.
     assert_allclose(figure.skin.weights, [0.5, 0.5, 1.0, 1.0])
     assert_array_equal(figure.skin.joints[-1], 2)

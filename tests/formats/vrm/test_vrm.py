@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from formats.gltf.files import File
 from numpy.testing import assert_allclose
 
@@ -100,6 +101,37 @@ def test_expressions_of_version_0_bind_meshes_in_percent(tmp_path: Path) -> None
     for weight, expected in ((0.4, 0.0), (0.6, 1.0)):
         found = shaped(figure, np.array([0.0, 0.0, weight])).require_mesh().positions - rest
         assert_allclose(found, np.tile([0.0, expected, 0.0], (3, 1)))
+
+
+@pytest.mark.parametrize("version", [0, 1])
+def test_parts_for_the_first_person_start_hidden(tmp_path: Path, version: int) -> None:
+    told = {} if version == 0 else _modern({})
+    note = {"mesh": 0, "firstPersonFlag": "FirstPersonOnly"}
+    if version == 1:
+        note = {"node": 6, "type": "firstPersonOnly"}
+    told["firstPerson"] = {"meshAnnotations": [note, {"node": 0, "mesh": 7, "type": "both"}]}
+    scene, figure = _loaded(_file(**{("VRM", "VRMC_vrm")[version]: told}), tmp_path)
+    mesh = figure.require_mesh()
+    assert (mesh.parts, mesh.part_views) == (("face",), ("first-person",))
+    assert scene.actors[0].hidden_parts == {0}
+    assert dict(figure.facts)["first person only"] == "face"
+    (found,) = scene.diagnostics
+    place = f"/extensions/{('VRM', 'VRMC_vrm')[version]}/firstPerson/meshAnnotations/1"
+    assert (found.key, found.pointer) == ("G006.first-person", place)
+
+
+@pytest.mark.parametrize(
+    "extension",
+    [
+        {"VRMC_springBone": {"springs": [{"joints": []}, {"joints": []}]}},
+        {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1]}, {"bones": [2]}]}}},
+    ],
+)
+def test_spring_chains_are_counted(tmp_path: Path, extension: dict[str, Any]) -> None:
+    scene, _ = _loaded(_file(**extension), tmp_path)
+    assert [(found.key, found.values["n"]) for found in scene.diagnostics] == [
+        ("F007.vrm-springs", 2)
+    ]
 
 
 def test_permissions_are_listed_in_the_facts(tmp_path: Path) -> None:

@@ -9,9 +9,11 @@ __all__ = ["isolate_part", "part_label", "set_part_shown", "show_all_parts"]
 
 
 def part_label(actor: Actor, part: int) -> str:
-    """Return the name of a part; its number if it has none."""
-    names = actor.figure.require_mesh().parts
-    return names[part] or f"part {part}"
+    """Return the name of a part, or its number, and the view if it is meant for one only."""
+    mesh = actor.figure.require_mesh()
+    view = mesh.part_views[part] if mesh.part_views else "both"
+    note = f" ({view.replace('-', ' ')} only)" if view.endswith("person") else ""
+    return (mesh.parts[part] or f"part {part}") + note
 
 
 def set_part_shown(actor: Actor, part: int, shown: bool) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 from imgui_bundle import imgui
 
@@ -187,11 +186,8 @@ def is_known_there(state: AppState, finding: Finding) -> bool:
 
 
 def file_place(finding: Finding) -> str:
-    """Return path and line of a finding as ``path:line``; empty if it is not about a file."""
-    if finding.file is None or finding.file == Path():
-        return ""
-    line = "" if finding.line is None else f":{finding.line}"
-    return f"{printable(finding.file, 300)}{line}"
+    """Return ``path:line`` or ``path#pointer`` of a finding; empty if it is not about a file."""
+    return finding.place()
 
 
 def copy_place(state: AppState, finding: Finding) -> None:

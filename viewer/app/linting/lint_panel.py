@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
@@ -209,11 +208,8 @@ def _searched_text(finding: Finding) -> str:
 
 
 def _place(finding: Finding) -> str:
-    """Return the file's name and the line; empty if there is none."""
-    if finding.file is None or finding.file == Path():
-        return ""
-    line = "" if finding.line is None else f":{finding.line}"
-    return f"{printable(finding.file.name, 60)}{line}"
+    """Return the file's name, and the line or the JSON pointer; empty if there is none."""
+    return finding.place(60, is_short=True)
 
 
 def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> None:
@@ -272,6 +268,8 @@ def _click_text(state: AppState, finding: Finding) -> str:
     if not file_place(finding):
         return "this finding has no location in the view"
     copied = "its path" if finding.line is None else "its path and line"
+    if finding.pointer:
+        copied = "its path and JSON pointer"
     return f"this finding is about the file, not the figure shown: click to copy {copied}"
 
 

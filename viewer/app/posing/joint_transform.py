@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import drag_float, in_row
@@ -15,6 +16,7 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
+from viewer.rig.skeleton import Skeleton
 
 __all__ = [
     "draw_scale",
@@ -26,6 +28,7 @@ __all__ = [
 
 _LABEL_WIDTH = 4.2  # in font sizes
 _LARGEST = 1e9
+_NOTICEABLE = 1e-4  # of the longest bone, and of a scale of 1; below it are rounding errors
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
 
 
@@ -61,14 +64,28 @@ def moved_joints(state: AppState) -> frozenset[int]:
     clip = state.actor.clip
     if not isinstance(clip, TransformClip):
         return unlocked_joints(state)
-    animated = _animated.get(clip, None, lambda: _animated_joints(clip))
+    skeleton = state.actor.figure.require_skeleton()
+    animated = _animated.get(clip, skeleton, lambda: _animated_joints(clip, skeleton))
     return unlocked_joints(state) | animated
 
 
-def _animated_joints(clip: TransformClip) -> frozenset[int]:
-    """Return the joints that a clip translates or scales."""
-    moves = "translation", "scale"
-    return frozenset(channel.joint for channel in clip.channels if channel.path in moves)
+def _animated_joints(clip: TransformClip, skeleton: Skeleton) -> frozenset[int]:
+    """Return the joints that a clip translates or scales noticeably away from rest.
+
+    Many exporters write channels for every joint, most of them without any effect.
+    """
+    bones = np.linalg.norm(skeleton.rest_translations, axis=1)
+    rests = {
+        "translation": (skeleton.rest_translations, _NOTICEABLE * float(bones.max())),
+        "scale": (skeleton.rest_scales, _NOTICEABLE),
+    }
+    return frozenset(
+        channel.joint
+        for channel in clip.channels
+        if channel.path in rests
+        and np.abs(channel.values - rests[channel.path][0][channel.joint]).max()
+        > rests[channel.path][1]
+    )
 
 
 def draw_translation(state: AppState, pose: Pose, joint: int, label: str) -> None:

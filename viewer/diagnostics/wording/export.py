@@ -23,6 +23,8 @@ MESSAGES = {
     "channels {order}",
     "X001.gltf": "{counts:all}, {size} bytes",
     "X001.gltf-motion": "{counts:all}, {frames} at {rate:g} fps, {size} bytes",
+    "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
+    "bytes",
     "X001.gltf-arrays": "array data, {size} bytes",
     "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
     "X001.texture": "its texture",
@@ -52,6 +54,8 @@ MESSAGES = {
     f"{_LIMITS}",
     "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
     "to {length}{extent:+ ({})}",
+    "X002.animations": "largest difference of {vertices} over {n:#animation}: {length}{place:+ "
+    "({})}, compared at {times} times{causes:+: {}}",
     # Omitted data
     "X005.hidden-parts": "{n:#hidden part|is|are} written, too",
     "X003.parts": "not stored in {format}: {parts:all}",
@@ -103,6 +107,8 @@ MESSAGES = {
     "written with {first:g}",
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-baked": "the shape is baked into mesh and joints",
+    "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
+    "{n:?is|are} delayed to begin at 0: {names:list8}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
     "X005.influences": _INFLUENCES,
@@ -145,9 +151,11 @@ PHRASES = {
     "the-original-pose": "the pose",
     "motion-between-frames": "the motion between frames",
     "mesh-vertices": "vertices",
+    "joint-positions": "joints",
     "driven-vertices": "vertices of a skin driven by it",
     "farthest-joint": "up to {length} ({joint:name})",
     "farthest-joint-in-frame": "up to {length} ({joint:name}, frame {frame})",
+    "animation-time": "{name:text} at {time:zg} s",
     "farthest-vertex": "up to {length} (vertex {vertex})",
     "farthest-vertex-in-frame": "up to {length} (vertex {vertex}, frame {frame})",
     "compared-frames": "vertices compared in {n} of {all} frames",
@@ -164,6 +172,8 @@ PHRASES = {
     "single-precision": "the mesh is far from its origin for glTF's single precision",
     # Parts of a figure
     "part-blend-shapes": "{n:#blend shape}",
+    "part-expressions": "{n:#expression} (combinations of morph targets, as in VRM)",
+    "part-humanoid": "the humanoid bone map",
     "part-baked-shapes": "{n:#blend shape} (baked into the mesh)",
     "part-current-shape": "{n:#blend shape} (the current shape is kept)",
     "part-correctives": "pose correctives",

@@ -20,6 +20,15 @@ MESSAGES = {
     "G006.constraint": "invalid constraint ignored: expected {expected}",
     "F002.constraint-cycle": "expected constraints without cycles, found a cycle of "
     "nodes {nodes:list12}",
+    "G006.first-person": "expected a mesh and auto, both, thirdPersonOnly or firstPersonOnly, "
+    "found {found:quoted}: ignored",
+    "F002.vrma-bones": "expected nodes of human bones, found none",
+    "F002.vrma-animation": "expected an animation of human bones, found none",
+    "F002.vrma-long": "expected at most {most} frames, found {found}",
+    "F007.vrma-animations": "{n:#further animation} ignored: a motion file plays its first",
+    "F007.vrma-look": "the direction of the eyes is not shown",
+    "F007.expressions-unmatched": "no such expression on the figure: {names:list12}",
+    "F007.vrm-springs": "{n:#spring chain} not simulated: hair and clothes follow their joints",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",

@@ -5,12 +5,12 @@ MESSAGES = {
     "F002.many-vertices": "expected at most {most} vertices, found {found} over all nodes",
     "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
     "vertex} along the edges",
-    "F007.no-weights": "{n:#vertex} without weights: attached to the first listed joint",
+    "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
     "F007.skinning-method": "skins {names:list} require another skinning method: select it "
     "with --method {method}",
     "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
-    "F007.weight-sums": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "
+    "W001.divided": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "
     "by their sum",
 }
 

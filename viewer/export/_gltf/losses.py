@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._gltf.nodes import Tree
-from viewer.export._gltf.reading import GltfFile, read_back
+from viewer.export._gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import PER_SET, Influences
 from viewer.export._left_out import extra_parts, not_held_note
@@ -17,7 +18,6 @@ from viewer.export._losses.apart import apart, apart_notes, extent_of, negligibl
 from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figure_side
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import split_seams
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import METHODS, Skinning
@@ -35,17 +35,25 @@ class Written:
         Its parsed contents.
     tree : Tree
         Indices of the nodes.
-    mesh_nodes : list of int
-        Indices of the nodes of the meshes, which share their vertices.
+    meshes : list of Placed
+        Its meshes.
     start : int
         Frame of the figure that comes first in the file.
+    keys : dict, optional
+        Animated values of each frame; by default, the file's keys, one per frame.
     """
 
     path: Path
     file: GltfFile
     tree: Tree
-    mesh_nodes: list[int]
+    meshes: list[Placed]
     start: int = 0
+    keys: Keys | None = None
+
+    @property
+    def sources(self) -> Ints:
+        """The figure's vertex that each vertex of the file is a copy of."""
+        return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
 def gltf_losses(
@@ -68,29 +76,37 @@ def gltf_losses(
     ``shape``, ``influences``: the written shape and skin.
     ``first_frame``: number of the first frame; None for a single pose.
     """
+    expected, read = sides(written, figure, frames, how, shape)
+    sources = written.sources if written.meshes else None
+    least = negligible(figure, frames, rows)
+    found = apart(expected, read(None), rows, least)
+    causes = []
+    if found.vertices is not None:
+        causes = causes_of(figure, frames, rows, how, shape, influences, least)
+    notes = apart_notes(written.path, figure, found, first_frame, sources)
+    notes = with_values(notes, causes=causes)
+    return notes + first_set_note(expected, read, figure, rows, least, influences)
+
+
+def sides(
+    written: Written, figure: Figure, frames: Frames, how: Skinning, shape: Shape
+) -> tuple[Side, Callable[[int | None], Side]]:
+    """Return a posed figure, and a function that returns the file, as comparable sides.
+
+    Parameters as for ``gltf_losses``; the function takes a number of influence sets, None for all.
+    """
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
     columns = changing(frames, still)
     expected = figure_side(figure, frames, how, still)
-    sources = None
-    node = written.mesh_nodes[0] if written.mesh_nodes else None
-    if figure.mesh is not None and node is not None:
-        sources = split_seams(figure.mesh)[0]
-        expected = _split(expected, sources)
+    if written.meshes:
+        expected = _split(expected, written.sources)
     else:
         expected = replace(expected, body=None, exact=None)
-    least = negligible(figure, frames, rows)
     targets = np.flatnonzero(np.isin(shape.targets, columns))
-    place = (written.file, written.tree, node, targets, written.start)
-    found = apart(expected, read_back(*place), rows, least)
-    causes = []
-    if found.vertices is not None:
-        causes = _causes(figure, frames, rows, how, shape, influences, least)
-    notes = apart_notes(written.path, figure, found, first_frame, sources)
-    notes = with_values(notes, causes=causes)
-    if influences is not None and influences.most > PER_SET and sources is not None:
-        notes += _first_set(expected, read_back(*place, 1), figure, rows, least, influences)
-    return notes
+    keys = frame_keys(written.file) if written.keys is None else written.keys
+    place = written.file, written.tree, written.meshes, shape.figure, targets, keys, written.start
+    return expected, lambda sets: read_back(*place, sets)
 
 
 def _split(side: Side, sources: Ints) -> Side:
@@ -103,11 +119,21 @@ def _split(side: Side, sources: Ints) -> Side:
     )
 
 
-def _first_set(
-    expected: Side, cut: Side, figure: Figure, rows: Rows, least: float, influences: Influences
+def first_set_note(
+    expected: Side,
+    read: Callable[[int | None], Side],
+    figure: Figure,
+    rows: Rows,
+    least: float,
+    influences: Influences | None,
 ) -> list[Diagnostic]:
-    """Return a note about the error in programs that read only four influences per vertex."""
-    found = apart(expected, cut, rows, least)
+    """Return a note about the error in programs that read only four influences per vertex.
+
+    Empty if no vertex has more. ``expected``, ``read``: from ``sides``.
+    """
+    if influences is None or influences.most <= PER_SET or expected.body is None:
+        return []
+    found = apart(expected, read(1), rows, least)
     most, worst = int(influences.most), found.vertices
     if worst is None:
         return [Diagnostic("X005.influences", values={"most": most})]
@@ -121,7 +147,7 @@ def _first_set(
     return [Diagnostic("X002.first-influences", values=values)]
 
 
-def _causes(
+def causes_of(
     figure: Figure,
     frames: Frames,
     rows: Rows,
@@ -157,12 +183,18 @@ def _weights_phrase(influences: Influences) -> Phrase:
 
 def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
     """Return a note that lists the parts of a figure that the file does not contain."""
-    unused = figure.n_shapes - len(shape.targets)
-    skeleton, lost = figure.skeleton, []
+    shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
+    rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())
+    mixed = 0 if shapes is None else sum(shapes.is_expression(row) for row in rows)
+    unused = len(rows) - mixed
     if shape.baked is not None:
         lost.append(Phrase("part-baked-shapes", n=figure.n_shapes))
     elif unused > 0:
         lost.append(Phrase("part-blend-shapes", n=unused))
+    if mixed and shape.baked is None:
+        lost.append(Phrase("part-expressions", n=mixed))
+    if skeleton is not None and skeleton.humanoid is not None:
+        lost.append(Phrase("part-humanoid"))
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
     lost += extra_parts(figure)

@@ -1,7 +1,4 @@
-"""Meshes in glTF form: one per part, with a primitive per material, and shared vertices.
-
-Vertices are split at seams. Every part has all morph targets of the figure.
-"""
+"""Meshes in glTF form: a primitive per material, vertices split at seams, morph targets."""
 
 from __future__ import annotations
 
@@ -12,83 +9,100 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.export._gltf.document import INDICES, VERTICES, Document, text_of
-from viewer.export._gltf.materials import Color, Materials
+from viewer.export._gltf.materials import Materials
+from viewer.export._gltf.parts import Part
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import Influences, influence_sets
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import Mesh, split_seams, vertex_normals
+from viewer.rig.mesh import Mesh, vertex_normals
 
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
 _NOT_UNIT = 1e-3  # tolerance of unit length; squares of normals may underflow or overflow
 
 
-@dataclass(frozen=True, slots=True)
-class WrittenMeshes:
-    """Indices and names of a figure's meshes, and their total number of vertices."""
-
-    meshes: list[int]
-    names: list[str]
-    n_vertices: int
-
-
-def add_meshes(
+def add_mesh(
     document: Document,
-    name: str,
+    materials: Materials,
+    part: Part,
     shape: Shape,
     influences: Influences | None,
-    color: Color | None = None,
-) -> WrittenMeshes:
-    """Add a figure's mesh: a mesh for each of its parts.
+) -> int:
+    """Add a part of a figure's mesh; return its index.
 
     ``document``: modified in place.
-    ``name``: name of the figure.
-    ``shape``: shape of a figure whose mesh is not empty.
+    ``materials``: writer of the figure's materials.
+    ``part``: part with at least one vertex.
+    ``shape``: shape of the figure.
     ``influences``: influences of the mesh; None if it is not skinned.
-    ``color`` (r, g, b): linear colour of untextured surfaces.
-    Returns the meshes; vertices on seams are duplicated.
     """
-    mesh = shape.figure.require_mesh()
-    sources, uv_indices, triangles = split_seams(mesh)
-    attributes = _attributes(document, mesh, sources, uv_indices)
-    for number, (joints, weights) in enumerate(
-        influence_sets(influences, sources) if influences is not None else ()
-    ):
-        attributes[f"JOINTS_{number}"] = document.array(joints, "VEC4", VERTICES)
-        attributes[f"WEIGHTS_{number}"] = document.array(weights, "VEC4", VERTICES)
-    common: dict[str, Any] = {}
+    mesh, surface = shape.figure.require_mesh(), _surface(part, shape)
+    attributes = _attributes(document, mesh, part, surface)
+    if part.joint < 0 and influences is not None:
+        for number, (joints, weights) in enumerate(influence_sets(influences, part.sources)):
+            attributes[f"JOINTS_{number}"] = document.array(joints, "VEC4", VERTICES)
+            attributes[f"WEIGHTS_{number}"] = document.array(weights, "VEC4", VERTICES)
+    item: dict[str, Any] = {"name": text_of(part.mesh_name)} if part.mesh_name else {}
     shared: dict[str, Any] = {"attributes": attributes}
+    record = shape.figure.record
+    extras = None if record is None else record.mesh_extras.get(part.index)
     shapes = shape.figure.blend_shapes
-    if shapes is not None and len(shape.targets):
-        shared["targets"] = _targets(document, mesh, shapes, shape.targets, sources)
-        common["weights"] = shape.weights[0].tolist()
-        common["extras"] = {"targetNames": [text_of(shapes.names[row]) for row in shape.targets]}
-    materials = Materials(document, mesh, color)
-    meshes, names = [], []
-    for part in np.unique(mesh.part_indices).tolist() or [-1]:
-        title = mesh.parts[part] if part >= 0 else ""
-        names.append(text_of(title or f"{name} mesh"))
-        chosen = mesh.part_indices == part
-        primitives = _primitives(document, materials, triangles, chosen, shared, len(sources))
-        item = {"name": names[-1], **common, "primitives": primitives}
-        meshes.append(document.add("meshes", item))
-    return WrittenMeshes(meshes, names, len(sources))
+    if shapes is not None and len(part.targets):
+        rows = shape.targets[part.targets]
+        shared["targets"] = _targets(document, surface, shapes, rows, part.sources)
+        item["weights"] = shape.weights[0, part.targets].tolist()
+        if any(part.target_names):
+            own = extras if isinstance(extras, dict) else {}
+            extras = {**own, "targetNames": [text_of(name) for name in part.target_names]}
+    if extras is not None:
+        item["extras"] = extras
+    item["primitives"] = _primitives(document, materials, part, surface, shared)
+    return document.add("meshes", item)
 
 
-def _attributes(document: Document, mesh: Mesh, sources: Ints, uv_indices: Ints) -> dict[str, int]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Surface:
+    """Rows of a part in the space of its node.
+
+    ``positions``, ``normals`` (R, 3): of the written vertices; normals of unit length.
+    ``lengths`` (R, 1): lengths of the figure's own normals.
+    ``linear`` (3, 3): from binding space to the space of the node.
+    """
+
+    positions: Floats
+    normals: Floats
+    lengths: Floats
+    linear: Floats
+
+
+def _surface(part: Part, shape: Shape) -> _Surface:
+    mesh, skin = shape.figure.require_mesh(), shape.figure.skin
+    positions, normals = mesh.positions[part.sources], _normals(mesh)[part.sources]
+    lengths = np.linalg.norm(mesh.normals[part.sources], axis=1, keepdims=True)
+    if part.joint < 0 or skin is None:
+        return _Surface(positions, normals, lengths, np.eye(3))
+    matrix = skin.inverse_bind[part.joint]
+    linear = matrix[:3, :3]
+    turned = normals @ np.linalg.inv(linear)
+    stretch = np.linalg.norm(turned, axis=1, keepdims=True)
+    return _Surface(apply_transform(matrix, positions), turned / stretch, lengths * stretch, linear)
+
+
+def _attributes(document: Document, mesh: Mesh, part: Part, surface: _Surface) -> dict[str, int]:
     attributes = {
-        "POSITION": document.array(mesh.positions[sources], "VEC3", VERTICES, bounds=True),
-        "NORMAL": document.array(_normals(mesh)[sources], "VEC3", VERTICES),
+        "POSITION": document.array(surface.positions, "VEC3", VERTICES, bounds=True),
+        "NORMAL": document.array(surface.normals, "VEC3", VERTICES),
     }
     if mesh.uvs is not None and len(mesh.uvs):
         # In glTF, the first image row is at v = 0; in this program, at v = 1.
         for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
-            flipped = uvs[uv_indices] * [1.0, -1.0] + [0.0, 1.0]
+            flipped = uvs[part.uv_indices] * [1.0, -1.0] + [0.0, 1.0]
             attributes[f"TEXCOORD_{number}"] = document.array(flipped, "VEC2", VERTICES)
     if mesh.colors is not None:
-        colors = np.clip(mesh.colors[sources], 0.0, 1.0)
+        colors = np.clip(mesh.colors[part.sources], 0.0, 1.0)
         attributes["COLOR_0"] = document.array(colors, "VEC4", VERTICES)
     return attributes
 
@@ -105,23 +119,22 @@ def _normals(mesh: Mesh) -> Floats:
 
 def _targets(
     document: Document,
-    mesh: Mesh,
+    surface: _Surface,
     shapes: BlendShapes,
     rows: NDArray[np.intp],
     sources: Ints,
 ) -> list[dict[str, int]]:
     # Normals are written with length 1, and their offsets at the same scale.
-    lengths = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
-    scales = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
-    targets = []
+    scales = np.divide(
+        1.0, surface.lengths, out=np.zeros_like(surface.lengths), where=surface.lengths > 0.0
+    )
+    targets, directions = [], shapes.direction_values()
     for row in rows:
-        one = np.zeros(shapes.n_shapes)
-        one[row] = 1.0
-        offsets = shapes.displacement(one)[sources]
+        offsets = directions[row][sources] @ surface.linear.T
         target = {"POSITION": document.array(offsets, "VEC3", VERTICES, bounds=True)}
-        normal_offsets = shapes.normal_displacement(one)
-        if normal_offsets is not None:
-            target["NORMAL"] = document.array((normal_offsets * scales)[sources], "VEC3", VERTICES)
+        if shapes.normal_offsets is not None:
+            normals = shapes.normal_values()[row][sources] @ np.linalg.inv(surface.linear)
+            target["NORMAL"] = document.array(normals * scales, "VEC3", VERTICES)
         targets.append(target)
     return targets
 
@@ -129,23 +142,23 @@ def _targets(
 def _primitives(
     document: Document,
     materials: Materials,
-    triangles: Ints,
-    chosen: Bools,
+    part: Part,
+    surface: _Surface,
     shared: dict[str, Any],
-    n_vertices: int,
 ) -> list[dict[str, Any]]:
-    """Return a primitive for each material of the chosen triangles, (T,)."""
+    triangles, n_vertices = part.triangles, len(part.sources)
     if len(triangles) == 0:
         return [{**shared, "mode": _POINTS, "material": materials.plain()}]
+    if np.linalg.det(surface.linear) < 0.0:
+        triangles = triangles[:, ::-1]
     dtype = np.uint16 if n_vertices <= _LONG else np.uint32
-    indices = materials.mesh.material_indices
     primitives = []
-    for index in np.unique(indices[chosen]).tolist():
-        corners = triangles[chosen & (indices == index)].astype(dtype).ravel()
+    for index in np.unique(part.materials).tolist():
+        chosen = triangles[part.materials == index].astype(dtype).ravel()
         primitives.append(
             {
                 **shared,
-                "indices": document.array(corners, "SCALAR", INDICES),
+                "indices": document.array(chosen, "SCALAR", INDICES),
                 "material": materials.add(index),
             }
         )

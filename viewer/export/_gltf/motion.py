@@ -42,7 +42,7 @@ def add_animation(
     skeleton: Skeleton,
     frames: Frames,
     tree: Tree,
-    morph: tuple[list[int], Floats] | None,
+    morphs: list[tuple[int, Floats]],
 ) -> int:
     """Add rotations of all joints, other properties that change, and the figure's placement.
 
@@ -56,7 +56,7 @@ def add_animation(
     ``skeleton``: skeleton in the written shape.
     ``frames``: frames without gaps.
     ``tree``: the nodes.
-    ``morph``: nodes of the meshes and their targets' weights, if the weights change.
+    ``morphs``: nodes of meshes, and the changing weights of their targets.
     Returns: number of joints with translations.
     Raises RigError if a number exceeds single precision.
     """
@@ -82,10 +82,8 @@ def add_animation(
     if np.ptp(frames.figure_scales):
         scales = np.repeat(frames.figure_scales[:, None], 3, axis=1)
         keys.add(tree.place, "scale", document.array(scales, "VEC3"))
-    if morph is not None:
-        output = document.array(morph[1].ravel(), "SCALAR")
-        for node in morph[0]:
-            keys.add(node, "weights", output)
+    for node, weights in morphs:
+        keys.add(node, "weights", document.array(weights.ravel(), "SCALAR"))
     document.add(
         "animations",
         {"name": text_of(name), "samplers": keys.samplers, "channels": keys.channels},

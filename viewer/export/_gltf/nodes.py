@@ -8,6 +8,9 @@
         ├── joints           T R S, by the figure's names
         ├── fixed            never moves; only if some vertices have no influence
         └── mesh             only if the mesh is not skinned; a skinned mesh is a root node
+
+A figure from a file of nodes has its own root, and needs the first two nodes only if it is moved
+or converted.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _HALF = float(np.sqrt(0.5))
+_NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
 _Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
 
 
@@ -54,7 +58,7 @@ class Tree:
     root : int
         The topmost node.
     place : int
-        The node that moves the whole figure.
+        The node that moves the whole figure; -1 without one.
     joints : list of J int
         Nodes of the joints, in the figure's order.
     fixed : list of int
@@ -87,6 +91,7 @@ def add_nodes(
     pose: Pose | None,
     still: Locals | None,
     fixes: bool,
+    bare: bool = False,
 ) -> Tree:
     """Add all nodes except the mesh's.
 
@@ -97,8 +102,15 @@ def add_nodes(
     ``skeleton``, ``still``: the skeleton, and transforms of its joints at rest.
     ``pose``: pose with the figure's placement.
     ``fixes``: whether vertices need a node that never moves.
+    ``bare``: whether the only root joint is the topmost node, if the figure is neither moved nor
+    converted.
     Raises RigError if a number is not finite.
     """
+    if bare and skeleton is not None and still is not None and not fixes:
+        moved = pose is not None and (pose.figure_translation.any() or pose.figure_scale != 1.0)
+        if np.sum(skeleton.parents < 0) == 1 and not moved and not _above(up, unit):
+            own = _add_joints(document, skeleton, still)
+            return Tree(own[0], -1, own, [])
     top: dict[str, Any] = {"name": text_of(name)}
     place = root = document.add("nodes", top)
     above = _above(up, unit)
@@ -133,16 +145,16 @@ def _above(up: str, unit: str) -> dict[str, Any]:
 
 
 def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[int]:
-    first = len(document.root["nodes"])
+    first = len(document.root.get("nodes", ()))
     below: list[list[int]] = [[] for _ in skeleton.names]
     for joint, parent in enumerate(skeleton.parents.tolist()):
         if parent >= 0:
             below[parent].append(first + joint)
     for joint, name in enumerate(skeleton.names):
-        node: dict[str, Any] = {"name": text_of(name)}
+        node: dict[str, Any] = {"name": text_of(name)} if name else {}
         _put(node, "translation", still.translations[joint], 0.0)
         rotation = still.rotations[joint]
-        node["rotation"] = _finite(rotation / np.linalg.norm(rotation))
+        _put(node, "rotation", rotation / np.linalg.norm(rotation), _NO_ROTATION)
         _put(node, "scale", still.scales[joint], 1.0)
         if below[joint]:
             node["children"] = below[joint]
@@ -150,7 +162,7 @@ def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[i
     return list(range(first, first + skeleton.n_joints))
 
 
-def _put(node: dict[str, Any], name: str, values: Floats, default: float) -> None:
+def _put(node: dict[str, Any], name: str, values: Floats, default: float | Floats) -> None:
     if (values != default).any():
         node[name] = _finite(values)
 

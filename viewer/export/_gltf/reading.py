@@ -1,8 +1,8 @@
 """Reader of glTF files written here: arrays, nodes in every frame, the mesh and its skin.
 
-Only the output of ``viewer.export.gltf`` is supported: one buffer without strides, and samplers
-with one key per frame. Joints and vertices are returned in the figure's space, below the node
-that rotates and scales the whole figure.
+Only the output of ``viewer.export.gltf`` is supported: one buffer without strides. Joints and
+vertices are returned in the figure's space, below the node that rotates and scales the whole
+figure.
 """
 
 from __future__ import annotations
@@ -10,17 +10,23 @@ from __future__ import annotations
 import json
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewer.export._gltf.nodes import Tree
+from viewer.export._gltf.parts import Part
 from viewer.export._losses.skinned import Body, Poses, Rows, Side
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rig.skin import Skin, influence_counts, skin_from_entries
+
+Keys: TypeAlias = dict[tuple[int, str], Floats]
+"""Animated values by node and path, a row per frame."""
 
 _TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -60,20 +66,40 @@ def parsed(files: list[bytes]) -> GltfFile:
     return GltfFile(root, files[0][end + _CHUNK :])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A mesh in a file, and the figure's vertices in it.
+
+    Attributes
+    ----------
+    node : int
+        Its node.
+    part : Part
+        What it was written from.
+    """
+
+    node: int
+    part: Part
+
+
 def read_back(
     file: GltfFile,
     tree: Tree,
-    node: int | None,
-    sources: Rows,
-    start: int,
+    meshes: list[Placed],
+    figure: Figure,
+    targets: Rows,
+    keys: Keys,
+    start: int = 0,
     sets: int | None = None,
 ) -> Side:
     """Return the contents of a file in a form that can be compared with the figure.
 
     ``file``: the written file.
     ``tree``: indices of the nodes.
-    ``node``: index of the mesh's node.
-    ``sources`` (M,): indices of the morph targets that change over time.
+    ``meshes``: its meshes, in the order of the compared vertices.
+    ``figure``: the figure as written, with the bindings of joints that have their own meshes.
+    ``targets`` (M,): indices of the figure's morph targets that change over time.
+    ``keys``: animated values of each frame, by node and path.
     ``start``: frame of the figure that is the first in the file.
     ``sets``: number of influence sets to use, normalised to a sum of 1; all if omitted.
     """
@@ -81,23 +107,28 @@ def read_back(
     parents = np.full(len(nodes), -1, dtype=np.int32)
     for index, item in enumerate(nodes):
         parents[item.get("children", [])] = index
-    keys = _keys(file)
-    skinned = node is not None and "skin" in nodes[node]
-    bound, joints = np.tile(np.eye(4), (len(tree.joints) + 1, 1, 1)), [*tree.joints, tree.place]
-    if skinned and node is not None:
-        skin = file.root["skins"][nodes[node]["skin"]]
-        stored = file.floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
-        bound[: len(stored)] = stored
-        joints[: len(skin["joints"])] = skin["joints"]
-    elif node is not None:
-        joints[-1] = node
+    n_joints = len(tree.joints)
+    bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
+    joints = [*tree.joints, len(nodes) if tree.place < 0 else tree.place]
+    if figure.skin is not None and n_joints:
+        bound[:-1] = figure.skin.inverse_bind
+    for placed in meshes:
+        item = nodes[placed.node]
+        if "skin" in item:
+            skin = file.root["skins"][item["skin"]]
+            stored = file.floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
+            bound[: len(stored)] = stored
+            joints[: len(skin["joints"])] = skin["joints"]
+        elif placed.part.joint < 0:
+            joints[-1] = placed.node
     body, morphs = None, np.zeros((1, 0))
-    if node is not None:
-        body, morphs = _body(file, node, keys, len(tree.joints), sources, sets)
+    if meshes:
+        body, morphs = _body(file, meshes, keys, bound, targets, sets)
 
     def poses(rows: Rows) -> Poses:
         world = _world(nodes, parents, keys, rows - start)
-        above = parents[tree.place]
+        world = np.concatenate([world, np.broadcast_to(np.eye(4), (len(rows), 1, 4, 4))], axis=1)
+        above = parents[tree.place] if tree.place >= 0 else -1
         if above >= 0:
             world = np.linalg.inv(world[:, above : above + 1]) @ world
         places = world[:, tree.joints][..., :3, 3]
@@ -108,9 +139,9 @@ def read_back(
     return Side(body, poses)
 
 
-def _keys(file: GltfFile) -> dict[tuple[int, str], Floats]:
-    """Return the animated values by node and path, one row per frame."""
-    found: dict[tuple[int, str], Floats] = {}
+def frame_keys(file: GltfFile) -> Keys:
+    """Return the animated values of a file whose keys are the frames."""
+    found: Keys = {}
     for animation in file.root.get("animations", ()):
         for channel in animation["channels"]:
             sampler = animation["samplers"][channel["sampler"]]
@@ -121,9 +152,7 @@ def _keys(file: GltfFile) -> dict[tuple[int, str], Floats]:
     return found
 
 
-def _world(
-    nodes: list[dict[str, Any]], parents: Ints, keys: dict[tuple[int, str], Floats], rows: Rows
-) -> Floats:
+def _world(nodes: list[dict[str, Any]], parents: Ints, keys: Keys, rows: Rows) -> Floats:
     """Return the global matrices of all nodes: (F, N, 4, 4)."""
     parts = {}
     for path, default in _DEFAULTS.items():
@@ -142,36 +171,73 @@ def _world(
 
 def _body(
     file: GltfFile,
-    node: int,
-    keys: dict[tuple[int, str], Floats],
-    n_joints: int,
+    meshes: list[Placed],
+    keys: Keys,
+    bound: Floats,
     changing: Rows,
     sets: int | None,
 ) -> tuple[Body, Floats]:
-    """Return the mesh in the shape of the first frame, and the weights that change it: (F, M)."""
-    mesh = file.root["meshes"][file.root["nodes"][node]["mesh"]]
+    """Return all meshes in the shape of the first frame, and the weights that change it: (F, M)."""
+    found = [_one_body(file, placed, keys, bound, sets) for placed in meshes]
+    positions = np.concatenate([each.positions for each in found])
+    skin = _joined([each.skin for each in found], bound)
+    count = max((len(each.weights) for each in found), default=1)
+    weights = np.zeros((count, len(changing)))
+    shapes = np.zeros((len(changing), len(positions), 3))
+    first = 0
+    for placed, each in zip(meshes, found, strict=True):
+        rows = slice(first, first + len(each.positions))
+        first = rows.stop
+        for column, target in enumerate(changing.tolist()):
+            for own in np.flatnonzero(placed.part.targets == target).tolist():
+                shapes[column, rows] = each.targets[own]
+                weights[:, column] = each.weights[:, own] - each.weights[0, own]
+    return Body(positions, skin, shapes if len(changing) else None), weights
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OneBody:
+    """One mesh: positions (V, 3) in the first frame, skin, targets (S, V, 3), weights (F, S)."""
+
+    positions: Floats
+    skin: Skin
+    targets: Floats
+    weights: Floats
+
+
+def _one_body(
+    file: GltfFile, placed: Placed, keys: Keys, bound: Floats, sets: int | None
+) -> _OneBody:
+    mesh = file.root["meshes"][file.root["nodes"][placed.node]["mesh"]]
     primitive = mesh["primitives"][0]  # all primitives share their vertices
     attributes = primitive["attributes"]
     positions = file.floats(attributes["POSITION"])
-    weights, shapes = np.zeros((1, 0)), None
+    weights = np.zeros((1, 0))
+    directions = np.zeros((0, *positions.shape))
     targets = [file.floats(target["POSITION"]) for target in primitive.get("targets", ())]
     if targets:
         directions = np.stack(targets)
-        weights = keys.get((node, "weights"), np.array([mesh["weights"]], dtype=np.float64))
+        weights = keys.get((placed.node, "weights"), np.array([mesh["weights"]], dtype=np.float64))
         positions = positions + np.einsum("s,sva->va", weights[0], directions)
-        shapes = directions[changing] if len(changing) else None
-        weights = (weights - weights[0])[:, changing]
-    return Body(positions, _skin(file, attributes, n_joints, sets), shapes), weights
+    joint = placed.part.joint
+    if joint >= 0:
+        # The comparison is in binding space.
+        inverse = np.linalg.inv(bound[joint])
+        positions = apply_transform(inverse, positions)
+        directions = directions @ inverse[:3, :3].T
+    slot = joint if joint >= 0 else len(bound) - 1
+    return _OneBody(positions, _skin(file, attributes, slot, bound, sets), directions, weights)
 
 
-def _skin(file: GltfFile, attributes: dict[str, int], n_joints: int, sets: int | None) -> Skin:
-    """Return the influences of a mesh; an unskinned mesh follows the last joint, its node."""
+def _skin(
+    file: GltfFile, attributes: dict[str, int], slot: int, bound: Floats, sets: int | None
+) -> Skin:
+    """Return the influences of a mesh; without any, all vertices follow one slot."""
     count = file.root["accessors"][attributes["POSITION"]]["count"]
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]
-    bound = np.tile(np.eye(4), (n_joints + 1, 1, 1))
     if not numbers:
-        last = np.full(count, n_joints)
+        last = np.full(count, slot)
         return skin_from_entries(count, np.arange(count), last, np.ones(count), bound)
     joints = np.concatenate([file.array(attributes[f"JOINTS_{n}"]) for n in numbers], axis=1)
     weights = np.concatenate([file.floats(attributes[f"WEIGHTS_{n}"]) for n in numbers], axis=1)
@@ -181,4 +247,15 @@ def _skin(file: GltfFile, attributes: dict[str, int], n_joints: int, sets: int |
     rows, _ = np.nonzero(used)
     return skin_from_entries(
         count, rows.astype(np.int32), joints[used].astype(np.int32), weights[used], bound
+    )
+
+
+def _joined(skins: list[Skin], bound: Floats) -> Skin:
+    """Return one skin with the vertices of several, one after the other."""
+    counts = np.concatenate([influence_counts(skin) for skin in skins])
+    return Skin(
+        starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+        joints=np.concatenate([skin.joints for skin in skins]),
+        weights=np.concatenate([skin.weights for skin in skins]),
+        inverse_bind=bound,
     )

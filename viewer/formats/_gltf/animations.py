@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -61,9 +61,7 @@ def _leave_out(document: Document, problem: FormatError, index: int) -> None:
 
 def _checked(animation: NodeAnimation) -> NodeAnimation:
     channels = animation.read()
-    return NodeAnimation(
-        animation.name, animation.start, animation.end, animation.nodes, lambda: channels
-    )
+    return replace(animation, read=lambda: channels)
 
 
 def _animation(
@@ -75,7 +73,8 @@ def _animation(
     nodes, inputs = plain or _any_channels(document, targets, animation, unused)
     start, end = _range(document, animation, inputs)
     read = partial(_channels, document, targets, animation, (start, end))
-    return NodeAnimation(animation.text("name"), start, end, frozenset(nodes), read)
+    name, pointer = animation.text("name"), animation.pointer
+    return NodeAnimation(name, start, end, frozenset(nodes), read, pointer)
 
 
 def _channels(

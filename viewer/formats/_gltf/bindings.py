@@ -33,13 +33,13 @@ def checked_bindings(
         limits[mesh] = min(limits.get(mesh, (count, skin)), (count, skin))
     result = list(meshes)
     for mesh, (count, skin) in limits.items():
-        result[mesh] = _checked(document, mesh, meshes[mesh], count, skin)
+        result[mesh] = _checked(document, meshes[mesh], count, skin)
     return tuple(result)
 
 
-def _checked(document: Document, index: int, mesh: NodeMesh, n_joints: int, skin: int) -> NodeMesh:
+def _checked(document: Document, mesh: NodeMesh, n_joints: int, skin: int) -> NodeMesh:
     primitives = []
-    for place, primitive in enumerate(mesh.primitives):
+    for primitive in mesh.primitives:
         joints, weights = primitive.joints, primitive.weights
         if joints is None or weights is None or int(joints.max(initial=0)) < n_joints:
             primitives.append(primitive)
@@ -48,7 +48,7 @@ def _checked(document: Document, index: int, mesh: NodeMesh, n_joints: int, skin
         vertex, column = (int(axis[0]) for axis in np.nonzero(bad))
         document.source.refuse(
             "W010.gltf-joint",
-            f"/meshes/{index}/primitives/{place}/attributes/JOINTS_{column // 4}",
+            f"{primitive.pointer}/attributes/JOINTS_{column // 4}",
             vertex=vertex,
             found=int(joints[vertex, column]),
             joints=n_joints,

@@ -147,4 +147,5 @@ def _read(attributes: Attributes, primitive: Element, triangles: Ints) -> Primit
         material=primitive.index("material", n_materials, "materials"),
         targets=targets,
         normal_targets=normal_targets,
+        pointer=primitive.pointer,
     )

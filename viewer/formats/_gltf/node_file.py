@@ -74,6 +74,7 @@ def read_nodes(source: Source) -> NodeFile:
         extensions=_object(document, "extensions"),
         extras=root.values.get("extras"),
         asset=_object(document, "asset"),
+        has_pointers=True,
     )
 
 

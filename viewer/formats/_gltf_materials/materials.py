@@ -2,8 +2,9 @@
 
 Read: all properties of the core specification, ``KHR_texture_transform``, ``KHR_materials_unlit``,
 ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived model
-``KHR_materials_pbrSpecularGlossiness`` is approximated; see ``glossiness.py``. Other extensions
-are not drawn. Invalid members are ignored with a warning, because the shape can still be shown.
+``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated, see
+``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored
+with a warning, because the shape can still be shown.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossines
 from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
 from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.textures import Slot, read_slot
+from viewer.formats._gltf_materials.toon import MTOON, unlit_by_vrm
 from viewer.rig.material import ALPHA_MODES, Material
 
 __all__ = ["DEFAULT_MATERIAL", "DRAWN_EXTENSIONS", "read_materials"]
@@ -27,7 +29,7 @@ _GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 
 DRAWN_EXTENSIONS = (
     *("KHR_texture_transform", "KHR_materials_unlit", "KHR_materials_emissive_strength"),
-    *("EXT_texture_webp", _GLOSSINESS),
+    *("EXT_texture_webp", _GLOSSINESS, MTOON),
 )
 """Extensions of materials and textures that have an effect."""
 
@@ -88,7 +90,8 @@ def read_materials(document: Document) -> tuple[Material, ...]:
         lenient(document.source, partial(table.__getitem__, index), neutral)
         for index in range(len(table))
     ]
-    stated = [_stated(document, element) for element in elements]
+    unlit = unlit_by_vrm(document, elements)
+    stated = [_stated(document, each, index in unlit) for index, each in enumerate(elements)]
     _report(document, elements, stated)
     used = [slot for one in stated for slot in _slots(one)]
     images = decoded_images(document, (slot.image for slot in used if slot.image >= 0))
@@ -102,8 +105,8 @@ def _slots(stated: _Stated) -> list[Slot]:
     return [slot for slot in (*stated.slots.values(), *more) if slot is not None]
 
 
-def _stated(document: Document, element: Element) -> _Stated:
-    """Return the properties of a material."""
+def _stated(document: Document, element: Element, is_unlit: bool) -> _Stated:
+    """Return the properties of a material; ``is_unlit`` if an extension of the file says so."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
@@ -121,8 +124,8 @@ def _stated(document: Document, element: Element) -> _Stated:
         "alpha_mode": _MODES[chosen(element, "alphaMode", tuple(_MODES), "OPAQUE")],
         "alpha_cutoff": bounded(element, "alphaCutoff", 0.5, 0.0, _LARGEST),
         "double_sided": lenient(source, lambda: element.flag("doubleSided"), False),
-        "unlit": lenient(source, lambda: element.extension("KHR_materials_unlit"), None)
-        is not None,
+        "unlit": is_unlit
+        or lenient(source, lambda: element.extension("KHR_materials_unlit"), None) is not None,
         "is_physical": True,
     }
     slots = {

@@ -15,6 +15,7 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.material import Material
+from viewer.rig.mesh import PartView
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
 
 __all__ = [
@@ -97,6 +98,8 @@ class Primitive:
         Offsets of the positions for each morph target of the mesh.
     normal_targets : (S, V, 3) or None
         Offsets of the normals; None if the file has none.
+    pointer : str
+        JSON pointer to it; empty in other files.
     """
 
     positions: Floats
@@ -109,6 +112,7 @@ class Primitive:
     material: int = -1
     targets: Floats | None = None
     normal_targets: Floats | None = None
+    pointer: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,6 +204,8 @@ class NodeAnimation:
         Nodes that it moves.
     read : callable
         Returns the channels; called at most once, may raise a ``FormatError``.
+    pointer : str
+        JSON pointer to it; empty in other files.
     """
 
     name: str
@@ -207,6 +213,7 @@ class NodeAnimation:
     end: float
     nodes: frozenset[int]
     read: Callable[[], tuple[NodeChannel, ...]]
+    pointer: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -286,8 +293,12 @@ class NodeFile:
         Facial expressions.
     constraints : tuple of Constraint
         Nodes (instead of joints) that follow others, in the order of evaluation.
+    part_views : dict of PartView
+        The views for which the meshes of some nodes are meant.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
+    has_pointers : bool
+        Whether elements have JSON pointers, ``/nodes/3`` for instance.
     """
 
     name: str
@@ -306,4 +317,6 @@ class NodeFile:
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()
     constraints: tuple[Constraint, ...] = ()
+    part_views: Mapping[int, PartView] = field(default_factory=dict)
     facts: tuple[tuple[str, str], ...] = ()
+    has_pointers: bool = False

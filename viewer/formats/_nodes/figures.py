@@ -10,6 +10,8 @@ from viewer.formats._nodes.facts import facts_of
 from viewer.formats._nodes.grouping import Members, group_nodes, is_skinned, scene_order
 from viewer.formats._nodes.joints import make_joints, skeleton_of
 from viewer.formats._nodes.motions import Reader, animations_of, read_once
+from viewer.formats._nodes.pointers import remember_pointers
+from viewer.formats._nodes.records import record_of
 from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
 from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
 from viewer.formats._nodes.views import views_of
@@ -47,7 +49,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
         raise source.fault("F002.no-figure")
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
-    found = [_figure(file, members, readers) for members in groups]
+    found = [_figure(file, members, readers, source) for members in groups]
     _note_normals([piece for _, pieces in found for piece in pieces], source)
     _note_weights([piece for _, pieces in found for piece in pieces], source)
     order = scene_order(file) if file.cameras else []
@@ -58,8 +60,10 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     return FigureGroup(file.name, tuple(figure for figure, _ in found), views)
 
 
-def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Figure, list[Piece]]:
-    """Return one figure, and its primitives."""
+def _figure(
+    file: NodeFile, members: Members, readers: list[Reader], source: Source
+) -> tuple[Figure, list[Piece]]:
+    """Return one figure, and the primitives of which it consists."""
     joints = make_joints(file.tree, members.nodes)
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
@@ -75,7 +79,9 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader]) -> tuple[Fi
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
         facts=facts_of(file, pieces),
         animations=animations_of(file.animations, readers, joints.own, columns),
+        record=record_of(file, joints, members.meshes, columns),
     )
+    remember_pointers(source, figure.skeleton, file, members, joints, pieces)
     return figure, pieces
 
 
@@ -115,12 +121,19 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Report sums of weights that are not 1, and vertices without weights."""
-    influences = [piece.influences for piece in pieces]
-    deviating = sum(each.n_deviating for each in influences)
-    if deviating:
-        most = max(each.deviation for each in influences)
-        source.warn("F007.weight-sums", n=deviating, most=most)
-    unbound = sum(each.n_unbound for each in influences)
+    """Record sums of weights that are not 1, and vertices without weights, at the first of them."""
+    odd = [piece for piece in pieces if piece.influences.n_deviating]
+    if odd:
+        n = sum(piece.influences.n_deviating for piece in odd)
+        most = max(piece.influences.deviation for piece in odd)
+        source.warn("W001.divided", _weights_of(odd[0]), n=n, most=most)
+    unbound = [piece for piece in pieces if piece.influences.n_unbound]
     if unbound:
-        source.warn("F007.no-weights", n=unbound)
+        n = sum(piece.influences.n_unbound for piece in unbound)
+        source.warn("W004.first-joint", _weights_of(unbound[0]), n=n)
+
+
+def _weights_of(piece: Piece) -> str | None:
+    """Return the JSON pointer to the weights of a primitive; None without one."""
+    pointer = piece.primitive.pointer
+    return f"{pointer}/attributes/WEIGHTS_0" if pointer else None

@@ -60,7 +60,13 @@ def animations_of(
         Blend shapes of each node's morph targets.
     """
     return tuple(
-        Animation(animation.name, animation.start, animation.end, _clip(animation, read))
+        Animation(
+            animation.name,
+            animation.start,
+            animation.end,
+            _clip(animation, read),
+            animation.pointer,
+        )
         for animation, read in zip(animations, _bound(readers, joints, columns), strict=True)
         if any(node in joints or node in columns for node in animation.nodes)
     )

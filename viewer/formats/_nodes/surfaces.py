@@ -13,7 +13,7 @@ from viewer.formats._nodes.flat_normals import flat_shaded
 from viewer.formats._nodes.influences import Influences, divided, of_rows, on_joint
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.mesh import Mesh
+from viewer.rig.mesh import Mesh, PartView
 from viewer.rig.skin import Skin
 
 __all__ = ["Piece", "mesh_of", "pieces_of", "skin_of"]
@@ -140,7 +140,14 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
         triangle_materials=np.repeat([slots[piece.primitive.material] for piece in pieces], counts),
         parts=tuple(part_name(file, node) for node in nodes),
         triangle_parts=np.repeat([piece.part for piece in pieces], counts),
+        part_views=_part_views(file, nodes),
     )
+
+
+def _part_views(file: NodeFile, nodes: list[int]) -> tuple[PartView, ...]:
+    if not any(node in file.part_views for node in nodes):
+        return ()
+    return tuple(file.part_views.get(node, "auto") for node in nodes)
 
 
 def part_name(file: NodeFile, node: int) -> str:

@@ -14,16 +14,18 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._nodes.content import NodeExpression, NodeFile
+from viewer.formats._nodes.surfaces import part_name
 from viewer.formats._source import Source
+from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.constraints import read_constraints
+from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.springs import note_springs
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
-from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
 __all__ = ["with_vrm"]
 
 _PERCENT = 100.0
-_OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
 # Heading of each property, and the property's names in versions 1.0 and 0.x.
 _META = {
@@ -63,46 +65,39 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
         If constraints of nodes depend on each other.
     """
     file = replace(file, constraints=read_constraints(file.tree, source))
+    note_springs(file, source)
     for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
         told = file.extensions.get(key)
         if isinstance(told, dict):
             pointer = f"/extensions/{key}"
-            return replace(
+            file = replace(
                 file,
-                humanoid=_humanoid(source, file, told, version, pointer),
+                humanoid=read_humanoid(source, file, told, version, pointer),
                 expressions=_expressions(source, file, told, version, pointer),
-                facts=_facts(told),
+                part_views=read_part_views(file, told, version, pointer, source),
             )
-    return file
+            return replace(file, facts=(*_facts(told), *_contents(file)))
+    return replace(file, facts=_contents(file))
 
 
-def _humanoid(
-    source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
-) -> dict[str, int]:
-    """Return the node of each human bone, by its name in VRM 1.0."""
-    bones = part(told, "humanoid", "humanBones")
-    given: list[tuple[Any, Any]] = []
-    if version == 0 and isinstance(bones, list):
-        given = [(part(each, "bone"), part(each, "node")) for each in bones]
-        given = [(_modern(bone), node) for bone, node in given if isinstance(bone, str)]
-    elif isinstance(bones, dict):
-        given = [(bone, part(each, "node")) for bone, each in bones.items()]
-    found: dict[str, int] = {}
-    for bone, node in given:
-        if not is_index(node, file.tree.n_nodes):
-            source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
-        elif bone in HUMAN_BONES or bone in SPINE_BONES:
-            found[bone] = node
-        else:
-            source.warn("G006.bone", f"{pointer}/humanoid/humanBones", bone=bone)
-    return found
+def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
+    """Return facts about the parts for one view only, and the constraints."""
+    names = file.tree.names
+    shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
+    facts = [
+        (heading, ", ".join(part_name(file, node) for node, view in file.part_views.items()
+                            if view == wanted))
+        for heading, wanted in shown.items()
+    ]  # fmt: skip
+    facts.append((
+        "constraints",
+        ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
+    ))  # fmt: skip
+    return tuple((heading, _shortened(text)) for heading, text in facts if text)
 
 
-def _modern(bone: str) -> str:
-    for old, new in _OLD_THUMB.items():
-        if bone.endswith(old):
-            return bone.removesuffix(old) + new
-    return bone
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
 def _expressions(

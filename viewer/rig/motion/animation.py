@@ -22,15 +22,27 @@ class Animation:
         Playback range in seconds.
     read : callable
         Returns the keys; called at most once, may raise a ``FormatError``.
+    place : str
+        Where the file has it, as a JSON pointer; empty if unknown.
     """
 
-    __slots__ = ("_clip", "_read", "end", "name", "start")
+    __slots__ = ("_clip", "_read", "end", "name", "place", "start")
 
     def __init__(
-        self, name: str, start: float, end: float, read: Callable[[], TransformClip]
+        self,
+        name: str,
+        start: float,
+        end: float,
+        read: Callable[[], TransformClip],
+        place: str = "",
     ) -> None:
         self.name, self.start, self.end, self._read = name, start, end, read
+        self.place = place
         self._clip: TransformClip | None = None
+
+    def plays(self, clip: object) -> bool:
+        """Return whether a motion is that of this animation."""
+        return clip is not None and clip is self._clip
 
     def clip(self) -> TransformClip:
         """Return the motion; always the same object.

@@ -1,10 +1,12 @@
-"""A skeleton together with its motion, the contents of one BVH file."""
+"""A skeleton together with its motion, the contents of one file of motion capture."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from viewer.diagnostics import Phrase
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 
@@ -25,9 +27,12 @@ class SkeletonMotion:
         Explains how the figure's unit was estimated; None if it was not.
     up_notes : tuple of Phrase
         Explain how the up axis was estimated, and give any contrary evidence.
+    expressions : mapping of str to (N,)
+        Weights of facial expressions in the clip's rows, by their names in VRM 1.0.
     """
 
     figure: Figure
     clip: SampledClip
     unit_note: Phrase | None = None
     up_notes: tuple[Phrase, ...] = ()
+    expressions: Mapping[str, Floats] = field(default_factory=dict)

@@ -27,6 +27,7 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, q
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
@@ -130,15 +131,17 @@ def retarget(
     place: Floats | None = None
     if figure.mesh is not None and len(roots) == 1:
         place, shifts[:, 0] = shifts[:, 0].copy(), 0.0
+    weights, missing = expression_weights(motion.expressions, figure)
     clip = SampledClip(
         motion.clip.name,
         motion.clip.timing,
         rotations,
         translations=shifts if shifts.any() else None,
         figure_translations=place,
+        shape_weights=weights,
     )
     scaled = Diagnostic("F007.path-scaled", values={"scale": scale, "by": by})
-    return clip, [*matches.notes, scaled, *notes]
+    return clip, [*matches.notes, scaled, *notes, *missing]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,131 @@
+"""A figure as nodes, meshes and a skin of a glTF file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from viewer.diagnostics import Phrase
+from viewer.errors import RigError
+from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.materials import Color, Materials
+from viewer.export._gltf.mesh import add_mesh
+from viewer.export._gltf.nodes import Locals, Tree, add_nodes
+from viewer.export._gltf.parts import parts_of
+from viewer.export._gltf.reading import Placed
+from viewer.export._gltf.records import add_record
+from viewer.export._gltf.shape import Shape
+from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
+from viewer.rig.figure import Figure
+from viewer.rig.pose import Pose
+from viewer.rig.skinning import Skinning, skin_used
+
+__all__ = ["Body", "Built", "add_body", "body_of"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """Data shared by all files of an export."""
+
+    shape: Shape
+    influences: Influences | None  # None if the mesh is not skinned
+
+    @property
+    def figure(self) -> Figure:
+        """The figure as written."""
+        return self.shape.figure
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """Indices and summary of one file's contents."""
+
+    tree: Tree
+    meshes: list[Placed]
+    counts: list[Phrase]
+
+
+def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:
+    """Return a figure in the form that glTF can store.
+
+    ``figure``, ``shape``: the figure, and the written form of its shape.
+    ``skinning``: selects influences.
+    Raises RigError if it has neither mesh nor skeleton, or too many joints.
+    """
+    if figure.mesh is None and figure.skeleton is None:
+        raise RigError(f"figure {figure.name} has neither mesh nor skeleton to write as glTF")
+    if not figure.is_attached or figure.skin is None:
+        return Body(shape, None)
+    return Body(shape, influences_of(skin_used(figure.skin, skinning)))
+
+
+def add_body(
+    document: Document,
+    body: Body,
+    up: str,
+    pose: Pose | None,
+    still: Locals | None,
+    color: Color | None = None,
+    is_still: bool = True,
+) -> Built:
+    """Add nodes, meshes and skin of a figure; return their indices and counts.
+
+    ``is_still``: whether the figure as a whole does not move.
+    """
+    figure, influences = body.figure, body.influences
+    fixes, record = influences is not None and influences.n_fixed > 0, figure.record
+    bare = record is not None and is_still
+    tree = add_nodes(
+        document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes, bare
+    )
+    if record is not None:
+        add_record(document, record, tree.joints)
+    scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
+    if figure.mesh is not None and figure.mesh.n_vertices:
+        meshes = _add_meshes(document, body, tree, color)
+        scene += _place_meshes(document, body, tree, meshes)
+        written, before = sum(len(each.part.sources) for each in meshes), figure.mesh.n_vertices
+        key = "written-vertices" if written == before else "split-vertices"
+        counts = [Phrase(key, n=written, before=before)]
+        counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
+    if figure.skeleton is not None:
+        counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
+    document.root["scene"] = document.add("scenes", {"nodes": scene})
+    return Built(tree, meshes, counts)
+
+
+def _add_meshes(document: Document, body: Body, tree: Tree, color: Color | None) -> list[Placed]:
+    """Add the parts of a figure, each with its node."""
+    figure, meshes = body.figure, list[Placed]()
+    materials = Materials(document, figure.require_mesh(), color)
+    record = figure.record
+    for part in parts_of(f"{figure.name} mesh", body.shape, body.influences):
+        mesh = add_mesh(document, materials, part, body.shape, body.influences)
+        if part.joint >= 0:
+            node = tree.joints[part.joint]
+            document.root["nodes"][node]["mesh"] = mesh
+        else:
+            item: dict[str, Any] = {"name": text_of(part.name)} if part.name else {}
+            if record is not None and part.index in record.part_extras:
+                item["extras"] = record.part_extras[part.index]
+            node = document.add("nodes", {**item, "mesh": mesh})
+        meshes.append(Placed(node, part))
+    return meshes
+
+
+def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Placed]) -> list[int]:
+    """Bind the meshes that have nodes of their own; return those that are roots of the scene."""
+    nodes = document.root["nodes"]
+    own = [placed.node for placed in meshes if placed.part.joint < 0]
+    influences, skin = body.influences, body.figure.skin
+    if not own:
+        return []
+    if influences is None or skin is None:
+        nodes[tree.place].setdefault("children", []).extend(own)
+        return []
+    bound = document.array(inverse_bind_matrices(influences, skin.inverse_bind), "MAT4")
+    item = {"name": text_of(body.figure.name), "joints": tree.joints + tree.fixed}
+    index = document.add("skins", {**item, "inverseBindMatrices": bound})
+    for node in own:
+        nodes[node]["skin"] = index
+    return own  # glTF ignores the transform of a skinned mesh's own node

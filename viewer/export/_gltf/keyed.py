@@ -1,0 +1,163 @@
+"""Animations with their own keys and interpolation in glTF form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.nodes import Tree
+from viewer.export._gltf.reading import Placed
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
+from viewer.rig.transforms.sampling import sample_transforms
+
+__all__ = ["add_clips", "first_time"]
+
+Targets: TypeAlias = NDArray[np.integer]
+"""Indices of blend shapes."""
+
+_MODES = {"linear": "LINEAR", "step": "STEP", "cubic": "CUBICSPLINE"}
+_KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
+_RATE = 60.0  # frames per second where channels of different interpolation must be joined
+
+
+def add_clips(
+    document: Document,
+    clips: Sequence[TransformClip],
+    tree: Tree,
+    meshes: Sequence[Placed],
+    shapes: Targets,
+    weights: Floats,
+) -> list[TransformClip]:
+    """Add an animation for each clip; return those that move something that the file has.
+
+    glTF has no times below 0, so earlier keys shift their whole animation.
+
+    ``document``: modified in place.
+    ``clips``: motions with at least one channel each.
+    ``tree``, ``meshes``: the nodes of joints and parts.
+    ``shapes`` (M,): blend shapes that are morph targets.
+    ``weights`` (S,): weights of all blend shapes at rest.
+    """
+    times: dict[bytes, int] = {}
+    added = []
+    for clip in clips:
+        keys = _Keys(document, times, first_time(clip))
+        for channel in clip.channels:
+            if channel.path != "weights":
+                keys.add(tree.joints[channel.joint], channel)
+        moved = [channel for channel in clip.channels if channel.path == "weights"]
+        for placed in meshes:
+            rows = shapes[placed.part.targets]
+            joined = _joined_weights(moved, rows, weights)
+            if joined is not None:
+                keys.add(placed.node, joined)
+        if keys.channels:
+            item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
+            item |= {"samplers": keys.samplers, "channels": keys.channels}
+            document.add("animations", item)
+            added.append(clip)
+    return added
+
+
+def first_time(clip: TransformClip) -> float:
+    """Return the time of the earliest key if it is below 0, else 0."""
+    return min(0.0, *(float(channel.times[0]) for channel in clip.channels))
+
+
+class _Keys:
+    """Samplers and channels of one animation; equal times are written once per file."""
+
+    def __init__(self, document: Document, times: dict[bytes, int], first: float) -> None:
+        self._document, self._times, self._first = document, times, first
+        self.samplers: list[dict[str, Any]] = []
+        self.channels: list[dict[str, Any]] = []
+
+    def add(self, node: int, channel: TransformChannel) -> None:
+        """Add the keys of a joint or mesh."""
+        target = {"node": node, "path": channel.path}
+        self.channels.append({"sampler": len(self.samplers), "target": target})
+        is_cubic = channel.tangents is not None and len(channel.times) > 1
+        values, kind = channel.values, _KINDS[channel.path]
+        if channel.path == "rotation" and not is_cubic:
+            values = values / np.linalg.norm(values, axis=1, keepdims=True)
+        if is_cubic and channel.tangents is not None:
+            arriving, leaving = channel.tangents[:, 0], channel.tangents[:, 1]
+            values = np.stack([arriving, values, leaving], axis=1)
+        if channel.path == "weights":
+            values = values.ravel()
+        mode = "linear" if channel.tangents is not None and not is_cubic else channel.interpolation
+        output = self._document.array(values, kind)
+        sampler = {"input": self._input(channel.times), "output": output}
+        self.samplers.append({**sampler, "interpolation": _MODES[mode]})
+
+    def _input(self, times: Floats) -> int:
+        single = _increasing(times - self._first)
+        key = single.tobytes()
+        if key not in self._times:
+            self._times[key] = self._document.array(single, "SCALAR", bounds=True)
+        return self._times[key]
+
+
+def _increasing(times: Floats) -> NDArray[np.float32]:
+    """Return times in single precision, each later than the one before, as glTF requires."""
+    single = times.astype(np.float32)
+    for key in np.flatnonzero(np.diff(single) <= 0.0).tolist():
+        later = np.nextafter(single[key], np.float32(np.inf))
+        single[key + 1] = max(single[key + 1], later)
+    return single
+
+
+def _joined_weights(
+    channels: list[TransformChannel], rows: Targets, weights: Floats
+) -> TransformChannel | None:
+    """Return one channel with all morph targets of a mesh, None if nothing moves them."""
+    own = [channel for channel in channels if np.isin(_shapes(channel), rows).any()]
+    if not own:
+        return None
+    if len(own) == 1 and np.array_equal(_shapes(own[0]), rows):
+        return own[0]
+    if len(own) == 1:
+        return _widened(own[0], rows, weights)
+    return _merged(own, rows, weights)
+
+
+def _widened(channel: TransformChannel, rows: Targets, weights: Floats) -> TransformChannel:
+    """Return a channel for other blend shapes, of which those it does not move stand still."""
+    place = {int(shape): column for column, shape in enumerate(_shapes(channel))}
+    columns = np.array([place.get(int(row), -1) for row in rows])
+    values = np.where(columns >= 0, channel.values[:, columns], weights[rows])
+    tangents = channel.tangents
+    if tangents is not None:
+        tangents = np.where(columns >= 0, tangents[..., columns], 0.0)
+    return replace(channel, values=values, tangents=tangents, shapes=rows.astype(np.int32))
+
+
+def _shapes(channel: TransformChannel) -> Ints:
+    """Return the blend shapes of a channel of weights."""
+    assert channel.shapes is not None
+    return channel.shapes
+
+
+def _merged(channels: list[TransformChannel], rows: Targets, weights: Floats) -> TransformChannel:
+    """Return several channels as one, with keys at the times of all of them.
+
+    This is exact if all are linear or all are steps; others are sampled in between.
+    """
+    times = np.unique(np.concatenate([channel.times for channel in channels]))
+    modes = {channel.interpolation for channel in channels}
+    is_exact = modes in ({"linear"}, {"step"})
+    if not is_exact:
+        count = int((times[-1] - times[0]) * _RATE)
+        times = np.union1d(times, times[0] + np.arange(count + 1) / _RATE)
+    found = sample_transforms(TransformClip("", tuple(channels), 0.0, 0.0), times)
+    values = np.tile(weights, (len(times), 1))
+    values[:, found.weighted] = found.weights
+    mode: Interpolation = "step" if modes == {"step"} else "linear"
+    shapes = rows.astype(np.int32)
+    return TransformChannel(-1, "weights", times, values[:, rows], mode, shapes=shapes)

@@ -1,0 +1,21 @@
+"""Application data and copyright of the glTF file that a figure came from."""
+
+from __future__ import annotations
+
+from viewer.export._gltf.document import Document, text_of
+from viewer.rig.file_record import FileRecord
+
+
+def add_record(document: Document, record: FileRecord, joints: list[int]) -> None:
+    """Add what a figure's own file states about the whole file and about joints.
+
+    ``document``: modified in place; already has the joints.
+    ``record``: from the figure.
+    ``joints`` (J,): their nodes.
+    """
+    if record.copyright:
+        document.root["asset"]["copyright"] = text_of(record.copyright)
+    if record.extras is not None:
+        document.root["extras"] = record.extras
+    for joint, extras in record.joint_extras.items():
+        document.root["nodes"][joints[joint]]["extras"] = extras

@@ -1,0 +1,51 @@
+"""Application data and names of a file of nodes that a figure keeps to be written back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from viewer.formats._nodes.content import NodeFile
+from viewer.formats._nodes.joints import Joints
+from viewer.rig.arrays import Ints
+from viewer.rig.file_record import FileRecord
+
+__all__ = ["record_of"]
+
+
+def record_of(
+    file: NodeFile, joints: Joints, nodes: list[int], columns: Mapping[int, Ints]
+) -> FileRecord:
+    """Return the record of one figure.
+
+    Parameters
+    ----------
+    file : NodeFile
+        Its asset, nodes and meshes.
+    joints : Joints
+        The joints of the figure.
+    nodes : list of int
+        Nodes with a mesh, one per part.
+    columns : mapping of (S,) int32
+        Blend shapes of each node's morph targets.
+    """
+    extras = file.tree.extras
+    meshes = [file.meshes[int(file.tree.meshes[node])] for node in nodes]
+    none = np.zeros(0, dtype=np.int32)
+    return FileRecord(
+        copyright=str(file.asset.get("copyright") or ""),
+        extras=file.extras,
+        joint_extras={joint: extras[node] for node, joint in joints.own.items() if node in extras},
+        part_extras={
+            part: extras[node]
+            for part, node in enumerate(nodes)
+            if node in extras and node not in joints.own
+        },
+        mesh_extras={
+            part: mesh.extras for part, mesh in enumerate(meshes) if mesh.extras is not None
+        },
+        mesh_names=tuple(mesh.name for mesh in meshes),
+        part_shapes=tuple(columns.get(node, none) for node in nodes),
+        target_names=tuple(mesh.target_names for mesh in meshes),
+    )

@@ -1,0 +1,82 @@
+"""All motions that a figure has, as keys: those of its file, one of them perhaps edited."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, figure_pose
+
+__all__ = ["has_own_animations", "own_animations", "still_pose"]
+
+_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
+
+
+def has_own_animations(actor: Actor) -> bool:
+    """Return whether an actor has animations, and plays one of them, an edit of one, or none.
+
+    False if constraints move its joints besides, as keys do not contain their effect.
+    """
+    clip, skeleton = actor.clip, actor.figure.skeleton
+    if skeleton is None or skeleton.constraints:
+        return False
+    return isinstance(clip, TransformClip) or (clip is None and bool(actor.figure.animations))
+
+
+def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformClip, ...]:
+    """Return the animations of an actor, with the edits of the one that it plays.
+
+    Animations without keys are left out.
+
+    Parameters
+    ----------
+    actor : Actor
+        See ``has_own_animations``.
+    only_played : bool
+        Return only the one that it plays.
+
+    Raises
+    ------
+    FormatError
+        If the keys of an animation are invalid.
+    """
+    played = actor.clip if isinstance(actor.clip, TransformClip) else None
+    if only_played:
+        clips = [] if played is None else [played]
+    else:
+        clips = [
+            played if played is not None and index == actor.animation else animation.clip()
+            for index, animation in enumerate(actor.figure.animations)
+        ]
+        if played is not None and actor.animation < 0:
+            clips.append(played)
+    return tuple(clip for clip in clips if clip.channels)
+
+
+def still_pose(actor: Actor) -> Pose:
+    """Return an actor's pose without what its motion changes, which is as in the file.
+
+    Parameters
+    ----------
+    actor : Actor
+        With a pose.
+    """
+    own, pose = figure_pose(actor.figure), actor.require_pose().copy()
+    if not isinstance(actor.clip, TransformClip):
+        return pose
+    skeleton = actor.figure.require_skeleton()
+    rotates = skeleton.dof_kinds >= _FIRST_ROTATION
+    for channel in actor.clip.channels:
+        joint, dofs = channel.joint, skeleton.dof_joints == channel.joint
+        if channel.path == "rotation":
+            pose.rotations[joint] = own.rotations[joint]
+            np.copyto(pose.dofs, own.dofs, where=dofs & rotates)
+        elif channel.path == "translation":
+            pose.translations[joint] = own.translations[joint]
+            np.copyto(pose.dofs, own.dofs, where=dofs & ~rotates)
+        elif channel.path == "scale":
+            pose.scales[joint] = own.scales[joint]
+        elif channel.shapes is not None:
+            pose.shape_weights[channel.shapes] = own.shape_weights[channel.shapes]
+    return pose

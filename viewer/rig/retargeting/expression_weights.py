@@ -1,0 +1,61 @@
+"""Weights of facial expressions for the blend shapes of a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.scene import figure_pose
+
+__all__ = ["expression_weights"]
+
+# Names in VRM 0.x, in lower case, and those in VRM 1.0.
+_OLD = {
+    **{"joy": "happy", "sorrow": "sad", "fun": "relaxed"},
+    **{"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"},
+    **{"blink_l": "blinkleft", "blink_r": "blinkright"},
+}
+
+
+def expression_weights(
+    expressions: Mapping[str, Floats], figure: Figure
+) -> tuple[Floats | None, list[Diagnostic]]:
+    """Return blend shape weights of a figure over time; other shapes keep those of its rest pose.
+
+    Parameters
+    ----------
+    expressions : mapping of str to (N,)
+        Weights by the names of VRM 1.0.
+    figure : Figure
+        Its blend shapes may have the names of VRM 0.x.
+
+    Returns
+    -------
+    weights : (N, S) or None
+        None if no expression moves a shape of the figure.
+    notes : list of Diagnostic
+        The expressions that the figure does not have.
+    """
+    shapes = figure.blend_shapes
+    names = () if shapes is None else shapes.names
+    # Expressions come after the morph targets, whose names they may share.
+    columns = {_plain(name): column for column, name in enumerate(names)}
+    found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
+    missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
+    notes = [Diagnostic("F007.expressions-unmatched", values={"names": missing})] if missing else []
+    if not found:
+        return None, notes
+    count = len(next(iter(expressions.values())))
+    weights = np.tile(figure_pose(figure).shape_weights, (count, 1))
+    for name, column in found.items():
+        weights[:, column] = expressions[name]
+    return weights, notes
+
+
+def _plain(name: str) -> str:
+    lower = name.lower()
+    return _OLD.get(lower, lower)
