@@ -118,7 +118,7 @@ def _write_poses(
 def _write_clips(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
-    """Write figures at rest with their animations, or only with the one that was asked for."""
+    """Write figures at rest with their animations, or only with the requested one."""
     is_chosen = bool(arguments.animation)
 
     def write(actor: Actor, path: Path) -> list[Diagnostic]:

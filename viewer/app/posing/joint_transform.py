@@ -28,7 +28,7 @@ __all__ = [
 
 _LABEL_WIDTH = 4.2  # in font sizes
 _LARGEST = 1e9
-_NOTICEABLE = 1e-4  # of the longest bone, and of a scale of 1; below it are rounding errors
+_NOTICEABLE = 1e-4  # relative to the longest bone, or to a scale of 1; less is rounding
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
 
 
@@ -72,7 +72,7 @@ def moved_joints(state: AppState) -> frozenset[int]:
 def _animated_joints(clip: TransformClip, skeleton: Skeleton) -> frozenset[int]:
     """Return the joints that a clip translates or scales noticeably away from rest.
 
-    Many exporters write channels for every joint, most of them without any effect.
+    Many exporters write channels for every joint, most of them without effect.
     """
     bones = np.linalg.norm(skeleton.rest_translations, axis=1)
     rests = {

@@ -25,9 +25,9 @@ MESSAGES = {
     "F002.vrma-bones": "expected nodes of human bones, found none",
     "F002.vrma-animation": "expected an animation of human bones, found none",
     "F002.vrma-long": "expected at most {most} frames, found {found}",
-    "F007.vrma-animations": "{n:#further animation} ignored: a motion file plays its first",
-    "F007.vrma-look": "the direction of the eyes is not shown",
-    "F007.expressions-unmatched": "no such expression on the figure: {names:list12}",
+    "F007.vrma-animations": "{n:#further animation} ignored: only the first is played",
+    "F007.vrma-look": "gaze direction is not shown",
+    "F007.expressions-unmatched": "the figure lacks expressions: {names:list12}",
     "F007.vrm-springs": "{n:#spring chain} not simulated: hair and clothes follow their joints",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON

@@ -52,7 +52,7 @@ class Written:
 
     @property
     def sources(self) -> Ints:
-        """The figure's vertex that each vertex of the file is a copy of."""
+        """The figure's vertex that each vertex of the file copies."""
         return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
@@ -93,7 +93,8 @@ def sides(
 ) -> tuple[Side, Callable[[int | None], Side]]:
     """Return a posed figure, and a function that returns the file, as comparable sides.
 
-    Parameters as for ``gltf_losses``; the function takes a number of influence sets, None for all.
+    Parameters as for ``gltf_losses``; the function takes a number of influence sets, or None for
+    all.
     """
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked

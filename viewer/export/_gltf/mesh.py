@@ -65,9 +65,9 @@ def add_mesh(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """Rows of a part in the space of its node.
+    """Vertices of a part in the space of its node.
 
-    ``positions``, ``normals`` (R, 3): of the written vertices; normals of unit length.
+    ``positions``, ``normals`` (R, 3): positions and unit normals of the written vertices.
     ``lengths`` (R, 1): lengths of the figure's own normals.
     ``linear`` (3, 3): from binding space to the space of the node.
     """

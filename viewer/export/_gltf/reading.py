@@ -26,7 +26,7 @@ from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skin import Skin, influence_counts, skin_from_entries
 
 Keys: TypeAlias = dict[tuple[int, str], Floats]
-"""Animated values by node and path, a row per frame."""
+"""Animated values by node and path, one row per frame."""
 
 _TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -75,7 +75,7 @@ class Placed:
     node : int
         Its node.
     part : Part
-        What it was written from.
+        The part from which it was written.
     """
 
     node: int
@@ -140,7 +140,7 @@ def read_back(
 
 
 def frame_keys(file: GltfFile) -> Keys:
-    """Return the animated values of a file whose keys are the frames."""
+    """Return the animated values of a file with one key per frame."""
     found: Keys = {}
     for animation in file.root.get("animations", ()):
         for channel in animation["channels"]:
@@ -232,7 +232,7 @@ def _one_body(
 def _skin(
     file: GltfFile, attributes: dict[str, int], slot: int, bound: Floats, sets: int | None
 ) -> Skin:
-    """Return the influences of a mesh; without any, all vertices follow one slot."""
+    """Return the influences of a mesh; if it has none, all vertices follow one slot."""
     count = file.root["accessors"][attributes["POSITION"]]["count"]
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]
@@ -251,7 +251,7 @@ def _skin(
 
 
 def _joined(skins: list[Skin], bound: Floats) -> Skin:
-    """Return one skin with the vertices of several, one after the other."""
+    """Return one skin with the concatenated vertices of several."""
     counts = np.concatenate([influence_counts(skin) for skin in skins])
     return Skin(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),

@@ -2,7 +2,7 @@
 
 Read: all properties of the core specification, ``KHR_texture_transform``, ``KHR_materials_unlit``,
 ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived model
-``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated, see
+``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated; see
 ``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored
 with a warning, because the shape can still be shown.
 """
@@ -106,7 +106,7 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element, is_unlit: bool) -> _Stated:
-    """Return the properties of a material; ``is_unlit`` if an extension of the file says so."""
+    """Return the properties of a material; ``is_unlit``: whether VRM declares it unlit."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None

@@ -99,7 +99,7 @@ class Primitive:
     normal_targets : (S, V, 3) or None
         Offsets of the normals; None if the file has none.
     pointer : str
-        JSON pointer to it; empty in other files.
+        JSON pointer to it; empty for files without JSON.
     """
 
     positions: Floats
@@ -205,7 +205,7 @@ class NodeAnimation:
     read : callable
         Returns the channels; called at most once, may raise a ``FormatError``.
     pointer : str
-        JSON pointer to it; empty in other files.
+        JSON pointer to it; empty for files without JSON.
     """
 
     name: str
@@ -294,11 +294,11 @@ class NodeFile:
     constraints : tuple of Constraint
         Nodes (instead of joints) that follow others, in the order of evaluation.
     part_views : dict of PartView
-        The views for which the meshes of some nodes are meant.
+        The views in which the meshes of some nodes are drawn.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
     has_pointers : bool
-        Whether elements have JSON pointers, ``/nodes/3`` for instance.
+        Whether elements have JSON pointers, such as ``/nodes/3``.
     """
 
     name: str

@@ -121,7 +121,7 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights, at the first of them."""
+    """Record sums of weights that are not 1, and vertices without weights, at the first one."""
     odd = [piece for piece in pieces if piece.influences.n_deviating]
     if odd:
         n = sum(piece.influences.n_deviating for piece in odd)
@@ -134,6 +134,6 @@ def _note_weights(pieces: list[Piece], source: Source) -> None:
 
 
 def _weights_of(piece: Piece) -> str | None:
-    """Return the JSON pointer to the weights of a primitive; None without one."""
+    """Return the JSON pointer to the weights of a primitive; None if there is none."""
     pointer = piece.primitive.pointer
     return f"{pointer}/attributes/WEIGHTS_0" if pointer else None

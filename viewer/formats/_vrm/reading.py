@@ -81,7 +81,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
 
 
 def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
-    """Return facts about the parts for one view only, and the constraints."""
+    """Return facts about parts that are drawn in one view only, and about constraints."""
     names = file.tree.names
     shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
     facts = [
