@@ -1,4 +1,4 @@
-"""Playback of animations that figures have in their files."""
+"""Playback of the animations in the actors' files."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def test_degenerate_triangles_of_strips_are_omitted() -> None:
 
 
 @pytest.mark.parametrize("kind", ["B", "H", "I"])
-def test_indices(kind: str) -> None:
+def test_indices_select_vertices(kind: str) -> None:
     file = File()
     file.mesh(SQUARE)
     file.primitive["indices"] = file.accessor([3, 1, 0, 0, 2, 3, 1], kind)
@@ -84,7 +84,7 @@ def test_v_is_0_at_the_bottom_of_images() -> None:
     assert first.shape == (3, 2)  # materials refer to sets by their numbers
 
 
-def test_colors() -> None:
+def test_colours_are_linear_with_opacity() -> None:
     file = File()
     file.mesh(COLOR_0=file.accessor([[0.5, 0.25, 2], [0, 0, 0], [1, 1, 1]]))
     assert only(file).colors.tolist() == [[0.5, 0.25, 2, 1], [0, 0, 0, 1], [1, 1, 1, 1]]

@@ -104,7 +104,7 @@ def test_expressions_of_version_0_bind_meshes_in_percent(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_parts_for_the_first_person_start_hidden(tmp_path: Path, version: int) -> None:
+def test_first_person_parts_start_hidden(tmp_path: Path, version: int) -> None:
     told = {} if version == 0 else _modern({})
     note = {"mesh": 0, "firstPersonFlag": "FirstPersonOnly"}
     if version == 1:

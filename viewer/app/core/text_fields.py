@@ -1,4 +1,4 @@
-"""Fields for text and typed numbers, which behave like those of other desktop software.
+"""Fields for text and typed numbers that behave as in other desktop software.
 
 ImGui provides selection, clipboard, undo within a field, and Tab between fields. In this module,
 fields also select their content when they get the focus, Escape restores the old value, and numbers

@@ -64,7 +64,7 @@ MESSAGES = {
     "data after {size} bytes",
     "F002.gltf-no-data": "expected a uri or a binary chunk, found neither",
     "F002.gltf-compressed": "expected valid compressed data, found damaged data",
-    "F002.gltf-draco": "compressed with Draco, which needs the extra draco: pip install DracoPy",
+    "F002.gltf-draco": "compressed with Draco, which requires DracoPy: pip install DracoPy",
     "F002.gltf-draco-id": "expected an attribute of the compressed data, found {found}",
     "F002.gltf-decoded-width": "expected {expected:#component}, found {found} in compressed data",
     "F002.gltf-decoded": "expected at most {most} bytes of decoded data for a file of this size, "

@@ -91,7 +91,7 @@ def gltf_losses(
 def sides(
     written: Written, figure: Figure, frames: Frames, how: Skinning, shape: Shape
 ) -> tuple[Side, Callable[[int | None], Side]]:
-    """Return a posed figure, and a function that returns the file, as comparable sides.
+    """Return a posed figure, and a function that returns a file in the same form.
 
     Parameters as for ``gltf_losses``; the function takes a number of influence sets, or None for
     all.

@@ -140,7 +140,7 @@ def _mesh_name(figure: Figure, index: int, name: str) -> str:
 
 
 def _targets(shape: Shape, index: int, sources: Ints) -> tuple[NDArray[np.intp], tuple[str, ...]]:
-    """Return a part's morph targets, as indices into those of the figure, and their names."""
+    """Return a part's morph targets, as indices into the figure's, and their names."""
     every = np.arange(len(shape.targets))
     shapes, record = shape.figure.blend_shapes, shape.figure.record
     if shapes is None or len(every) == 0:

@@ -58,7 +58,7 @@ def influences_of(skin: Skin) -> Influences:
     """Return a skin in the form that glTF can store.
 
     ``skin``: a skin with arbitrary weights.
-    Raises RigError if there are more joints than a file can number.
+    Raises RigError if there are more joints than a file can index.
     """
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
     owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
@@ -112,7 +112,7 @@ def influence_sets(
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
 
-    ``influences``: determines whether any vertices are fixed; the node of these is bound at the
+    ``influences``: determines whether any vertices are fixed; their node is bound at the
     origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]

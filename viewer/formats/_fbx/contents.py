@@ -153,7 +153,7 @@ def _channels(
 
 
 def _joined(rows: dict[int, Floats], still: list[float]) -> tuple[Floats, Floats]:
-    """Return all key times of a mesh's shapes, (N,), and all weights there, (N, S)."""
+    """Return all key times of a mesh's shapes, (N,), and the weights at these times, (N, S)."""
     times = np.unique(np.concatenate([table[:, 0] for table in rows.values()]))
     values = np.tile(still, (len(times), 1))
     for row, table in rows.items():

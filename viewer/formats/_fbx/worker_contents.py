@@ -144,7 +144,7 @@ def _mesh(kept: KeptScene, at: int, mesh: Any) -> dict[str, Any]:
     return {
         "name": str(kept.get(mesh, "name")),
         "nodes": [int(node.typed_id) for node in instances],
-        # A mesh's list of materials is that of its first node; each node has its own list.
+        # A mesh lists the materials of its first node; each node has its own list.
         "materials": [
             [int(material.typed_id) for material in kept.items(node, "materials")]
             for node in instances

@@ -154,7 +154,7 @@ class Accessors:
     ) -> Floats:
         """Return an accessor whose integers must be normalised, such as colours or weights.
 
-        Parameters, shape and errors are those of ``floats``. A missing flag causes a warning.
+        Parameters, shape and errors as for ``floats``. A missing flag causes a warning.
         """
         values = self.floats(index, kinds, user, rows, decoded)
         layout = self._layout(index, kinds, user)
@@ -173,7 +173,7 @@ class Accessors:
     ) -> NDArray[np.int64]:
         """Return an accessor as whole numbers: (N, C) or (M, C) int64.
 
-        Parameters and errors are those of ``floats``; floating-point components are also an error.
+        Parameters and errors as for ``floats``; floating-point components are also an error.
         """
         layout = self._layout(index, kinds, user)
         if layout.dtype.kind == "f" or layout.is_normalized:

@@ -1,4 +1,4 @@
-"""Check that vertices refer only to joints that their skin has."""
+"""Validation of the joint indices of skinned meshes."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Element:
         return pointer_to(self.pointer, *keys)
 
     def has(self, name: str) -> bool:
-        """Return whether there is a member of this name."""
+        """Return whether the object has a member of this name."""
         return name in self.values
 
     def fault(self, key: str, name: str = "", **values: Any) -> FormatError:

@@ -13,7 +13,7 @@ __all__ = ["read_influences"]
 def read_influences(attributes: Attributes) -> tuple[Ints, Floats] | tuple[None, None]:
     """Return joints (V, K) int32 and weights (V, K), as stored; None if there are none.
 
-    Joint indices of weight 0 are set to 0, because files may contain any number there.
+    Joint indices of weight 0 are set to 0, because files may contain any number in these slots.
 
     Raises
     ------

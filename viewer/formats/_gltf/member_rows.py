@@ -64,7 +64,7 @@ def _array(items: list[Any], width: int) -> Floats | None:
 
 
 def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
-    """Return a member that is an index below ``count`` for each object, -1 if missing: (N,).
+    """Return an index below ``count`` from a member of each object, -1 if it is missing: (N,).
 
     Raises
     ------

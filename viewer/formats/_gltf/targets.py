@@ -38,7 +38,7 @@ def read_targets(attributes: Attributes, targets: Table) -> tuple[Floats | None,
     Raises
     ------
     FormatError
-        If they are malformed.
+        If the targets are malformed.
     """
     if not len(targets):
         return None, None
@@ -71,7 +71,7 @@ def shape_weights(mesh: Element, count: int) -> Floats:
     Raises
     ------
     FormatError
-        If they are not numbers.
+        If the weights are not numbers.
     """
     weights = mesh.numbers("weights")
     return np.zeros(count) if weights is None else _fitted(mesh, weights, count)

@@ -86,7 +86,7 @@ def data_uri_bytes(element: Element, most: int | None = None) -> bytes:
     Raises
     ------
     FormatError
-        If it is malformed.
+        If the URI is malformed.
     """
     uri = element.text("uri")
     comma = uri.find(",")

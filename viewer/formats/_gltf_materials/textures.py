@@ -141,7 +141,7 @@ def _pair(extension: Element, name: str, default: float) -> Floats:
 def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     """Return a texture transform with v = 0 at the bottom: F T(offset) R(-angle) S(scale) F.
 
-    F flips v: glTF puts v = 0 at the first row of the image. The transform is that of
+    F flips v: glTF puts v = 0 at the first row of the image. The transform follows
     KHR_texture_transform, whose rotation is counter-clockwise as seen on the image.
 
     Parameters

@@ -25,7 +25,7 @@ class Members:
     nodes : list of int
         Nodes that become joints, parents first.
     skins : list of int
-        Skins of the figure; those of meshes come first, in the order of the meshes.
+        Skins of the figure; skins of meshes come first, in the order of the meshes.
     meshes : list of int
         Nodes whose meshes are parts of the figure, in tree order.
     name : str

@@ -161,7 +161,7 @@ def skeleton_of(
     humanoid : mapping of str to int, optional
         Node of each human bone; nodes that are not joints of this figure are ignored.
     constraints : iterable of Constraint
-        Constraints between nodes; those of other figures are ignored.
+        Constraints between nodes; constraints of other figures are ignored.
 
     Returns
     -------

@@ -217,7 +217,7 @@ def _targets(
     lines: list[TransformChannel],
     cubics: list[TransformChannel],
 ) -> Targets:
-    """Return the targets of a path, with those of arcs or lines first."""
+    """Return the targets of a path: targets of arcs or lines first, then of cubic curves."""
     plain = arcs if path == "rotation" else lines
     indices = [np.zeros(0, dtype=np.int32)]
     for channel in (*plain, *cubics):
@@ -232,7 +232,7 @@ def _targets(
 
 
 def _components(path: str, channels: list[TransformChannel]) -> slice:
-    """Return the range of a path's components among those of ordered channels."""
+    """Return the range of a path's components among all components of ordered channels."""
     widths = [(channel.path, channel.n_components) for channel in channels]
     place = TRANSFORM_PATHS.index
     start = sum(width for other, width in widths if place(other) < place(path))
