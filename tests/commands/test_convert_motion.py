@@ -7,12 +7,15 @@ import json
 import numpy as np
 import pytest
 from app.tiny import write_rig
+from export.gltf.two_parts import two_parts
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
+from viewer.export import export_clips
 from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.scene import Actor
 
 
 @pytest.fixture
@@ -192,3 +195,29 @@ def test_invalid_name_is_a_usage_error_before_anything_is_read(
     assert error.count("\n") == 1 and "missing.skel" not in error
     assert all(word in error for word in words)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "animations", "printed"),
+    [
+        ([], ["wave", "jump"], "2 animations with their own keys"),
+        (["--animation", "jump"], ["jump"], "1 animation with its own keys"),
+        (["--animation", "none"], [], "2 joints"),
+        (["--time", "0.5"], [], "2 joints"),
+        (["--frames", "0:4"], ["wave"], "4 frames (0 to 3)"),
+        (["--optimize"], ["wave", "jump"], "quantised with rounding errors of up to"),
+    ],
+)
+def test_animations_are_written_with_their_keys(tmp_path, capsys, options, animations, printed):
+    export_clips(Actor(two_parts()), tmp_path / "in.glb")
+    assert run(["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.glb", *options]) == 0
+    assert printed in capsys.readouterr().out
+    figure = viewer.load(tmp_path / "out.glb").actors[0].figure
+    assert [animation.name for animation in figure.animations] == animations
+
+
+def test_only_gltf_is_optimised(tmp_path, capsys):
+    export_clips(Actor(two_parts()), tmp_path / "in.glb")
+    command = ["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.bvh", "--optimize"]
+    assert run(command) == 2
+    assert "--optimize: expected .glb or .gltf, found .bvh" in capsys.readouterr().err

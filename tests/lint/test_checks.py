@@ -26,7 +26,7 @@ def test_registry_is_exactly_its_folder() -> None:
 
 def test_codes_have_a_severity_a_title_and_a_hint() -> None:
     for name, code in CODES.items():
-        assert name[0] in "FWBSMYC" and name[1:].isdecimal() and len(name) == 4
+        assert name[0] in "FGWBSMYC" and name[1:].isdecimal() and len(name) == 4
         assert code.severity in SEVERITIES and code.title and code.hint
 
 

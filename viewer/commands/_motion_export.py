@@ -30,7 +30,7 @@ from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip
 from viewer.rig.captures.sampled_points import SampledPoints, sample_upright_points
 from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.own_animations import has_own_animations
+from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
@@ -68,6 +68,12 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         "--rest-frame", action="store_true", help="BVH: begin with a rest pose frame"
     )
     group.add_argument(
+        "--optimize",
+        action="store_true",
+        help="glTF: quantise positions, normals, texture coordinates and weights to 16 bits "
+        "(KHR_mesh_quantization); the errors are printed",
+    )
+    group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
     )
 
@@ -92,7 +98,7 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
     return moves and not wants_one and suffix not in _ONE_A_FRAME
 
 
-def keeps_keys(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
+def writes_keys(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
     """Return whether animations are written with their own keys instead of as frames.
 
     This is the case for formats with keys, unless frames, a rate or a single pose is requested, or
@@ -106,7 +112,7 @@ def keeps_keys(arguments: argparse.Namespace, output: Path, scene: Scene) -> boo
     if any(option is not None for option in options):
         return False
     moving = [actor for actor in scene.actors if actor.clip is not None]
-    return bool(moving) and all(has_own_animations(actor) for actor in moving)
+    return bool(moving) and all(keeps_keys(scene, actor) for actor in moving)
 
 
 def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionOptions:
@@ -122,6 +128,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         rest_frame=arguments.rest_frame,
         digits=digits,
         skinning=skinning,
+        optimizes=arguments.optimize,
     )
 
 

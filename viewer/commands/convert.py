@@ -12,10 +12,10 @@ from viewer.commands._motion_export import (
     check_kind,
     check_numbered,
     is_motion,
-    keeps_keys,
     left_out_notes,
     pose_or_point_actors,
     write_motions,
+    writes_keys,
 )
 from viewer.commands._one_pose import check_frame_options
 from viewer.commands._output import inputs_of
@@ -31,7 +31,7 @@ from viewer.commands._scene import (
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError, UnsupportedFormatError
+from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_clips, files_written
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
-    if keeps_keys(arguments, output, scene):
+    if writes_keys(arguments, output, scene):
         write = _write_clips
     notes = write(arguments, scene, output, skinning)
     print("\n".join(map(str, notes)), file=summary_stream(output))
@@ -99,6 +99,8 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
+    if arguments.optimize and not any(kind.writes_keys for kind in kinds):
+        raise ViewerError(f"--optimize: expected .glb or .gltf, found {printable(suffix)}")
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
@@ -112,19 +114,23 @@ def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
     """Write the current poses."""
-    return _write_actors(arguments, scene, output, lambda a, path: export(a, path, skinning))
+    optimizes = bool(arguments.optimize)
+    return _write_actors(
+        arguments, scene, output, lambda a, path: export(a, path, skinning, optimizes)
+    )
 
 
 def _write_clips(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
     """Write figures at rest with their animations, or only with the requested one."""
-    is_chosen = bool(arguments.animation)
+    is_chosen, optimizes = bool(arguments.animation), bool(arguments.optimize)
 
     def write(actor: Actor, path: Path) -> list[Diagnostic]:
         if not has_own_animations(actor):
-            return export(actor, path, skinning)
-        return export_clips(actor, path, skinning, own_animations(actor, is_chosen))
+            return export(actor, path, skinning, optimizes)
+        clips = own_animations(actor, is_chosen)
+        return export_clips(actor, path, skinning, clips, optimizes)
 
     return _write_actors(arguments, scene, output, write)
 

@@ -37,7 +37,8 @@ class Collector:
         if found.is_refusal:
             self._found.append(found)
             return
-        message = found.message
+        # Whoever looks for all errors wants each element that has one.
+        message = f"{found.pointer} {found.message}" if self.keeps_errors else found.message
         if message in self._warned or len(self._warned) > _MOST:
             return
         self._warned.add(message)

@@ -164,7 +164,9 @@ def exporter_for(path: str | Path) -> str:
     raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {known}')
 
 
-def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> list[Diagnostic]:
+def export(
+    actor: Actor, path: str | Path, skinning: Skinning | None = None, optimizes: bool = False
+) -> list[Diagnostic]:
     """Write an actor in its current pose; its placement in the scene is omitted.
 
     Parameters
@@ -175,6 +177,8 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
         The suffix selects the exporter; existing files are replaced.
     skinning : Skinning, optional
         Skinning method and options.
+    optimizes : bool
+        Quantise vertices, which glTF can.
 
     Returns
     -------
@@ -185,14 +189,17 @@ def export(actor: Actor, path: str | Path, skinning: Skinning | None = None) -> 
     Raises
     ------
     UnsupportedFormatError
-        If no exporter writes this suffix.
+        If no exporter writes this suffix, or it cannot quantise.
     RigError
         If the figure lacks the data that the format needs.
     OutputError
         If a file cannot be written.
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
-    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning())
+    options = (True,) if optimizes else ()
+    if optimizes and not EXPORTERS[exporter_for(path)].writes_keys:
+        raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
+    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), *options)
     if actor.hidden_parts:
         notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
     return notes
@@ -203,6 +210,7 @@ def export_clips(
     path: str | Path,
     skinning: Skinning | None = None,
     clips: Sequence[TransformClip] | None = None,
+    optimizes: bool = False,
 ) -> list[Diagnostic]:
     """Write a figure at rest, with animations that keep their own keys.
 
@@ -216,6 +224,8 @@ def export_clips(
         Skinning method and options.
     clips : sequence of TransformClip, optional
         All of the actor's animations if omitted.
+    optimizes : bool
+        Quantise vertices.
 
     Returns
     -------
@@ -233,7 +243,10 @@ def export_clips(
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     chosen = own_animations(actor) if clips is None else clips
-    notes: list[Diagnostic] = module.export_clips(actor, Path(path), skinning or Skinning(), chosen)
+    how = skinning or Skinning()
+    notes: list[Diagnostic] = module.export_clips(actor, Path(path), how, chosen, optimizes)
+    if actor.hidden_parts:
+        notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
     return notes
 
 

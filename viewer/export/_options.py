@@ -43,6 +43,8 @@ class MotionOptions:
         world.
     skinning : Skinning
         Skinning method and options, if vertices are written.
+    optimizes : bool
+        Quantise the vertices of glTF files.
     """
 
     unit: str = ""
@@ -53,6 +55,7 @@ class MotionOptions:
     digits: int = 6
     world_up: str = "y"
     skinning: Skinning = field(default_factory=Skinning)
+    optimizes: bool = False
 
     @property
     def closing(self) -> str:

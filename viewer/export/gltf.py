@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._gltf.body import Body, Built, add_body, body_of
@@ -30,11 +30,13 @@ from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
+from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
@@ -43,7 +45,9 @@ from viewer.rig.units import METRES, UNIT_NAMES
 __all__ = ["export", "export_animation", "export_clips"]
 
 
-def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
+def export(
+    actor: Actor, path: Path, skinning: Skinning, optimizes: bool = False
+) -> list[Diagnostic]:
     """Write a figure in its current pose; see ``viewer.export.export``."""
     figure, pose = actor.figure, actor.pose
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
@@ -52,11 +56,11 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     if skeleton is not None and pose is not None:
         still = locals_of(skeleton, pose)
     document = Document(figure.name)
-    built = add_body(document, body, figure.up, pose, still, actor.color)
+    built = add_body(document, body, figure.up, pose, still, actor.color, optimizes=optimizes)
     (data,) = _files([(path, document)])
     written = {"counts": built.counts, "size": len(data[path])}
     notes = [Diagnostic("X001.gltf", path, values=written)]
-    notes += _beside(data, path) + _remarks(body, figure.up)
+    notes += _beside(data, path) + _quantization(path, built, figure) + _remarks(body, figure.up)
     file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
     figure, frames = pose_frames(figure, pose)
     rows = np.zeros(1, dtype=np.intp)
@@ -65,7 +69,11 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
 
 
 def export_clips(
-    actor: Actor, path: Path, skinning: Skinning, clips: Sequence[TransformClip]
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    clips: Sequence[TransformClip],
+    optimizes: bool = False,
 ) -> list[Diagnostic]:
     """Write a figure at rest with animations, which keep their keys and interpolation.
 
@@ -79,6 +87,8 @@ def export_clips(
         Selects influences, and is the reference for the measured error.
     clips : sequence of TransformClip
         Motions of the figure; see ``own_animations``.
+    optimizes : bool
+        Whether vertex attributes are quantised.
 
     Returns
     -------
@@ -98,12 +108,12 @@ def export_clips(
     body = body_of(figure, replace(shape, weights=shape.weights[:1]), skinning)
     document = Document(figure.name)
     locals_ = locals_of(body.figure.require_skeleton(), pose)
-    built = add_body(document, body, figure.up, pose, locals_, actor.color)
+    built = add_body(document, body, figure.up, pose, locals_, actor.color, optimizes=optimizes)
     kept = add_clips(document, clips, built.tree, built.meshes, shape.targets, weights[0])
     (data,) = _files([(path, document)])
     written = {"counts": built.counts, "n": len(kept), "size": len(data[path])}
     notes = [Diagnostic("X001.gltf-animations", path, values=written)]
-    notes += _beside(data, path) + _remarks(body, figure.up)
+    notes += _beside(data, path) + _quantization(path, built, figure) + _remarks(body, figure.up)
     file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
     notes += clip_losses(file, figure, pose, kept, skinning, body)
     early = [clip.name for clip in kept if first_time(clip) < 0.0]
@@ -153,9 +163,7 @@ def export_animation(
     documents, built = [], []
     for start, stop in spans:
         document = Document(animation.name)
-        built.append(
-            _add_animation(document, animation, body, frames, (start, stop), options.world_up)
-        )
+        built.append(_add_animation(document, animation, body, frames, (start, stop), options))
         documents.append(document)
     notes, lost = list[Diagnostic](), list[Diagnostic]()
     saved = _files(list(zip(paths, documents, strict=True)))
@@ -167,6 +175,7 @@ def export_animation(
             "size": len(data[file]),
         }
         notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
+        notes += _quantization(file, made, animation.figure)
         written = Written(file, parsed([*data.values()]), made.tree, made.meshes, start)
         rows = start + np.flatnonzero(present[start:stop])
         lost += gltf_losses(
@@ -205,7 +214,7 @@ def _add_animation(
     body: Body,
     frames: Frames,
     span: tuple[int, int],
-    up: str,
+    options: MotionOptions,
 ) -> Built:
     """Add a figure at rest, and a range of frames as an animation."""
     skeleton = body.figure.require_skeleton()
@@ -220,7 +229,11 @@ def _add_animation(
         body = replace(body, shape=replace(body.shape, weights=weights))
     is_still = not np.ptp(part.figure_translations, axis=0).any() and not np.ptp(part.figure_scales)
     locals_ = still_locals(skeleton, rest, part)
-    built = add_body(document, body, up, pose, locals_, is_still=is_still)
+    built = add_body(
+        *(document, body, options.world_up, pose, locals_),
+        is_still=is_still,
+        optimizes=options.optimizes,
+    )
     morphs = [
         (placed.node, own)
         for placed in built.meshes
@@ -253,6 +266,21 @@ def _beside(data: dict[Path, bytes], path: Path) -> list[Diagnostic]:
     return [
         Diagnostic("X001.gltf-arrays", file, values={"size": size}) for file, size in others.items()
     ]
+
+
+def _quantization(path: Path, built: Built, figure: Figure) -> list[Diagnostic]:
+    """Return a note with the largest rounding errors of quantised attributes, if there are any."""
+    errors = built.errors
+    if not errors:
+        return []
+    parts = []
+    if "positions" in errors:
+        length = length_text(figure, errors["positions"])
+        parts.append(Phrase("quantized-positions", length=length))
+    for kind, factor in (("normals", 180.0 / np.pi), ("uvs", 1.0), ("weights", 1.0)):
+        if kind in errors:
+            parts.append(Phrase(f"quantized-{kind}", error=f"{factor * errors[kind]:.2g}"))
+    return [Diagnostic("X002.quantized", path, values={"parts": parts})]
 
 
 def _remarks(body: Body, up: str) -> list[Diagnostic]:

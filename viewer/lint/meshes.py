@@ -22,6 +22,7 @@ _AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are sm
 # Squared number of border edges per triangle: with smaller holes, the sign of the volume is
 # reliable.
 _CLOSED = 0.25
+_HOLLOW = 1e-6  # volume relative to area^1.5 that is rounding: of two caps that lie on each other
 # Multiple of the median distance of vertices from their median: feet are at 16 times that distance
 # in models with half of their vertices in the face.
 _FAR = 40.0
@@ -218,8 +219,9 @@ def _inside_out(
     a, b, c = (mesh.positions[mesh.triangles[valid, k]] - middle[component] for k in range(3))
     volumes = signs * np.einsum("ta,ta->t", a, np.cross(b, c))
     total = np.bincount(component, volumes, minlength=count)
+    areas = np.bincount(component, np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count)
     is_closed = open_edges**2 <= _CLOSED * members
-    wrong = np.flatnonzero((total < 0.0) & is_closed & (members >= 4))
+    wrong = np.flatnonzero((total < -_HOLLOW * areas**1.5) & is_closed & (members >= 4))
     if len(wrong) == 0:
         return []
     triangles = valid[np.isin(component, wrong)]

@@ -19,9 +19,11 @@ from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
+from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.clip import Clip, misfit, suits
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
@@ -111,6 +113,9 @@ def _named_model(cast: Cast, path: Path | None) -> Figure | None:
         return None
     source = Source.open(path)
     model = read(source)
+    if isinstance(model, FigureGroup):
+        complete = [each for each in model.figures if each.is_attached]
+        model = complete[0] if complete else model.figures[0]
     if not isinstance(model, Figure) or model.skeleton is None or model.mesh is None:
         raise source.fault("F002.no-body-model")
     cast.diagnostics += source.diagnostics.warnings
@@ -159,22 +164,39 @@ def _give_body_motion(
 ) -> None:
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
+    lost = motion.shape is not None, motion.expression is not None
     if is_bundled:
-        _note_bundled(cast, path, motion.shape is not None, motion.expression is not None)
         motion = replace(motion, shape=None, expression=None)
     try:
         clip, notes = body_clip(motion, model)
     except RigError as problem:
         values = {"problem": problem.cause}
         raise RigError(Diagnostic("F004.model", path, values=values)) from None
-    cast.diagnostics += [replace(note, path=path) for note in notes]
     actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
     up = settings.up or motion.up
     if not up:
         up = _judged_up(path, [actor], cast)
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
+    if is_bundled and settings.drives and _drives_character(path, motion.name, actor, up, cast):
+        return
+    if is_bundled:
+        _note_bundled(cast, path, *lost)
+    cast.diagnostics += [replace(note, path=path) for note in notes]
     cast.add(actor, up[-1], placed=False)
+
+
+def _drives_character(path: Path, name: str, actor: Actor, up: str, cast: Cast) -> bool:
+    """Let a motion of the bundled body drive another figure that has its joints, if any."""
+    if not any(other.clip is None and other.figure.is_attached for other in cast.actors):
+        return False
+    from viewer.loading.skeleton_motions import drive_somebody
+    from viewer.rig.motion.skeleton_motion import SkeletonMotion
+
+    assert isinstance(actor.clip, SampledClip)  # that of a captured body
+    body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
+    motion = SkeletonMotion(body, actor.clip)
+    return drive_somebody(path, motion, cast, actor.placement)[0]
 
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:

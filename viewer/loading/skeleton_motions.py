@@ -20,7 +20,7 @@ from viewer.rig.retargeting.retarget import retarget, scaled_motion
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.units import METRES, is_metres
 
-__all__ = ["Lone", "agree_on_units", "give_skeleton_motion"]
+__all__ = ["Lone", "agree_on_units", "drive_somebody", "give_skeleton_motion"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,8 +90,12 @@ def give_skeleton_motion(
             Actor(model, clip=clip, placement=placement, called=called), model.up, placed=False
         )
         return None
-    if settings.drives and _drives_somebody(path, motion, cast, placement):
-        return None
+    if settings.drives:
+        is_driving, refusal = drive_somebody(path, motion, cast, placement)
+        if is_driving:
+            return None
+        if refusal:
+            cast.note("F007.stands-alone", path, problem=refusal)
     called = cast.free_title(motion.figure.name)
     actor = Actor(motion.figure, clip=motion.clip, placement=placement, called=called)
     cast.add(actor, motion.figure.up, placed=False)
@@ -120,8 +124,29 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
     return replace(scaled, figure=replace(scaled.figure, facts=kept), unit_note=None)
 
 
-def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats) -> bool:
-    """Assign a motion to the first matching figure with a mesh and no clip, if any."""
+def drive_somebody(
+    path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats
+) -> tuple[bool, str | Diagnostic]:
+    """Assign a motion to the first matching figure with a mesh and no clip, if any.
+
+    Parameters
+    ----------
+    path : Path
+        File of the motion, for messages.
+    motion : SkeletonMotion
+        Motion of another skeleton.
+    cast : Cast
+        Its actor gets the clip.
+    placement : (4, 4)
+        Applied to that actor.
+
+    Returns
+    -------
+    is_driving : bool
+        Whether there is such a figure.
+    refusal : str or Diagnostic
+        Why the first figure does not match; empty if there is none.
+    """
     refusal: str | Diagnostic = ""
     for actor in cast.actors:
         if actor.clip is not None or not actor.figure.is_attached:
@@ -133,10 +158,8 @@ def _drives_somebody(path: Path, motion: SkeletonMotion, cast: Cast, placement: 
             continue
         actor.placement = placement @ actor.placement
         cast.diagnostics += [replace(note, path=path) for note in notes]
-        return True
-    if refusal:
-        cast.note("F007.stands-alone", path, problem=refusal)
-    return False
+        return True, ""
+    return False, refusal
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:

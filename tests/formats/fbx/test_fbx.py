@@ -26,7 +26,7 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> NodeFile:
 
 @needs_ufbx
 def test_nodes_keep_names_and_parents(strip: NodeFile) -> None:
-    assert strip.tree.names == ("", "Body", "low", "high")
+    assert strip.tree.names == ("RootNode", "Body", "low", "high")
     assert strip.tree.parents.tolist() == [-1, 0, 0, 2]
     assert_allclose(strip.tree.translations[3], [0.0, 1.0, 0.0])
     assert (strip.up, strip.unit) == ("y", "cm")

@@ -105,6 +105,8 @@ def skinned(**attributes: Any) -> File:
     joints = file.accessor([[0, 1, 0, 0]] * 3, "B")
     weights = file.accessor([[0.25, 0.75, 0, 0]] * 3)
     file.mesh(JOINTS_0=joints, WEIGHTS_0=weights, **attributes)
+    positions = file.primitive["attributes"]["POSITION"]
+    file.root["accessors"][positions] |= {"min": [0, 0, 0], "max": [1, 1, 0]}
     file.root["nodes"] = [{"mesh": 0, "skin": 0}, {"children": [2]}, {}]
     file.root["skins"] = [{"joints": [1, 2]}]
     return file

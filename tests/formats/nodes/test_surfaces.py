@@ -14,7 +14,7 @@ from tests.formats.nodes.node_files import (
     triangle,
     vertices,
 )
-from viewer.formats._nodes.content import NodeAnimation, NodeChannel, Primitive
+from viewer.formats._nodes.content import NodeAnimation, NodeChannel, NodeSkin, Primitive
 from viewer.formats._nodes.figures import figure_group
 from viewer.rig.material import Material
 from viewer.rig.scene import figure_pose
@@ -144,3 +144,28 @@ def test_equally_animated_targets_share_sliders():
 def test_facts_contain_the_asset(key):
     file = file_of(tree_of({"mesh": 0}), meshes=(mesh(triangle(1)),), asset={key: "somebody"})
     assert (key, "somebody") in figure_of(file).facts
+
+
+def test_binding_space_is_the_scene():
+    """A triangle bound at rest by two joints, whose matrices undo a quantisation."""
+    tree = tree_of(
+        {"name": "hip", "translation": [0, 1, 0]},
+        {"name": "knee", "parent": 0, "translation": [0, 2, 0]},
+        {"mesh": 0, "skin": 0},
+    )
+    decode = np.diag([2.0, 2.0, 4.0, 1.0])
+    decode[:3, 3] = 5.0, 6.0, 7.0
+    matrices = np.stack([decode, decode])
+    matrices[:, 1, 3] -= 1.0, 3.0
+    bound = NodeSkin("", np.array([0, 1], dtype=np.int32), matrices)
+    primitive = triangle(1, 2, normals=np.tile([0.6, 0.0, 0.8], (3, 1)))
+    figure = figure_of(file_of(tree, meshes=(mesh(primitive),), skins=(bound,)))
+    x, y, z = primitive.positions.T
+    scene = np.column_stack([2.0 * x + 5.0, 2.0 * y + 6.0, 4.0 * z + 7.0])
+    assert_allclose(figure.mesh.positions, scene, atol=1e-12)
+    assert_allclose(deform(figure)[0], scene, atol=1e-12)
+    # The normal is divided by the scale, (0.3, 0, 0.2), and keeps its length.
+    assert_allclose(figure.mesh.normals[0], np.array([3.0, 0.0, 2.0]) / 13.0**0.5, atol=1e-12)
+    inverse = np.tile(np.eye(4), (2, 1, 1))
+    inverse[:, 1, 3] = -1.0, -3.0
+    assert_allclose(figure.skin.inverse_bind[:2], inverse, atol=1e-12)

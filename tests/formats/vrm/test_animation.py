@@ -8,31 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from formats.gltf.files import File
+from formats.vrm.humanoids import ABOUT_Y, ABOUT_Z, character, humanoid
 from numpy.testing import assert_allclose
 
 import viewer
 from viewer.errors import FormatError
+from viewer.loading import MotionSettings
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.skinning import joint_matrices
-
-BONES = ("hips", "spine", "head", "leftUpperArm", "leftLowerArm", "rightUpperArm")
-PARENTS = (-1, 0, 1, 1, 3, 1)
-PLACES = ((0, 1, 0), (0, 0.3, 0), (0, 0.3, 0), (0.2, 0.2, 0), (0.3, 0, 0), (-0.2, 0.2, 0))
-HALF = np.sqrt(0.5)
-ABOUT_X, ABOUT_Y, ABOUT_Z = [HALF, 0, 0, HALF], [0, HALF, 0, HALF], [0, 0, HALF, HALF]
-
-
-def humanoid(extension: str, prefix: str, scale: float = 1.0, **more: Any) -> File:
-    """Return a person in a T-pose, its bones as nodes 0 to 5."""
-    bones = {bone: {"node": node} for node, bone in enumerate(BONES)}
-    told = {"specVersion": "1.0", "humanoid": {"humanBones": bones}, **more}
-    file = File(extensionsUsed=[extension], extensions={extension: told})
-    for node, place in enumerate(PLACES):
-        children = [child for child, parent in enumerate(PARENTS) if parent == node]
-        item: dict[str, Any] = {"name": f"{prefix}{node}"}
-        item["translation"] = [scale * part for part in place]
-        file.add("nodes", item | ({"children": children} if children else {}))
-    return file
 
 
 def motion(**more: Any) -> File:
@@ -53,19 +36,6 @@ def motion(**more: Any) -> File:
         channels.append({"sampler": index, "target": {"node": node, "path": path}})
         samplers.append({"input": times, "output": file.accessor(values)})
     file.add("animations", {"name": "wave", "channels": channels, "samplers": samplers})
-    return file
-
-
-def character() -> File:
-    """Return a character of half the size; its upper arm has other axes at rest."""
-    binds = [{"node": 6, "index": 0, "weight": 1.0}]
-    expressions = {"preset": {"happy": {"morphTargetBinds": binds}}}
-    file = humanoid("VRMC_vrm", "c", 0.5, expressions=expressions)
-    file.root["nodes"][3]["rotation"] = ABOUT_X
-    mesh = file.mesh()
-    file.primitive["targets"] = [{"POSITION": file.accessor([[1, 0, 0]] * 3)}]
-    file.add("nodes", {"name": "face", "mesh": mesh})
-    file.root["nodes"][2]["children"] = [6]
     return file
 
 
@@ -109,6 +79,33 @@ def test_a_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> N
     # The lower arm is above the upper arm now; half the size, so half the way.
     assert_allclose(below[:3, 3] - arm[:3, 3], turn @ quarter @ [0.15, 0, 0], atol=1e-6)
     assert_allclose(worlds[names.index("c0"), :3, 3], [0.2, 0.5, 0.0], atol=1e-6)
+
+
+def test_a_captured_body_drives_a_character(tmp_path: Path) -> None:
+    poses = np.random.default_rng(2).uniform(-0.3, 0.3, (3, 156))
+    path = tmp_path / "walk.npz"
+    still = {"trans": np.zeros((3, 3)), "betas": np.zeros(10), "gender": "neutral"}
+    np.savez(path, poses=poses, mocap_framerate=30.0, **still)
+    hero, up = written(tmp_path, "a.vrm", character()), MotionSettings(up="y")
+    (driven,) = viewer.load(path, hero, motion=up).actors
+    (body,) = viewer.load(path, motion=up).actors
+    beside = viewer.load(path, hero, motion=MotionSettings(up="y", drives=False))
+    assert [actor.clip is None for actor in beside.actors] == [True, False]
+    for time in (0.0, 2 / 30):
+        ways = []
+        for actor, pair in ((driven, ("c3", "c4")), (body, ("left_shoulder", "left_elbow"))):
+            pose_actor(actor, time)
+            names = actor.figure.require_skeleton().names
+            places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
+            way = places[names.index(pair[1])] - places[names.index(pair[0])]
+            ways.append(way / np.linalg.norm(way))
+        assert_allclose(ways[0], ways[1], atol=1e-9)
+
+
+def test_a_model_of_a_character_file_is_driven(tmp_path: Path) -> None:
+    settings = MotionSettings(model=written(tmp_path, "a.vrm", character()))
+    (actor,) = viewer.load(written(tmp_path, "wave.vrma", motion()), motion=settings).actors
+    assert actor.figure.mesh is not None and actor.clip is not None
 
 
 def test_motions_without_bones_or_keys_are_refused(tmp_path: Path) -> None:

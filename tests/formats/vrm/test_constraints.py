@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 from formats.gltf.files import File, source_of
+from numpy.testing import assert_allclose
 
+from viewer.cli import run
 from viewer.errors import FormatError
 from viewer.formats.gltf import read
+from viewer.loading import load
 from viewer.rig.constraints.constraint import Constraint
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.skinning import deform
 
 NAME = "VRMC_node_constraint"
 AT = f"/extensions/{NAME}"
@@ -45,6 +52,8 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
         Constraint(3, 0, "aim", (-1.0, 0.0, 0.0)),
     )
     assert not source.diagnostics
+    # Sliders of joints that follow others would have no effect.
+    assert skeleton.dof_joints[skeleton.locked].tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
 
 
 @pytest.mark.parametrize(
@@ -78,3 +87,23 @@ def test_invalid_constraints_are_ignored(constraint: dict[str, Any], expected: s
     found = next(iter(source.diagnostics))
     assert (found.key, found.pointer) == ("G006.constraint", f"/nodes/1{AT}/constraint")
     assert found.values["expected"] == expected
+
+
+def test_exported_poses_contain_what_constraints_do(tmp_path: Path) -> None:
+    file = file_of(None, {"rotation": {"source": 0}}, None)
+    file.root["nodes"][2]["mesh"] = file.mesh()
+    half = math.sqrt(0.5)
+    file.root["nodes"][0]["rotation"] = [0.0, 0.0, half, half]
+    still, turned = [0.0, 0.0, half, half], [0.0, 0.0, 1.0, 0.0]
+    samplers = [{"input": file.times([0.0, 1.0]), "output": file.accessor([still, turned])}]
+    channels = [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}]
+    file.add("animations", {"name": "wave", "channels": channels, "samplers": samplers})
+    path, again = tmp_path / "hero.glb", tmp_path / "again.glb"
+    path.write_bytes(file.glb())
+    assert run(["convert", str(path), "-o", str(again)]) == 0
+    for name in (path, again):
+        (actor,) = load(name).actors
+        pose_actor(actor, 1.0)
+        corners = deform(actor.figure, actor.require_pose())[0]
+        # The parent rotates to 180 degrees, the joint by the 90 degrees since its rest pose.
+        assert_allclose(corners, [[0, 0, 0], [0, -1, 0], [1, 0, 0]], atol=1e-6)

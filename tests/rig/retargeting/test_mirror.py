@@ -6,12 +6,21 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from rig.hand_made import matrix, mesh, skeleton, turn_x, turn_y, turn_z
+from rig.retargeting.two_people import BODY, figure_of
 
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
+from viewer.rig.humanoid import Humanoid
+from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import joint_rotations, rest_pose
-from viewer.rig.retargeting.mirror import asymmetry, joint_partners, mirror_axis, mirror_pose
+from viewer.rig.retargeting.mirror import (
+    asymmetry,
+    joint_partners,
+    mirror_axis,
+    mirror_pose,
+    posing_partners,
+)
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import deform
@@ -276,3 +285,37 @@ def test_mirrored_hip_rotation_is_its_mirror_image():
     flip = np.diag([-1.0, 1.0, 1.0])
     found = joint_rotations(figure.skeleton, mirror_pose(figure, pose))[0]
     assert_allclose(found, flip @ turn @ flip, atol=1e-15)
+
+
+def test_bones_pair_the_joints_of_a_humanoid_with_a_sword() -> None:
+    table = BODY | {
+        "sword": ("left_wrist", (0.6, 0.9, 0.3)),
+        "Ear_L": ("head", (0.1, 1.6, 0.0)),
+        "Ear_R": ("head", (-0.09, 1.7, 0.0)),
+        "knot": ("head", (0.0, 1.7, 0.0)),
+    }
+    figure = figure_of(table, "hero")
+    with pytest.raises(RigError):
+        joint_partners(figure)
+    # The file states two bones only; the names of the others state their sides.
+    names = tuple(table)
+    hands = {"leftHand": names.index("left_wrist"), "rightHand": names.index("right_wrist")}
+    humanoid = replace(figure.require_skeleton(), humanoid=Humanoid(hands))
+    figure = replace(figure, skeleton=humanoid)
+    partners = dict(zip(names, posing_partners(figure).tolist(), strict=True))
+    assert names[partners["left_elbow"]] == "right_elbow" and names[partners["Ear_L"]] == "Ear_R"
+    assert names[partners["knot"]] == "knot" and names[partners["spine1"]] == "spine1"
+    assert partners["sword"] == -1
+    pose = rest_pose(figure.require_skeleton())
+    pose.dofs[:] = np.random.default_rng(3).uniform(-0.5, 0.5, len(pose.dofs))
+    mirrored = mirror_pose(figure, pose)
+    before, after = (
+        dict(zip(names, world_matrices(figure.require_skeleton(), each), strict=True))
+        for each in (pose, mirrored)
+    )
+    flip = np.diag([-1.0, 1.0, 1.0])
+    for name, partner in (("left_wrist", "right_wrist"), ("Ear_R", "Ear_L"), ("knot", "knot")):
+        expected = flip @ before[partner][:3, :3] @ flip
+        np.testing.assert_allclose(after[name][:3, :3], expected, atol=1e-12)
+    local = [worlds["left_wrist"][:3, :3].T @ worlds["sword"][:3, :3] for worlds in (before, after)]
+    np.testing.assert_allclose(local[1], local[0], atol=1e-12)

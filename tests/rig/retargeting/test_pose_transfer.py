@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from faults import told
 from numpy.testing import assert_allclose
+from rig.retargeting.two_people import BODY, figure_of
 
 from viewer.diagnostics.phrase import Phrase
 from viewer.errors import RigError
+from viewer.formats._pose.rotations import named_rotations
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
+from viewer.rig.humanoid import HUMAN_BONES, Humanoid
 from viewer.rig.pose import joint_rotations, pose_key, rest_pose
 from viewer.rig.posing.pose_record import apply_record, record_of
 from viewer.rig.retargeting.pose_transfer import (
@@ -365,3 +369,24 @@ def test_same_skeleton_without_shapes_reports_dropped_shapes() -> None:
     ]
     assert found.dofs.tolist() == [0.1, 0.2, 0.3, 0.4] and found.shape_weights.size == 0
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
+
+
+def test_humanoids_exchange_poses_by_their_bones() -> None:
+    half = np.diag([-1.0, 1.0, -1.0])  # VRM 0.x faces -z
+    one, other = figure_of(BODY, "body"), figure_of(BODY, "hero", half)
+    bones = {bone: list(BODY).index(name) for bone, name in HUMAN_BONES.items() if name in BODY}
+    bones |= {"spine": 3, "chest": 6, "upperChest": 9}
+    names = tuple(f"n{joint}" for joint in range(len(BODY)))
+    stated = replace(other.require_skeleton(), names=names, humanoid=Humanoid(bones))
+    other = replace(other, skeleton=stated)
+    pose = rest_pose(one.require_skeleton())
+    pose.dofs[:] = np.random.default_rng(5).uniform(-0.4, 0.4, len(pose.dofs))
+    moved, notes = transfer_pose(one, pose, other, rest_pose(stated))
+    assert notes[0].values["n"] == len(BODY)
+    expected = half @ joint_rotations(one.require_skeleton(), pose) @ half
+    assert_allclose(joint_rotations(stated, moved), expected, atol=1e-12)
+    # Back again, through a file.
+    text = json.loads(json.dumps(named_rotations(relative_rotations(other, moved))))
+    assert text["left"] == [[-1.0, 0.0, 0.0]] and "left_hip" in text["joint_meanings"]
+    back, _ = transfer_pose(other, moved, one, rest_pose(one.require_skeleton()))
+    assert_allclose(back.dofs, pose.dofs, atol=1e-9)

@@ -17,6 +17,7 @@ from viewer.export import (
     MotionOptions,
     animation_for,
     export_animation,
+    export_clips,
     suited_exporter,
 )
 from viewer.export._motion_paths import motion_paths
@@ -25,8 +26,10 @@ from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import JointMotion
+from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
@@ -112,6 +115,8 @@ class _Part:
 def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
     """Write motions within the playback range, in the background.
 
+    glTF gets all animations of a figure with their own keys, unless the range is a part of one.
+
     Parameters
     ----------
     state : AppState
@@ -178,6 +183,10 @@ def _write(
 ) -> list[Diagnostic]:
     notes: list[Diagnostic] = []
     for part in parts:
+        if EXPORTERS[key].writes_keys and part.frames is None and keeps_keys(scene, part.actor):
+            actor = upright_actor(scene, part.actor)
+            notes += export_clips(actor, part.path, options.skinning)
+            continue
         animation, up = animation_for(key, options, scene, part.actor, part.rate, part.frames)
         notes += export_animation(animation, part.path, key, replace(options, world_up=up))
     return notes

@@ -25,8 +25,10 @@ MESSAGES = {
     "D001.skeleton": "only the {side} has a skeleton",
     "D002.dofs-by-index": "no DOF names in common: compared by index",
     "D002.joints-by-index": "no joint names in common: compared by index",
+    "D002.material": "material {name:quoted} differs: {properties:list}",
     "D002.meshes": "meshes differ ({vertices:#vertex}, {triangles:#triangle}; "
     "{other_vertices:#vertex}, {other_triangles:#triangle}): closest points are compared",
+    "D002.only": "{what:text} only in the {side}: {names:list}",
     "D002.order": "joints are in a different order, which matters for .skin and .anim files: where "
     "the first has {first:text}, the second has {second:text}",
     "D002.partner": "compared with {name:name}",

@@ -54,6 +54,7 @@ MESSAGES = {
     f"{_LIMITS}",
     "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
     "to {length}{extent:+ ({})}",
+    "X002.quantized": "quantised with rounding errors of up to {parts:all}",
     "X002.animations": "largest difference of {vertices} over {n:#animation}: {length}{place:+ "
     "({})}, compared at {times} times{causes:+: {}}",
     # Omitted data
@@ -151,6 +152,10 @@ PHRASES = {
     "the-original-pose": "the pose",
     "motion-between-frames": "the motion between frames",
     "mesh-vertices": "vertices",
+    "quantized-positions": "{length} in positions",
+    "quantized-normals": "{error} degrees in normals",
+    "quantized-uvs": "{error} in texture coordinates",
+    "quantized-weights": "{error} in weights",
     "joint-positions": "joints",
     "driven-vertices": "vertices of a skin driven by it",
     "farthest-joint": "up to {length} ({joint:name})",
@@ -183,6 +188,7 @@ PHRASES = {
     "part-symmetry": "the symmetry map",
     "part-reduced": "the reduced mesh",
     "part-regressor": "the joint regressor",
+    "part-constraints": "{n:#constraint} (the joints have their rotations)",
     "part-limits": "limits of joints",
     "part-all-materials": "materials and textures",
     "part-materials": "material properties except one texture each",

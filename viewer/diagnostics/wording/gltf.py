@@ -115,6 +115,25 @@ MESSAGES = {
     "G002.corners": "{n} vertex indices, not a multiple of 3: the last {left} ignored",
     "G002.weights": "expected {expected:#weight}, one per morph target, found {found}",
     "F007.gltf-undrawn": "{n:#primitive} of points or lines not drawn",
+    # Conformance, which only lint checks
+    "G002.bounds": "component {component}: expected {expected:.9g} as in the data, found "
+    "{found:.9g}",
+    "G002.bounds-length": "expected {expected:#number}, one per component, found {found}",
+    "G002.no-bounds": "positions: expected an accessor with min and max, found one without",
+    "G002.unused-joints": "{n:#influence} of weight 0 {n:?refers|refer} to a joint other than 0 "
+    "(first: vertex {vertex})",
+    "G003.no-influences": "skin of a mesh without joints and weights: not used",
+    "G003.no-skin": "mesh with joints and weights, but no skin: not deformed",
+    "G003.unused-transform": "transform of a node with a skinned mesh: not used",
+    "G004.no-common-root": "expected joints with a common root, found joints below nodes "
+    "{nodes:list12}",
+    "G004.not-a-root": "expected a common ancestor of all joints, found node {node}, with "
+    "{n:#joint} outside of it",
+    "G005.matrix": "expected a node without a matrix, found node {node} with one: its matrix is "
+    "decomposed",
+    "G005.negative": "{n:#key} at negative times (earliest: {found:.6g} s)",
+    "G005.no-bounds": "times: expected an accessor with min and max, found one without",
+    "G005.unit": "{n:#rotation} not of unit length (first: {found:.6g}, key {index}): normalised",
     # Skins
     "F002.gltf-bind-count": "expected {expected:#matrix}, one per joint, found {found}",
     "F002.gltf-bind-row": "joint {joint}: expected 0 0 0 1 as the last row, found {found}",

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.encoding import EXTENSION, Encoding, quantized
 from viewer.export._gltf.materials import Color, Materials
 from viewer.export._gltf.mesh import add_mesh
 from viewer.export._gltf.nodes import Locals, Tree, add_nodes
@@ -16,6 +19,7 @@ from viewer.export._gltf.reading import Placed
 from viewer.export._gltf.records import add_record
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import Skinning, skin_used
@@ -43,6 +47,7 @@ class Built:
     tree: Tree
     meshes: list[Placed]
     counts: list[Phrase]
+    errors: dict[str, float]  # of quantised attributes
 
 
 def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:
@@ -67,10 +72,12 @@ def add_body(
     still: Locals | None,
     color: Color | None = None,
     is_still: bool = True,
+    optimizes: bool = False,
 ) -> Built:
     """Add nodes, meshes and skin of a figure; return their indices and counts.
 
     ``is_still``: whether the figure as a whole does not move.
+    ``optimizes``: whether to quantise vertex attributes.
     """
     figure, influences = body.figure, body.influences
     fixes, record = influences is not None and influences.n_fixed > 0, figure.record
@@ -81,8 +88,11 @@ def add_body(
     if record is not None:
         add_record(document, record, tree.joints)
     scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
+    errors: dict[str, float] = {}
     if figure.mesh is not None and figure.mesh.n_vertices:
-        meshes = _add_meshes(document, body, tree, color)
+        encoding = _encoding(document, body, optimizes)
+        errors = encoding.errors
+        meshes = _add_meshes(encoding, body, tree, color)
         scene += _place_meshes(document, body, tree, meshes)
         written, before = sum(len(each.part.sources) for each in meshes), figure.mesh.n_vertices
         key = "written-vertices" if written == before else "split-vertices"
@@ -91,16 +101,28 @@ def add_body(
     if figure.skeleton is not None:
         counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
     document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return Built(tree, meshes, counts)
+    return Built(tree, meshes, counts, errors)
 
 
-def _add_meshes(document: Document, body: Body, tree: Tree, color: Color | None) -> list[Placed]:
+def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
+    """Return the writer of vertex attributes."""
+    if not optimizes:
+        return Encoding(document)
+    for name in ("extensionsUsed", "extensionsRequired"):
+        document.root.setdefault(name, []).append(EXTENSION)
+    shapes, offsets = body.figure.blend_shapes, list[Floats]()
+    if shapes is not None and len(body.shape.targets):
+        offsets = [shapes.direction_values()[row] for row in body.shape.targets]
+    return quantized(document, body.figure.require_mesh().positions, offsets)
+
+
+def _add_meshes(encoding: Encoding, body: Body, tree: Tree, color: Color | None) -> list[Placed]:
     """Add the parts of a figure, each with its node."""
-    figure, meshes = body.figure, list[Placed]()
-    materials = Materials(document, figure.require_mesh(), color)
+    figure, meshes, document = body.figure, list[Placed](), encoding.document
     record = figure.record
+    materials = Materials(document, figure.require_mesh(), color, record is not None)
     for part in parts_of(f"{figure.name} mesh", body.shape, body.influences):
-        mesh = add_mesh(document, materials, part, body.shape, body.influences)
+        mesh = add_mesh(encoding, materials, part, body.shape, body.influences)
         if part.joint >= 0:
             node = tree.joints[part.joint]
             document.root["nodes"][node]["mesh"] = mesh
@@ -109,7 +131,7 @@ def _add_meshes(document: Document, body: Body, tree: Tree, color: Color | None)
             if record is not None and part.index in record.part_extras:
                 item["extras"] = record.part_extras[part.index]
             node = document.add("nodes", {**item, "mesh": mesh})
-        meshes.append(Placed(node, part))
+        meshes.append(Placed(node, part, encoding.decoding if part.joint < 0 else np.eye(4)))
     return meshes
 
 
@@ -122,8 +144,14 @@ def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Place
         return []
     if influences is None or skin is None:
         nodes[tree.place].setdefault("children", []).extend(own)
+        for placed in meshes:
+            if not np.array_equal(placed.decoding, np.eye(4)):
+                nodes[placed.node]["translation"] = placed.decoding[:3, 3].tolist()
+                nodes[placed.node]["scale"] = placed.decoding.diagonal()[:3].tolist()
         return []
-    bound = document.array(inverse_bind_matrices(influences, skin.inverse_bind), "MAT4")
+    decoding = next(placed.decoding for placed in meshes if placed.part.joint < 0)
+    matrices = inverse_bind_matrices(influences, skin.inverse_bind, decoding)
+    bound = document.array(matrices, "MAT4")
     item = {"name": text_of(body.figure.name), "joints": tree.joints + tree.fixed}
     index = document.add("skins", {**item, "inverseBindMatrices": bound})
     for node in own:

@@ -17,7 +17,13 @@ from viewer.errors import RigError
 
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 
-_TYPES = {np.dtype("u1"): 5121, np.dtype("<u2"): 5123, np.dtype("<u4"): 5125, np.dtype("<f4"): 5126}
+_TYPES = {
+    np.dtype("u1"): 5121,
+    np.dtype("<i2"): 5122,
+    np.dtype("<u2"): 5123,
+    np.dtype("<u4"): 5125,
+    np.dtype("<f4"): 5126,
+}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _PADDING = 4  # alignment of arrays, bytes: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
@@ -84,6 +90,33 @@ class Document:
                 accessor["max"] = part.max(axis=0).tolist()
             accessors.append(self.add("accessors", accessor))
         return accessors
+
+    def integers(self, values: NDArray[np.integer], kind: str, bounds: bool = False) -> int:
+        """Add a vertex attribute of normalised integers; return its accessor.
+
+        ``values`` (N, C): rows are padded to a multiple of four bytes, as vertices must be.
+        ``kind``: ``"VEC3"`` and so on.
+        ``bounds``: store the minimum and maximum of each component.
+        """
+        stored = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+        size = stored.itemsize * stored.shape[1]
+        stride = size + -size % _PADDING
+        rows = np.zeros((len(stored), stride // stored.itemsize), stored.dtype)
+        rows[:, : stored.shape[1]] = stored
+        view = self._view(rows.tobytes(), VERTICES)
+        self.root["bufferViews"][view]["byteStride"] = stride
+        accessor: dict[str, Any] = {
+            "bufferView": view,
+            "byteOffset": 0,
+            "componentType": _TYPES[stored.dtype],
+            "normalized": True,
+            "count": len(stored),
+            "type": kind,
+        }
+        if bounds:
+            accessor["min"] = stored.min(axis=0).tolist()
+            accessor["max"] = stored.max(axis=0).tolist()
+        return self.add("accessors", accessor)
 
     def picture(self, data: bytes, name: str) -> int:
         """Add an image, the bytes of a PNG or JPEG file; return its index in ``images``."""

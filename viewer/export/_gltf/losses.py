@@ -20,6 +20,7 @@ from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.scalars import length_text
+from viewer.rig.skeleton import Skeleton
 from viewer.rig.skinning import METHODS, Skinning
 
 
@@ -199,6 +200,15 @@ def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
     lost += extra_parts(figure)
-    if skeleton is not None and np.isfinite(skeleton.dof_limits).any():
+    if skeleton is not None and skeleton.constraints:
+        lost.append(Phrase("part-constraints", n=len(skeleton.constraints)))
+    if skeleton is not None and _is_limited(skeleton):
         lost.append(Phrase("part-limits"))
     return not_held_note("glTF", lost)
+
+
+def _is_limited(skeleton: Skeleton) -> bool:
+    """Return whether a joint has limits, other than the locked ones that follow others."""
+    followers = [constraint.joint for constraint in skeleton.constraints]
+    is_own = ~np.isin(skeleton.dof_joints, followers)
+    return bool(np.isfinite(skeleton.dof_limits[is_own]).any())

@@ -32,9 +32,13 @@ class Materials:
     ``document``: modified in place.
     ``mesh``: mesh with the materials.
     ``color`` (r, g, b): linear colour of surfaces without their own colour.
+    ``is_own``: whether the mesh is from a file of nodes, in which materials may have no name.
     """
 
-    def __init__(self, document: Document, mesh: Mesh, color: Color | None) -> None:
+    def __init__(
+        self, document: Document, mesh: Mesh, color: Color | None, is_own: bool = False
+    ) -> None:
+        self._is_own = is_own
         # Vertex colours replace the figure's colour.
         own = color or _PLAIN if mesh.colors is None else (1.0, 1.0, 1.0)
         self._document, self.mesh, self._color = document, mesh, own
@@ -77,7 +81,8 @@ class Materials:
         if "metallic_texture" in shown or "roughness_texture" in shown:
             packed = _packed(shown.get("metallic_texture"), shown.get("roughness_texture"))
             surface["metallicRoughnessTexture"] = self._reference(packed, name)
-        return self._add(name, surface, self._rest(material, shown, name))
+        title = material.name if self._is_own else name
+        return self._add(title, surface, self._rest(material, shown, name))
 
     def _rest(self, material: Material, shown: dict[str, Texture], name: str) -> dict[str, Any]:
         """Return the remaining properties: normals, occlusion, emission, opacity and culling."""
@@ -110,8 +115,8 @@ class Materials:
     def _add(self, name: str, surface: dict[str, Any], rest: dict[str, Any] | None = None) -> int:
         # Triangles may be wound either way unless the file states that they are single-sided.
         rest = {"doubleSided": True} if rest is None else rest
-        item = {"name": text_of(name), "pbrMetallicRoughness": surface, **rest}
-        return self._document.add("materials", item)
+        item = {"name": text_of(name)} if name else {}
+        return self._document.add("materials", {**item, "pbrMetallicRoughness": surface, **rest})
 
     def _reference(self, texture: Texture, name: str) -> dict[str, Any]:
         """Return a texture's index with its transform; each image is written once."""

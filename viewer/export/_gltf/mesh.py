@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.export._gltf.document import INDICES, VERTICES, Document, text_of
+from viewer.export._gltf.document import INDICES, Document, text_of
+from viewer.export._gltf.encoding import Encoding
 from viewer.export._gltf.materials import Materials
 from viewer.export._gltf.parts import Part
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import Influences, influence_sets
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
@@ -25,7 +26,7 @@ _NOT_UNIT = 1e-3  # tolerance of unit length; squares of normals may underflow o
 
 
 def add_mesh(
-    document: Document,
+    encoding: Encoding,
     materials: Materials,
     part: Part,
     shape: Shape,
@@ -33,18 +34,19 @@ def add_mesh(
 ) -> int:
     """Add a part of a figure's mesh; return its index.
 
-    ``document``: modified in place.
+    ``encoding``: writer of vertex attributes.
     ``materials``: writer of the figure's materials.
     ``part``: part with at least one vertex.
     ``shape``: shape of the figure.
     ``influences``: influences of the mesh; None if it is not skinned.
     """
     mesh, surface = shape.figure.require_mesh(), _surface(part, shape)
-    attributes = _attributes(document, mesh, part, surface)
+    document = encoding.document
+    attributes = _attributes(encoding, mesh, part, surface)
     if part.joint < 0 and influences is not None:
-        for number, (joints, weights) in enumerate(influence_sets(influences, part.sources)):
-            attributes[f"JOINTS_{number}"] = document.array(joints, "VEC4", VERTICES)
-            attributes[f"WEIGHTS_{number}"] = document.array(weights, "VEC4", VERTICES)
+        sets = [*influence_sets(influences, part.sources)]
+        for number, (joints, weights) in enumerate(encoding.influences(sets)):
+            attributes |= {f"JOINTS_{number}": joints, f"WEIGHTS_{number}": weights}
     item: dict[str, Any] = {"name": text_of(part.mesh_name)} if part.mesh_name else {}
     shared: dict[str, Any] = {"attributes": attributes}
     record = shape.figure.record
@@ -52,7 +54,7 @@ def add_mesh(
     shapes = shape.figure.blend_shapes
     if shapes is not None and len(part.targets):
         rows = shape.targets[part.targets]
-        shared["targets"] = _targets(document, surface, shapes, rows, part.sources)
+        shared["targets"] = _targets(encoding, part, surface, shapes, rows)
         item["weights"] = shape.weights[0, part.targets].tolist()
         if any(part.target_names):
             own = extras if isinstance(extras, dict) else {}
@@ -91,19 +93,19 @@ def _surface(part: Part, shape: Shape) -> _Surface:
     return _Surface(apply_transform(matrix, positions), turned / stretch, lengths * stretch, linear)
 
 
-def _attributes(document: Document, mesh: Mesh, part: Part, surface: _Surface) -> dict[str, int]:
+def _attributes(encoding: Encoding, mesh: Mesh, part: Part, surface: _Surface) -> dict[str, int]:
     attributes = {
-        "POSITION": document.array(surface.positions, "VEC3", VERTICES, bounds=True),
-        "NORMAL": document.array(surface.normals, "VEC3", VERTICES),
+        "POSITION": encoding.positions(surface.positions, part.joint < 0),
+        "NORMAL": encoding.normals(surface.normals),
     }
     if mesh.uvs is not None and len(mesh.uvs):
         # In glTF, the first image row is at v = 0; in this program, at v = 1.
         for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
             flipped = uvs[part.uv_indices] * [1.0, -1.0] + [0.0, 1.0]
-            attributes[f"TEXCOORD_{number}"] = document.array(flipped, "VEC2", VERTICES)
+            attributes[f"TEXCOORD_{number}"] = encoding.uvs(flipped)
     if mesh.colors is not None:
         colors = np.clip(mesh.colors[part.sources], 0.0, 1.0)
-        attributes["COLOR_0"] = document.array(colors, "VEC4", VERTICES)
+        attributes["COLOR_0"] = encoding.colors(colors)
     return attributes
 
 
@@ -118,11 +120,11 @@ def _normals(mesh: Mesh) -> Floats:
 
 
 def _targets(
-    document: Document,
+    encoding: Encoding,
+    part: Part,
     surface: _Surface,
     shapes: BlendShapes,
     rows: NDArray[np.intp],
-    sources: Ints,
 ) -> list[dict[str, int]]:
     # Normals are written with length 1, and their offsets at the same scale.
     scales = np.divide(
@@ -130,11 +132,11 @@ def _targets(
     )
     targets, directions = [], shapes.direction_values()
     for row in rows:
-        offsets = directions[row][sources] @ surface.linear.T
-        target = {"POSITION": document.array(offsets, "VEC3", VERTICES, bounds=True)}
+        offsets = directions[row][part.sources] @ surface.linear.T
+        target = {"POSITION": encoding.offsets(offsets, part.joint < 0)}
         if shapes.normal_offsets is not None:
-            normals = shapes.normal_values()[row][sources] @ np.linalg.inv(surface.linear)
-            target["NORMAL"] = document.array(normals * scales, "VEC3", VERTICES)
+            normals = shapes.normal_values()[row][part.sources] @ np.linalg.inv(surface.linear)
+            target["NORMAL"] = encoding.normal_offsets(normals * scales)
         targets.append(target)
     return targets
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,7 +28,7 @@ from viewer.rig.skin import Skin, influence_counts, skin_from_entries
 Keys: TypeAlias = dict[tuple[int, str], Floats]
 """Animated values by node and path, one row per frame."""
 
-_TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_TYPES = {5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
 _HEAD = 12  # bytes before the first chunk of a .glb
@@ -47,13 +47,19 @@ class GltfFile:
         item = self.root["accessors"][accessor]
         view = self.root["bufferViews"][item["bufferView"]]
         start = view["byteOffset"] + item["byteOffset"]
-        count = item["count"] * _SIZES[item["type"]]
-        dtype = np.dtype(_TYPES[item["componentType"]])
-        return np.frombuffer(self.buffer, dtype, count, start).reshape(item["count"], -1)
+        dtype, width = np.dtype(_TYPES[item["componentType"]]), _SIZES[item["type"]]
+        whole = view.get("byteStride", width * dtype.itemsize) // dtype.itemsize
+        rows = np.frombuffer(self.buffer, dtype, item["count"] * whole, start)
+        return rows.reshape(item["count"], whole)[:, :width]
 
     def floats(self, accessor: int) -> Floats:
-        """Return an array in double precision."""
-        return self.array(accessor).astype(np.float64)
+        """Return an array in double precision, normalised integers as fractions."""
+        values = self.array(accessor).astype(np.float64)
+        item = self.root["accessors"][accessor]
+        if not item.get("normalized"):
+            return values
+        most = np.iinfo(np.dtype(_TYPES[item["componentType"]])).max
+        return np.maximum(values / most, -1.0)
 
 
 def parsed(files: list[bytes]) -> GltfFile:
@@ -76,10 +82,13 @@ class Placed:
         Its node.
     part : Part
         The part from which it was written.
+    decoding : (4, 4)
+        From positions in the file, which may be quantised, to the figure's.
     """
 
     node: int
     part: Part
+    decoding: Floats = field(default_factory=lambda: np.eye(4))
 
 
 def read_back(
@@ -117,10 +126,11 @@ def read_back(
         if "skin" in item:
             skin = file.root["skins"][item["skin"]]
             stored = file.floats(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
-            bound[: len(stored)] = stored
+            bound[: len(stored)] = stored @ np.linalg.inv(placed.decoding)
             joints[: len(skin["joints"])] = skin["joints"]
         elif placed.part.joint < 0:
             joints[-1] = placed.node
+            bound[-1] = np.linalg.inv(placed.decoding)
     body, morphs = None, np.zeros((1, 0))
     if meshes:
         body, morphs = _body(file, meshes, keys, bound, targets, sets)
@@ -220,11 +230,11 @@ def _one_body(
         weights = keys.get((placed.node, "weights"), np.array([mesh["weights"]], dtype=np.float64))
         positions = positions + np.einsum("s,sva->va", weights[0], directions)
     joint = placed.part.joint
-    if joint >= 0:
-        # The comparison is in binding space.
-        inverse = np.linalg.inv(bound[joint])
-        positions = apply_transform(inverse, positions)
-        directions = directions @ inverse[:3, :3].T
+    # The comparison is in binding space.
+    space = placed.decoding if joint < 0 else np.linalg.inv(bound[joint])
+    if not np.array_equal(space, np.eye(4)):
+        positions = apply_transform(space, positions)
+        directions = directions @ space[:3, :3].T
     slot = joint if joint >= 0 else len(bound) - 1
     return _OneBody(positions, _skin(file, attributes, slot, bound, sets), directions, weights)
 

@@ -109,12 +109,15 @@ def influence_sets(
         yield joints, weights
 
 
-def inverse_bind_matrices(influences: Influences, inverse_bind: Floats) -> Floats:
+def inverse_bind_matrices(influences: Influences, inverse_bind: Floats, decoding: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
 
     ``influences``: determines whether any vertices are fixed; their node is bound at the
     origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
+    ``decoding`` (4, 4): from stored positions to the figure's.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
+    if not np.array_equal(decoding, np.eye(4)):
+        matrices = matrices @ decoding
     matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # set exactly, as readers expect
     return matrices.transpose(0, 2, 1).reshape(-1, 16)

@@ -70,10 +70,15 @@ def node_file(source: Source) -> NodeFile:
 
 
 def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints) -> NodeTree:
-    local = arrays["local"]
+    local, parents = arrays["local"], arrays["parents"]
+    # The root has no name in the file; the FBX SDK calls it that.
+    named = (
+        name or ("RootNode" if parent < 0 else "")
+        for name, parent in zip(names, parents.tolist(), strict=True)
+    )
     return NodeTree(
-        tuple(names),
-        arrays["parents"],
+        tuple(named),
+        parents,
         translations=local[:, :3],
         rotations=local[:, 3:7],
         scales=local[:, 7:],

@@ -182,6 +182,22 @@ class Accessors:
             raise source.fault("F002.gltf-whole", user, found=found, accessor=index)
         return self._picked(layout, rows, decoded).astype(np.int64)
 
+    def components(self, index: int) -> Floats | None:
+        """Return the components of an accessor as stored, not normalised: (N, C).
+
+        None if the data is elsewhere: compressed with Draco, for instance.
+
+        Raises
+        ------
+        FormatError
+            If it is invalid, or its data is missing.
+        """
+        if not self._table[index].has("bufferView") and not self._table[index].has("sparse"):
+            return None
+        layout = self._layout(index, tuple(_TYPES), self._table[index].pointer)
+        with np.errstate(invalid="ignore"):  # signalling NaN
+            return self._picked(layout, None, None).astype(np.float64)
+
     def matrices(self, index: int, user: str) -> Floats:
         """Return an accessor of MAT4 as matrices with the translation in the last column.
 

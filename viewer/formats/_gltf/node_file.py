@@ -22,6 +22,7 @@ import numpy as np
 from viewer.formats._gltf.animations import read_animations
 from viewer.formats._gltf.bindings import checked_bindings
 from viewer.formats._gltf.cameras import read_cameras
+from viewer.formats._gltf.conformance import check_conformance
 from viewer.formats._gltf.document import Document, open_document
 from viewer.formats._gltf.extensions import check_extensions
 from viewer.formats._gltf.meshes import read_meshes
@@ -58,6 +59,8 @@ def read_nodes(source: Source) -> NodeFile:
     tree, skins = _without_empty(read_tree(document), read_skins(document))
     meshes = checked_bindings(document, tree, read_meshes(document), skins)
     tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
+    if source.diagnostics.keeps_errors:
+        check_conformance(document, tree, meshes, skins)
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
         meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
         materials = (*materials, DEFAULT_MATERIAL)

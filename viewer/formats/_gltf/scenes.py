@@ -25,10 +25,10 @@ def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
     if not len(scenes):
         return every
     scene = scenes[max(default, 0)]
-    if len(scenes) > 1:
+    roots = _roots(scene, tree)
+    if len(scenes) > 1 and roots:
         name = scene.text("name") or str(max(default, 0))
         document.root.warn("F007.gltf-scenes", "scenes", n=len(scenes), found=name)
-    roots = _roots(scene, tree)
     if not roots and every:
         scene.warn("F007.gltf-empty-scene")
     return roots or every

@@ -3,7 +3,8 @@
 A figure has one inverse bind matrix per joint, but each skin of a file has its own, and meshes
 attached to a node have none. Their vertices are transformed into one binding space by a matrix A
 with IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a second
-time, through an auxiliary joint.
+time, through an auxiliary joint. Binding space is the space of the scene: A of the first skin
+undoes quantisation, and the units and axes of the mesh.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ _SAME = 1e-6
 # Worse conditioned matrices are not inverted, because baking would lose too many digits.
 _WORST_CONDITION = 1e5
 _MOST_CANDIDATES = 8
+# A first A that is closer to the identity is omitted: the vertices keep the numbers of the file.
+_NEARLY_SCENE = 1e-3
 
 
 @dataclass(slots=True, eq=False)
@@ -54,7 +57,7 @@ class Bindings:
 
 
 def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
-    """Bind the skins of a figure; the first determines the binding space.
+    """Bind the skins of a figure; the first determines where the binding space is in the scene.
 
     Parameters
     ----------
@@ -88,7 +91,8 @@ def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
     """Return the matrix A on which most of a skin's joints agree, or the identity."""
     known = bindings.matrices
     if not known:
-        return np.eye(4)
+        order = np.argsort(slots)
+        return _rest_space((bindings.worlds[slots] @ inverse_bind)[order])
     pairs = [
         (known[joint], inverse_bind[place])
         for place, joint in enumerate(slots.tolist())
@@ -103,6 +107,27 @@ def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
     reach = _reach(inverse_bind)
     counts = [sum(_agree(one @ each, other, reach) for one, other in pairs) for each in candidates]
     return candidates[int(np.argmax(counts))]
+
+
+def _rest_space(rests: Floats) -> Floats:
+    """Return the matrix with which the topmost joints of the first skin place its meshes at rest.
+
+    Parameters
+    ----------
+    rests : (M, 4, 4)
+        Skinning matrices in the rest pose, of parents before those of their children. They are
+        all the same if the rest pose is the bind pose; otherwise the first that another one is
+        equal to is returned, as helpers above the hips may have any matrix.
+    """
+    regular = rests[_is_regular(rests)]
+    if not len(regular):
+        return np.eye(4)
+    some = regular[:_MOST_CANDIDATES]
+    limits = _SAME * np.abs(some).max(axis=(1, 2))[:, None] + np.zeros(len(regular))
+    equal = np.abs(some[:, None] - regular[None]).max(axis=(2, 3)) <= limits
+    found: Floats = some[int((equal.sum(axis=1) > 1).argmax())]
+    is_near = np.abs(found - np.eye(4)).max() <= _NEARLY_SCENE
+    return np.eye(4) if is_near else found
 
 
 def _baked_at_rest(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:

@@ -166,13 +166,22 @@ def skeleton_of(
     Returns
     -------
     Skeleton
-        Skeleton of J joints; auxiliary joints have no DOFs.
+        Skeleton of J joints. Auxiliary joints have no DOFs, constrained joints have locked DOFs,
+        and all other DOFs have no limits.
     """
     is_auxiliary = np.array(joints.nodes) < 0
     balls = np.flatnonzero(~is_auxiliary).astype(np.int32)
     count = 3 * len(balls)
     given = (humanoid or {}).items()
     bones = {bone: joints.own[node] for bone, node in given if node in joints.own}
+    followers = tuple(
+        replace(each, joint=joints.own[each.joint], source=joints.own[each.source])
+        for each in constraints
+        if each.joint in joints.own and each.source in joints.own
+    )
+    # A pose has no effect on a joint that follows another.
+    is_free = ~np.isin(balls, [each.joint for each in followers])
+    limits = np.where(np.repeat(is_free, 3)[:, None], [-np.inf, np.inf], 0.0)
     return Skeleton(
         names=tuple(joints.names),
         parents=np.array(joints.parents, dtype=np.int32),
@@ -182,12 +191,8 @@ def skeleton_of(
         dof_joints=np.repeat(balls, 3),
         dof_kinds=np.tile(np.arange(3, 6, dtype=np.int32), len(balls)),
         rest_dofs=np.zeros(count),
-        dof_limits=np.tile([-np.inf, np.inf], (count, 1)),
+        dof_limits=limits,
         auxiliary=is_auxiliary if is_auxiliary.any() else None,
         humanoid=Humanoid(bones) if bones else None,
-        constraints=tuple(
-            replace(each, joint=joints.own[each.joint], source=joints.own[each.source])
-            for each in constraints
-            if each.joint in joints.own and each.source in joints.own
-        ),
+        constraints=followers,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
 from viewer.formats._nodes.motions import Reader
-from viewer.formats._nodes.surfaces import Piece, part_name
+from viewer.formats._nodes.surfaces import Piece, normal_matrix, normal_scales, part_name
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
@@ -202,9 +202,11 @@ def _offsets(
         targets = primitive.normal_targets if of_normals else primitive.targets
         if own is None or targets is None:
             continue
-        linear = piece.baked[:3, :3]
-        matrix = np.linalg.inv(linear) if of_normals else linear.T
-        offsets[own, rows] = targets[:, piece.sources] @ matrix
+        values = targets[:, piece.sources]
+        if of_normals:
+            offsets[own, rows] = values @ normal_matrix(piece) * normal_scales(piece)
+        else:
+            offsets[own, rows] = values @ piece.baked[:3, :3].T
     if not len(sums):
         return offsets
     return np.concatenate([offsets, np.einsum("es,sva->eva", sums, offsets)])

@@ -12,11 +12,10 @@ from viewer.formats._nodes.content import NodeFile, Primitive
 from viewer.formats._nodes.flat_normals import flat_shaded
 from viewer.formats._nodes.influences import Influences, divided, of_rows, on_joint
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import Mesh, PartView
 from viewer.rig.skin import Skin
 
-__all__ = ["Piece", "mesh_of", "pieces_of", "skin_of"]
+__all__ = ["Piece", "mesh_of", "normal_matrix", "normal_scales", "pieces_of", "skin_of"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,12 +155,32 @@ def part_name(file: NodeFile, node: int) -> str:
 
 
 def _positions(piece: Piece) -> Floats:
-    return apply_transform(piece.baked, piece.primitive.positions[piece.sources])
+    """Return the positions in binding space, p' = A p; equal ones stay equal."""
+    positions = piece.primitive.positions[piece.sources]
+    if np.array_equal(piece.baked, np.eye(4)):
+        return positions
+    # A matrix product may round equal rows differently, which would open seams.
+    x, y, z = positions.T[:, :, None]
+    right, up, back, shift = piece.baked[:3].T
+    return np.asarray(x * right + y * up + z * back + shift, dtype=np.float64)
 
 
 def _normals(piece: Piece) -> Floats:
-    """Return the normals in binding space, n' = A^-T n."""
-    return piece.normals @ np.linalg.inv(piece.baked[:3, :3])
+    """Return the normals in binding space."""
+    return piece.normals @ normal_matrix(piece) * normal_scales(piece)
+
+
+def normal_matrix(piece: Piece) -> Floats:
+    """Return A^-1, with which rows of normals are multiplied: n' = A^-T n. (3, 3)."""
+    return np.asarray(np.linalg.inv(piece.baked[:3, :3]), dtype=np.float64)
+
+
+def normal_scales(piece: Piece) -> Floats:
+    """Return factors that give transformed normals the lengths they have in the file: (V, 1)."""
+    moved = np.linalg.norm(piece.normals @ normal_matrix(piece), axis=1)
+    lengths = np.linalg.norm(piece.normals, axis=1)
+    scales: Floats = np.where(moved > 0.0, lengths / np.where(moved > 0.0, moved, 1.0), 1.0)
+    return scales[:, None]
 
 
 def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:

@@ -20,6 +20,8 @@ KEYS = (
     "joint_names",
     "joint_rotations",
     "joint_shifts",
+    "joint_meanings",
+    "left",
     "up",
     "dof_layout",
     "figure",
@@ -61,6 +63,8 @@ def read_rotations(named: NamedValues) -> JointRotations | None:
         _up(named),
         _word(named, "dof_layout", ""),
         None if rotations is None else _quaternions(named, "joint_rotations", names),
+        _meanings(named, len(names)),
+        _left(named),
     )
 
 
@@ -75,6 +79,9 @@ def named_rotations(rotations: JointRotations) -> dict[str, Any]:
     }
     if rotations.rotations is not None:
         named["joint_rotations"] = rotations.rotations.tolist()
+    if rotations.meanings:
+        named["joint_meanings"] = list(rotations.meanings)
+        named["left"] = rotations.left[None].tolist()
     if rotations.shifts.any():
         named["joint_shifts"] = rotations.shifts.tolist()
     return named
@@ -86,6 +93,23 @@ def _names(named: NamedValues) -> tuple[str, ...]:
         key = "joint_names"
         raise named.fault("F002.pose-list", key, item=key, found=names.ndim)
     return tuple(names.tolist())
+
+
+def _meanings(named: NamedValues, count: int) -> tuple[str, ...]:
+    """Return the meaning of each joint; none if there is another number of them."""
+    if named.values.get("joint_meanings") is None:
+        return ()
+    found = named.array("joint_meanings", "U", Phrase("pose-names"))
+    return tuple(found.tolist()) if found.shape == (count,) else ()
+
+
+def _left(named: NamedValues) -> Floats:
+    """Return the direction of the figure's left, +x by default."""
+    if named.values.get("left") is None:
+        return np.array([1.0, 0.0, 0.0])
+    found = _rows(named, "left", 1, 3)[0]
+    length = np.linalg.norm(found)
+    return found / length if length > _SHORTEST else np.array([1.0, 0.0, 0.0])
 
 
 def _rows(named: NamedValues, key: str, count: int, width: int) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
+from viewer.rig.comparison.contents import content_notes
 from viewer.rig.comparison.difference import Difference, Measure, Tally
 from viewer.rig.comparison.pairs import Pairs, pair_joints, pair_names, rotation_distance
 from viewer.rig.comparison.steps import FrameRange, Steps, steps_of
@@ -79,6 +80,7 @@ class _Comparison:
         self._pair_skeletons()
         self._pair_meshes()
         self._pair_points()
+        self.notes += content_notes(first.figure, second.figure)
         if first.figure.up != second.figure.up:
             ups = {"first": first.figure.up, "second": second.figure.up}
             self.notes.append(Diagnostic("D002.up", values=ups))
@@ -158,6 +160,7 @@ class _Comparison:
             if size == 0.0:
                 size = _size(self.first)
                 self._compare_weights()
+                self._compare_shapes()
             self._compare_joints(step)
             self._compare_points(step)
             self._compare_meshes(step, number in searched)
@@ -228,6 +231,25 @@ class _Comparison:
             other = skin_at(second.skin, second.require_mesh().triangles, found)
         tally = self._tally("weights", "weight", first.skin.n_vertices)
         tally.add("", row_distances(first.skin, other, self.joints))
+
+    def _compare_shapes(self) -> None:
+        """Compare the offsets of blend shapes with the same name on the same mesh."""
+        first, second = self.first.figure.blend_shapes, self.second.figure.blend_shapes
+        if first is None or second is None or not self.is_same:
+            return
+        pairs = [
+            (index, second.names.index(name))
+            for index, name in enumerate(first.names)
+            if name in second.names
+        ]
+        if not pairs:
+            return
+        one, other = np.array(pairs).T
+        distances = np.linalg.norm(
+            first.direction_values()[one] - second.direction_values()[other], axis=-1
+        )
+        tally = self._tally("blend shapes", "length", distances.shape[-1])
+        tally.add("", distances.max(axis=0))
 
     def _posed(self, actor: Actor) -> Floats:
         return deform(actor.figure, actor.pose, self.skinning)[0]

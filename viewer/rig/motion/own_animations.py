@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
-from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.scene import Actor, Scene, figure_pose
 
-__all__ = ["has_own_animations", "own_animations", "still_pose"]
+__all__ = ["has_own_animations", "keeps_keys", "own_animations", "still_pose"]
 
 _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
@@ -22,6 +23,11 @@ def has_own_animations(actor: Actor) -> bool:
     if skeleton is None or skeleton.constraints:
         return False
     return isinstance(clip, TransformClip) or (clip is None and bool(actor.figure.animations))
+
+
+def keeps_keys(scene: Scene, actor: Actor) -> bool:
+    """Return whether an actor's animations can be written as they are, also if it is upright."""
+    return has_own_animations(actor) and not own_up(scene, actor)[1]
 
 
 def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformClip, ...]:

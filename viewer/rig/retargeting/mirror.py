@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
@@ -11,10 +13,11 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import Pose, joint_rotations, rest_pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
+from viewer.rig.retargeting.joint_names import joint_meanings, sided_words
 from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton, clamp_dofs
 
-__all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose"]
+__all__ = ["asymmetry", "joint_partners", "mirror_axis", "mirror_pose", "posing_partners"]
 
 # Maximum distance of a joint from its counterpart's mirror image, relative to the figure's size.
 _NEAR = 0.02
@@ -85,11 +88,63 @@ def joint_partners(figure: Figure) -> Ints:
     return partners
 
 
+def posing_partners(figure: Figure) -> Ints:
+    """Return each joint's counterpart for mirrored poses: (J,) int32.
+
+    That of ``joint_partners`` for symmetric skeletons. Pairs of other humanoids are found by the
+    bones that their file states and by names (``Ear_L``, ``Ear_R``), and joints in the mirror
+    plane are their own; -1 for joints on one side only, such as a sword.
+
+    Raises
+    ------
+    RigError
+        If a joint has no counterpart, and the file states no human bones.
+    """
+    try:
+        return joint_partners(figure)
+    except RigError:
+        skeleton = figure.skeleton
+        if skeleton is None or skeleton.humanoid is None:
+            raise
+        return _named_partners(figure, skeleton)
+
+
+def _named_partners(figure: Figure, skeleton: Skeleton) -> Ints:
+    """Return counterparts by meaning and name, -1 for none."""
+    keys = [
+        _sided(meaning) if meaning else named
+        for meaning, named in zip(
+            joint_meanings(skeleton), sided_words(skeleton.names), strict=True
+        )
+    ]
+    counts = Counter(keys)
+    place = {key: joint for joint, key in enumerate(keys) if counts[key] == 1}
+    other = {"left": "right", "right": "left"}
+    partners = np.full(skeleton.n_joints, -1, dtype=np.int32)
+    for joint, (side, word) in enumerate(keys):
+        if side and (side, word) in place:
+            partners[joint] = place.get((other[side], word), -1)
+    joints, axis = rest_joints(figure), mirror_axis(figure)
+    pairs = np.flatnonzero(partners >= 0)
+    plane = joints[pairs if len(pairs) else [0], axis].mean()
+    near = np.abs(joints[:, axis] - plane) <= _NEAR * box_size(bounding_box(joints))
+    central = np.flatnonzero((partners < 0) & near & np.array([not side for side, _ in keys]))
+    partners[central] = central
+    return partners
+
+
+def _sided(meaning: str) -> tuple[str, str]:
+    """Return side and word: ``("left", "hip")`` of ``left_hip``, ``("", "neck")`` of ``neck``."""
+    side, _, word = meaning.partition("_")
+    return (side, word) if side in ("left", "right") else ("", meaning)
+
+
 def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     """Return the mirrored pose, with left and right exchanged.
 
     World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes that
-    of its counterpart; rest rotations may therefore differ between the sides.
+    of its counterpart; rest rotations may therefore differ between the sides. Joints without a
+    counterpart keep their local rotation.
 
     Parameters
     ----------
@@ -106,25 +161,31 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     Raises
     ------
     RigError
-        If the skeleton is not symmetric.
+        If the skeleton is neither symmetric nor a stated humanoid.
     """
-    partners = joint_partners(figure)
+    partners = posing_partners(figure)
     skeleton = figure.require_skeleton()
+    is_alone = partners < 0
+    partners = np.where(is_alone, np.arange(skeleton.n_joints), partners)
     flip = np.ones(3)
     flip[mirror_axis(figure)] = -1.0
     zero = rest_pose(skeleton)
     zero.dofs[:] = 0.0
     rest = _world_rotations(skeleton.parents, joint_rotations(skeleton, zero))
-    posed = _world_rotations(skeleton.parents, joint_rotations(skeleton, pose))
+    present = joint_rotations(skeleton, pose)
+    posed = _world_rotations(skeleton.parents, present)
     # F D F with F = diag(flip) is a proper rotation again: the two reflections cancel out.
     deltas = posed @ np.swapaxes(rest, 1, 2)
     wanted = (flip[:, None] * deltas[partners] * flip) @ rest
+    for joint in np.flatnonzero(is_alone & (skeleton.parents >= 0)):
+        wanted[joint] = wanted[skeleton.parents[joint]] @ present[joint]
     local = wanted.copy()
     below = np.flatnonzero(skeleton.parents >= 0)
     local[below] = np.swapaxes(wanted[skeleton.parents[below]], 1, 2) @ wanted[below]
     mirrored = pose.copy()
     set_joint_rotations(skeleton, mirrored, np.arange(skeleton.n_joints, dtype=np.int32), local)
     _mirror_moves(skeleton, pose, mirrored, partners, flip, rest)
+    mirrored.translations[is_alone] = pose.translations[is_alone]
     return mirrored
 
 

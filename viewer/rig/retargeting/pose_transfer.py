@@ -6,9 +6,10 @@ world rotations W of the pose and W0 of the skeleton with all DOFs at 0,
 
     W_target = C W_source W0_source^T C^T W0_target
 
-where C rotates the source's up axis to the target's. Of the source, only the rotations W_source
-W0_source^T are needed: they accompany a pose in files and on the clipboard. Figures with the
-source's skeleton take its DOFs, base rotations and translations instead.
+where C rotates the source's up axis to the target's, and its left if the file of either states
+human bones: their joints match by these bones, and may face another way. Of the source, only the
+rotations W_source W0_source^T are needed: they accompany a pose in files and on the clipboard.
+Figures with the source's skeleton take its DOFs, base rotations and translations instead.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,9 +26,15 @@ from viewer.errors import RigError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.rotation import (
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
+from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose, joint_rotations, rest_pose
 from viewer.rig.posing.joint_rotation import nearest_dofs
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton
 
 __all__ = [
@@ -35,6 +42,7 @@ __all__ = [
     "dof_layout",
     "has_layout_of",
     "joints_by_name",
+    "left_of",
     "relative_rotations",
     "restore_beneath",
     "rotate_joints",
@@ -64,6 +72,10 @@ class JointRotations:
         Result of ``dof_layout``: figures with the same layout use the DOF values directly.
     rotations : (J, 4) or None
         Base rotations, before the DOFs, as in ``Pose``; None for those of the rest pose.
+    meanings : tuple of J str
+        For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
+    left : (3,)
+        The figure's left, a horizontal direction; that of figures with meanings is measured.
     """
 
     figure: str
@@ -73,6 +85,8 @@ class JointRotations:
     up: str
     layout: str
     rotations: Floats | None = None
+    meanings: tuple[str, ...] = ()
+    left: Floats = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
 
 
 def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
@@ -97,6 +111,8 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
         figure.up,
         dof_layout(figure),
         None if np.array_equal(pose.rotations, skeleton.rest_rotations) else pose.rotations.copy(),
+        () if skeleton.humanoid is None else joint_meanings(skeleton),
+        left_of(figure),
     )
 
 
@@ -216,17 +232,63 @@ def rotate_joints(
     other = target.skeleton
     if other is None:
         raise RigError(Diagnostic("F004.pose", values={"figure": target.name}))
-    partners = joints_by_name(source.names, other.names)
+    partners = _partners(source, other)
     found = np.flatnonzero(partners >= 0)
     if not len(found):
         values = {"pose": source.figure or Phrase("the-pose"), "figure": target.name}
         raise RigError(Diagnostic("F004.no-common-joint", values=values))
     to_target = _up_rotation(source.up, target.up)
+    if source.meanings or other.humanoid is not None:
+        up = np.eye(3)["xyz".index(target.up)]
+        to_target = _arc(to_target @ source.left, left_of(target), up) @ to_target
     deltas = to_target @ quaternion_to_matrix(source.relative[partners[found]]) @ to_target.T
     rest = _figure_rotations(other, _with_zero_dofs(other))
     wanted = dict(zip(found.tolist(), deltas @ rest[found], strict=True))
     moved, missed = _rotate_joints(other, start, wanted)
     return moved, _notes(source, target, partners, missed)
+
+
+def _partners(source: JointRotations, target: Skeleton) -> Ints:
+    """Return the source joint of each target joint, by name, then by stated bones; -1 for none."""
+    partners = joints_by_name(source.names, target.names)
+    if source.meanings or target.humanoid is not None:
+        # The names of other figures may be those of the SMPL family.
+        theirs = source.meanings or source.names
+        mine = target.names if target.humanoid is None else joint_meanings(target)
+        meant = joints_by_name(theirs, mine)
+        is_free = (partners < 0) & ~np.isin(meant, partners)
+        partners = np.where(is_free, meant, partners)
+    return partners
+
+
+def left_of(figure: Figure) -> Floats:
+    """Return the left of a figure whose file states human bones; of others +x, as is usual.
+
+    Characters of VRM 0.x face -z: their left is -x.
+    """
+    skeleton, usual = figure.require_skeleton(), np.array([1.0, 0.0, 0.0])
+    if skeleton.humanoid is None:
+        return usual
+    place = {name: joint for joint, name in enumerate(joint_meanings(skeleton)) if name}
+    pairs = [
+        (place[f"left_{part}"], place[f"right_{part}"])
+        for part in ("hip", "shoulder", "collar", "elbow", "wrist")
+        if {f"left_{part}", f"right_{part}"} <= set(place)
+    ]
+    if not pairs:
+        return usual
+    points = world_matrices(skeleton, _with_zero_dofs(skeleton))[:, :3, 3]
+    sides = sum((points[left] - points[right] for left, right in pairs), np.zeros(3))
+    sides["xyz".index(figure.up)] = 0.0
+    largest = int(np.abs(sides).argmax())
+    # Fronts are along an axis; a twisted pair of shoulders must not rotate the pose.
+    return np.sign(sides[largest]) * np.eye(3)[largest] if sides.any() else usual
+
+
+def _arc(start: Floats, end: Floats, up: Floats) -> Floats:
+    """Return the rotation about the up axis from one horizontal axis to another: (3, 3)."""
+    angle = np.arctan2(np.cross(start, end) @ up, start @ end)
+    return rotation_vector_to_matrix(angle * up)
 
 
 def _rotate_joints(

@@ -1,0 +1,54 @@
+"""Notes about materials and names that differ between two figures."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.comparison import compare
+from viewer.rig.comparison.contents import content_notes
+from viewer.rig.figure import Figure
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh
+from viewer.rig.scene import Actor
+
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+
+
+def figure(*materials: Material, parts=("coat", "hat"), **more) -> Figure:
+    mesh = Mesh(
+        CORNERS,
+        np.tile([0.0, 0.0, 1.0], (3, 1)),
+        np.array([[0, 1, 2]], dtype=np.int32),
+        materials=materials,
+        triangle_materials=np.zeros(1, np.int32) if materials else None,
+        parts=parts,
+        triangle_parts=np.zeros(1, np.int32),
+    )
+    return Figure("a", mesh, **more)
+
+
+def test_changed_materials_and_lone_names_are_noted() -> None:
+    first = figure(Material("skin"), Material("cloth"))
+    skin = Material("skin", base_color=(1.0, 0.0, 0.0, 1.0), roughness=0.2)
+    second = figure(skin, Material("metal"), parts=("coat", "belt"))
+    found = [note.message for note in content_notes(first, second)]
+    assert found == [
+        "parts only in the first: hat",
+        "parts only in the second: belt",
+        "materials only in the first: cloth",
+        "materials only in the second: metal",
+        'material "skin" differs: base color, roughness',
+    ]
+    assert content_notes(first, first) == []
+    # Formats without materials or parts are no difference.
+    assert content_notes(first, figure(parts=())) == []
+
+
+def test_offsets_of_blend_shapes_are_compared() -> None:
+    offsets = np.zeros((1, 3, 3))
+    first = figure(blend_shapes=BlendShapes(("smile",), offsets))
+    offsets[0, 2] = 0.0, 3.0, 4.0
+    second = replace(first, blend_shapes=BlendShapes(("smile",), offsets))
+    measures = {one.name: one for one in compare(Actor(first), Actor(second)).measures}
+    assert measures["blend shapes"].maximum == 5.0

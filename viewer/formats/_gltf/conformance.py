@@ -1,0 +1,198 @@
+"""Violations of the specification that do not change what is shown, found only by lint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.errors import FormatError
+from viewer.formats._gltf.document import Document
+from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.content import NodeMesh, NodeSkin, NodeTree
+from viewer.rig.arrays import Floats
+
+__all__ = ["check_conformance"]
+
+_ROUNDING = 1e-5  # deviation of a declared bound, relative to the largest component, that is text
+_UNIT = 1e-3  # deviation of a quaternion's length from 1
+
+
+def check_conformance(
+    document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...], skins: tuple[NodeSkin, ...]
+) -> None:
+    """Record what Khronos' validator reports about accessors, skins, nodes and animations.
+
+    Parameters
+    ----------
+    document : Document
+        The file, whose elements were read; invalid ones were reported then and are not repeated.
+    tree, meshes, skins : NodeTree, tuple of NodeMesh, tuple of NodeSkin
+        Its contents.
+    """
+    _check_bounds(document)
+    _check_primitives(document)
+    for index, skin in enumerate(skins):
+        if len(skin.joints):
+            _check_hierarchy(document.table("skins")[index], skin, tree.parents.tolist())
+    _check_nodes(document, tree, meshes)
+    animations = document.table("animations")
+    for index in range(len(animations)):
+        try:
+            _check_animation(document, animations[index])
+        except FormatError:  # reported when it was read
+            continue
+
+
+def _check_bounds(document: Document) -> None:
+    """Compare declared bounds with the components of all accessors that have any."""
+    for index in range(len(document.accessors)):
+        try:
+            accessor = document.accessors[index]
+            if accessor.has("min") or accessor.has("max"):
+                _compare_bounds(accessor, document.accessors.components(index))
+        except FormatError:  # reported when it was read, or not used
+            continue
+
+
+def _compare_bounds(accessor: Element, components: Floats | None) -> None:
+    if components is None or not len(components) or not np.isfinite(components).all():
+        return
+    for name, found in (("min", components.min(axis=0)), ("max", components.max(axis=0))):
+        if not accessor.has(name):
+            continue
+        declared = accessor.numbers(name)
+        if declared is None or len(declared) != len(found):
+            n_declared = 0 if declared is None else len(declared)
+            accessor.warn("G002.bounds-length", name, expected=len(found), found=n_declared)
+            continue
+        apart = np.abs(declared - found)
+        if (apart > _ROUNDING * max(1e-30, float(np.abs(components).max()))).any():
+            worst = int(apart.argmax())
+            values = {"expected": float(found[worst]), "found": float(declared[worst])}
+            accessor.warn("G002.bounds", name, component=worst, **values)
+
+
+def _check_primitives(document: Document) -> None:
+    """Check that positions have bounds, and that unused influences refer to joint 0."""
+    table = document.table("meshes")
+    for mesh in range(len(table)):
+        try:
+            primitives = table[mesh].table("primitives")
+            for place in range(len(primitives)):
+                attributes = primitives[place].part("attributes")
+                if attributes is not None:
+                    _check_attributes(document, attributes)
+        except FormatError:  # reported when it was read
+            continue
+
+
+def _check_attributes(document: Document, attributes: Element) -> None:
+    accessors = document.accessors
+    position = attributes.index("POSITION", len(accessors), "accessors")
+    if position >= 0 and not _has_bounds(accessors[position]):
+        attributes.warn("G002.no-bounds", "POSITION")
+    for name in attributes.values:
+        number = name.removeprefix("JOINTS_")
+        if number == name or not attributes.has(f"WEIGHTS_{number}"):
+            continue
+        joints = accessors.components(attributes.index(name, len(accessors), "accessors"))
+        weights = accessors.components(
+            attributes.index(f"WEIGHTS_{number}", len(accessors), "accessors")
+        )
+        if joints is None or weights is None or joints.shape != weights.shape:
+            continue
+        unused = (weights == 0.0) & (joints != 0.0)
+        if unused.any():
+            vertex = int(unused.any(axis=1).argmax())
+            attributes.warn("G002.unused-joints", name, n=int(unused.sum()), vertex=vertex)
+
+
+def _has_bounds(accessor: Element) -> bool:
+    return accessor.has("min") and accessor.has("max")
+
+
+def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
+    """Check that the joints have a common root, and that ``skeleton`` is one if it is declared."""
+    ancestors = [_ancestors(joint, parents) for joint in read.joints.tolist()]
+    roots = {chain[-1] for chain in ancestors}
+    if len(roots) > 1:
+        skin.warn("G004.no-common-root", "joints", nodes=sorted(roots))
+    declared = skin.values.get("skeleton")
+    if type(declared) is int and 0 <= declared < len(parents):
+        outside = sum(declared not in chain for chain in ancestors)
+        if outside:
+            skin.warn("G004.not-a-root", "skeleton", node=declared, n=outside)
+
+
+def _ancestors(node: int, parents: list[int]) -> list[int]:
+    """Return a node and its ancestors, its root last."""
+    chain = [node]
+    while parents[chain[-1]] >= 0:
+        chain.append(parents[chain[-1]])
+    return chain
+
+
+def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
+    """Check nodes with a mesh: skins without influences, influences without a skin."""
+    is_bound = [any(part.joints is not None for part in mesh.primitives) for mesh in meshes]
+    is_drawn = [bool(mesh.primitives) for mesh in meshes]
+    identity = (0.0,) * 6 + (1.0,) * 4
+    for node in np.flatnonzero(tree.meshes >= 0).tolist():
+        mesh, element = int(tree.meshes[node]), document.table("nodes")[node]
+        if tree.skins[node] < 0:
+            if is_bound[mesh]:
+                element.warn("G003.no-skin")
+            continue
+        if is_drawn[mesh] and not is_bound[mesh]:
+            element.warn("G003.no-influences", "skin")
+        local = (*tree.translations[node], *tree.rotations[node], *tree.scales[node])
+        if node in tree.matrices or not np.allclose(local, identity, atol=1e-6):
+            element.warn("G003.unused-transform")
+
+
+def _check_animation(document: Document, animation: Element) -> None:
+    """Check times, bounds and rotations of keys, and that no channel moves a matrix."""
+    channels, samplers = animation.table("channels"), animation.table("samplers")
+    accessors, nodes = document.accessors, document.table("nodes")
+    rotating: set[int] = set()
+    for place in range(len(channels)):
+        target = channels[place].part("target")
+        if target is None:
+            continue
+        node = target.index("node", len(nodes), "nodes")
+        path = target.text("path")
+        if node >= 0 and path != "weights" and nodes[node].has("matrix"):
+            target.warn("G005.matrix", "node", node=node)
+        if path == "rotation":
+            rotating.add(channels[place].index("sampler", len(samplers), "samplers"))
+    seen: set[int] = set()
+    for place in range(len(samplers)):
+        sampler = samplers[place]
+        times = sampler.index("input", len(accessors), "accessors")
+        if times >= 0 and times not in seen:
+            seen.add(times)
+            _check_times(document, sampler, times)
+        if place in rotating and sampler.text("interpolation", "LINEAR") != "CUBICSPLINE":
+            _check_rotations(document, sampler)
+
+
+def _check_times(document: Document, sampler: Element, accessor: int) -> None:
+    if not _has_bounds(document.accessors[accessor]):
+        sampler.warn("G005.no-bounds", "input")
+    times = document.accessors.components(accessor)
+    if times is not None and len(times) and times.min() < 0.0:
+        sampler.warn("G005.negative", "input", n=int((times < 0.0).sum()), found=float(times.min()))
+
+
+def _check_rotations(document: Document, sampler: Element) -> None:
+    accessor = sampler.index("output", len(document.accessors), "accessors")
+    if accessor < 0:
+        return
+    keys = document.accessors.floats(accessor, ("VEC4",), sampler.at("output"))
+    lengths = np.linalg.norm(keys, axis=1)
+    # Integers are rounded: 1 / 127 for each component of a byte.
+    is_float = document.accessors[accessor].values.get("componentType") == 5126
+    odd = np.abs(lengths - 1.0) > (_UNIT if is_float else 0.02)
+    if odd.any():
+        key = int(odd.argmax())
+        found = {"index": key, "found": float(lengths[key])}
+        sampler.warn("G005.unit", "output", n=int(odd.sum()), **found)
