@@ -20,7 +20,7 @@ def animate(cast: Cast, wanted: str) -> None:
     Parameters
     ----------
     cast : Cast
-        The actors, which are posed by their clips later.
+        The actors; their poses are computed later.
     wanted : str
         See ``chosen_animation``; figures of files without it keep their rest pose.
 

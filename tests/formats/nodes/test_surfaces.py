@@ -1,4 +1,4 @@
-"""Normals, colours, materials, blend shapes and animations of figures of files of nodes."""
+"""Normals, colours, materials, blend shapes and animations of figures made from nodes."""
 
 import numpy as np
 import pytest

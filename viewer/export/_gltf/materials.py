@@ -32,7 +32,7 @@ class Materials:
     ``document``: modified in place.
     ``mesh``: mesh with the materials.
     ``color`` (r, g, b): linear colour of surfaces without their own colour.
-    ``is_own``: whether the mesh is from a file of nodes, in which materials may have no name.
+    ``is_own``: whether the mesh is from a glTF or FBX file, where materials may be unnamed.
     """
 
     def __init__(

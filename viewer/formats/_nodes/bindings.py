@@ -24,7 +24,7 @@ _SAME = 1e-6
 # Worse conditioned matrices are not inverted, because baking would lose too many digits.
 _WORST_CONDITION = 1e5
 _MOST_CANDIDATES = 8
-# A first A that is closer to the identity is omitted: the vertices keep the numbers of the file.
+# If the first A is closer to the identity, the vertices keep the file's coordinates.
 _NEARLY_SCENE = 1e-3
 
 

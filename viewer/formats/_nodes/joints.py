@@ -179,7 +179,7 @@ def skeleton_of(
         for each in constraints
         if each.joint in joints.own and each.source in joints.own
     )
-    # A pose has no effect on a joint that follows another.
+    # A pose has no effect on constrained joints.
     is_free = ~np.isin(balls, [each.joint for each in followers])
     limits = np.where(np.repeat(is_free, 3)[:, None], [-np.inf, np.inf], 0.0)
     return Skeleton(

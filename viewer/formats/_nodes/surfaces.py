@@ -171,7 +171,7 @@ def _normals(piece: Piece) -> Floats:
 
 
 def normal_matrix(piece: Piece) -> Floats:
-    """Return A^-1, with which rows of normals are multiplied: n' = A^-T n. (3, 3)."""
+    """Return A^-1, (3, 3), which multiplies rows of normals: n' = A^-T n."""
     return np.asarray(np.linalg.inv(piece.baked[:3, :3]), dtype=np.float64)
 
 
