@@ -31,6 +31,12 @@ _PACKAGES = (
     "rich",
     "shtab",
 )
+_EXTRAS = {
+    "ufbx": "reading .fbx files",
+    "DracoPy": "glTF files compressed with Draco",
+    "av": "videos",
+    "scipy": "viewer rig, comparing different meshes",
+}
 _WINDOW_SECONDS = 20
 _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
 
@@ -88,6 +94,24 @@ def _examine_packages() -> Iterator[Finding]:
     if missing:
         cure = f"pip install {' '.join(missing)}"
         yield Finding("packages", "missing", ", ".join(missing), cure, is_vital=True)
+    yield from _examine_extras()
+
+
+def _examine_extras() -> Iterator[Finding]:
+    """Report optional packages, and what each of the missing ones is for."""
+    found, missing = [], {}
+    for name, purpose in _EXTRAS.items():
+        try:
+            found.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            missing[name] = purpose
+    if found:
+        yield Finding("extras", "ok", ", ".join(found))
+    if missing:
+        uses = ", ".join(f"{name} ({purpose})" for name, purpose in missing.items())
+        yield Finding(
+            "extras", "note", f"not installed: {uses}", f"pip install {' '.join(missing)}"
+        )
 
 
 def _examine_devices() -> Iterator[Finding]:

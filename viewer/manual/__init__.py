@@ -14,6 +14,7 @@ __all__ = ["PAGES", "page_text"]
 PAGES = {
     "pictures": "pictures and videos without a screen",
     "course": "course files: .skel, .skin, .anim, .morph and .rig",
+    "characters": "glTF, VRM and FBX: what is read, drawn and reported",
     "bodies": "body models: the SMPL family and PIG",
     "motion": "clips, BVH and AMASS: play, edit, retarget, convert",
     "captures": "EasyMocap recordings: people, gaps, keypoints, cameras",

@@ -23,7 +23,7 @@ def figure(*materials: Material, parts=("coat", "hat"), **more) -> Figure:
         materials=materials,
         triangle_materials=np.zeros(1, np.int32) if materials else None,
         parts=parts,
-        triangle_parts=np.zeros(1, np.int32),
+        triangle_parts=np.zeros(1, np.int32) if parts else None,
     )
     return Figure("a", mesh, **more)
 
