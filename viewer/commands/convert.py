@@ -97,6 +97,11 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         )
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
+    if suffix == ".vrm":
+        raise UnsupportedFormatError(
+            "VRM files cannot be written: use .glb, which omits the humanoid map, expressions and "
+            "meta data"
+        )
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
     if arguments.optimize and not any(kind.writes_keys for kind in kinds):
