@@ -3,7 +3,7 @@
 
 in vec3 in_corner;      // x and z across in half widths, y from the joint (0) to the end (1)
 in vec3 in_normal;      // in the same frame; 0 for one normal per triangle
-in float in_tint;       // 0: the joint's colour, 1: that of the axis in_link.z
+in float in_tint;       // 0: the joint's colour, 1: the colour of axis in_link.z
 in ivec3 in_link;       // joint; its child, -1 for an end, -2 for a ball; axis that marks the roll
 in vec4 in_end;         // end without a child: direction in joint space, length in figure units
 in vec3 in_width;       // fraction of the length; smallest and largest half width, figure units
@@ -55,7 +55,7 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
     return size > 1e-12 ? v / size : otherwise;
 }
 
-// Unit vector perpendicular to a unit direction: an axis of the joint, or any vector if that is
+// Unit vector perpendicular to a unit direction: from an axis of the joint, or any if that axis is
 // parallel.
 vec3 across(vec3 way, vec3 wanted) {
     vec3 side = unit_or(wanted, vec3(0.0));

@@ -1,6 +1,6 @@
 #version 330
-// Writes depth only. Blended surfaces cover a fraction of the texels, their alpha, in a pattern that
-// the filters of shadows average.
+// Writes depth only. Blended surfaces cover a fraction of the texels, their alpha, in a pattern
+// that the shadow filters average.
 
 #ifdef MATERIALS
 #pragma include surface

@@ -5,7 +5,7 @@
 in vec2 v_place;            // in the field
 
 uniform sampler2D u_field;  // darkness by contact, and by occluders farther above
-uniform vec2 u_opacity;     // of both
+uniform vec2 u_opacity;     // opacity of each kind
 
 out vec4 f_color;           // sRGB, premultiplied by alpha
 

@@ -12,7 +12,7 @@ uniform mat4 u_projection;
 uniform vec2 u_size;        // of the image, pixels
 uniform float u_border;     // width of the border, pixels
 uniform float u_lift;       // fraction of the distance to the eye by which it is moved forward
-uniform float u_height;     // the same for parallel projections, scene units
+uniform float u_height;     // distance moved in parallel projections, scene units
 uniform bool u_orthographic;
 
 out vec4 v_color;

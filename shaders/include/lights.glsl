@@ -6,7 +6,7 @@ uniform vec3 u_up;                   // the scene's up axis, unit length, camera
 uniform vec3 u_ambient;              // ambient light on an upright surface, linear
 uniform vec3 u_ambient_growth;       // added to surfaces that face up, subtracted if they face down
 
-// Hemisphere lighting: light that a surface receives from a sky above and a ground below it.
+// Hemisphere lighting: light that a surface receives from the sky above and the ground below.
 vec3 ambient_light(vec3 normal) {
     return u_ambient + u_ambient_growth * dot(normal, u_up);
 }
@@ -17,8 +17,7 @@ uniform float u_shadow_offset;   // offset along the normal of a surface at graz
 uniform float u_shadow_strength;
 #endif
 
-// Fraction of a light, key or rim, that reaches a surface; the cosine is that of the incidence
-// angle.
+// Fraction of the key or rim light that reaches a surface at this cosine of the incidence angle.
 float visibility(int light, vec3 position, vec3 normal, float cosine) {
 #ifdef SHADOWS
     if (light != 0)

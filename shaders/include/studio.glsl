@@ -1,7 +1,7 @@
 // Image-based lighting by the studio; assets/make_studio.py generates the maps.
 
 uniform sampler2DArray u_studio;    // octahedral maps; the last layer is irradiance / pi
-uniform mat3 u_to_studio;           // camera space to the studio's: +y up, +z towards the camera
+uniform mat3 u_to_studio;           // camera space to studio space: +y up, +z towards the camera
 uniform float u_studio_strength;
 
 const float STUDIO_SIZE = 128.0;    // texels per side, with a border of one texel

@@ -16,7 +16,7 @@ vec4 base_color() {
 const int BASE_MAP = 0, METALLIC_MAP = 1, ROUGHNESS_MAP = 2;
 const int NORMAL_MAP = 3, OCCLUSION_MAP = 4, EMISSIVE_MAP = 5;
 
-in vec4 v_other_uvs;            // second and third set of texture coordinates that are used
+in vec4 v_other_uvs;            // second and third set of texture coordinates in use
 in vec4 v_tint;                 // vertex colour, linear, and opacity
 
 uniform vec4 u_base_factor;     // linear
@@ -62,7 +62,7 @@ void cut_out(float alpha) {
         discard;
 }
 
-// A normal perturbed by the normal map. Tangents are computed from screen-space derivatives
+// Normal perturbed by the normal map. Tangents are computed from screen-space derivatives
 // (Schueler 2013, "Normal Mapping Without Precomputed Tangents"), so meshes need none, and mirrored
 // texture coordinates need no sign. On the back of a surface, side -1, bumps are dents.
 vec3 mapped_normal(vec3 position, vec3 normal, float side) {

@@ -99,10 +99,10 @@ def is_motion(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool
 
 
 def writes_keys(arguments: argparse.Namespace, output: Path, scene: Scene) -> bool:
-    """Return whether animations are written with their own keys, instead of as frames.
+    """Return whether animations are written with their own keys instead of as frames.
 
-    That is so for formats with keys unless frames, a rate or a single pose are requested, or a
-    figure has another motion.
+    This is the case for formats with keys, unless frames, a rate or a single pose is requested, or
+    a figure has another motion.
     """
     suffix = output.suffix.lower()
     kinds = [key for key, kind in EXPORTERS.items() if kind.writes_keys and suffix in kind.suffixes]

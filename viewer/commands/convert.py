@@ -97,6 +97,11 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         )
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
+    if suffix == ".vrm":
+        raise UnsupportedFormatError(
+            "VRM files cannot be written: use .glb, which omits the humanoid map, expressions and "
+            "meta data"
+        )
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
     if arguments.optimize and not any(kind.writes_keys for kind in kinds):
@@ -123,7 +128,7 @@ def _write_poses(
 def _write_clips(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
-    """Write figures at rest with their animations, or only with the one that was asked for."""
+    """Write figures at rest with their animations, or only with the requested one."""
     is_chosen, optimizes = bool(arguments.animation), bool(arguments.optimize)
 
     def write(actor: Actor, path: Path) -> list[Diagnostic]:

@@ -52,7 +52,7 @@ class Exporter:
     writes_motion : bool
         Whether its module has ``export_animation(animation, path, options)``.
     keeps_world : bool
-        Whether it keeps the up axis of the motion's own world, even if that is upside down.
+        Whether it keeps the up axis of the motion's own world, even if that world is upside down.
     writes_keys : bool
         Whether its module has ``export_clips(actor, path, skinning, clips)``, which writes all
         animations of a figure with their own keys.

@@ -84,11 +84,11 @@ def export_clips(
     path : Path
         The file.
     skinning : Skinning
-        Selects influences; the reference for the measured error.
+        Selects influences, and is the reference for the measured error.
     clips : sequence of TransformClip
-        Motions of the figure, see ``own_animations``.
+        Motions of the figure; see ``own_animations``.
     optimizes : bool
-        Quantise vertex attributes.
+        Whether vertex attributes are quantised.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def export_clips(
     Raises
     ------
     RigError
-        If numbers do not fit single precision.
+        If a number exceeds single precision.
     OutputError
         If a file cannot be written.
     """

@@ -270,19 +270,20 @@ class Source:
         self._offsets[kind] = self, offset_of
 
     def remember_pointers(self, skeleton: object, pointer_of: Callable[[str, int], str]) -> None:
-        """Register a function that returns JSON pointers of elements of one figure.
+        """Register a function that returns JSON pointers to the elements of one figure.
 
         Parameters
         ----------
         skeleton : Skeleton
             Identifies the figure, as a file may have several.
         pointer_of : callable
-            Takes a kind as of ``remember``, and an index; empty if there is no such element.
+            Takes a kind, as for ``remember``, and an index; returns an empty text if there is no
+            such element.
         """
         self._pointers[id(skeleton)] = skeleton, pointer_of
 
     def pointer_of(self, skeleton: object, kind: str, index: int) -> str:
-        """Return the JSON pointer of an element of a figure; empty if none is registered."""
+        """Return the JSON pointer to an element of a figure; empty if none is registered."""
         known = self._pointers.get(id(skeleton))
         return "" if known is None else known[1](kind, index)
 

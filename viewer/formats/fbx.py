@@ -3,8 +3,8 @@
 The format belongs to Autodesk and is not published. ufbx (github.com/ufbx/ufbx) reads versions 3.0
 to 7.7, ASCII and binary, in a child process, because its Python binding can crash. Transforms with
 pivots are folded into translation, rotation and scale, which is exact. Animations are baked at the
-file's frame rate and at their keys. Right-handed axes with y or z up, and units of m, cm, mm or
-inches, are kept; others are converted to y up and metres.
+file's frame rate and at their keys. Right-handed axes with y or z up and units of m, cm, mm or
+inches are kept; others are converted to y up and metres.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ def read(source: Source) -> FigureGroup:
     Parameters
     ----------
     source : Source
-        The file; elements without equivalent are added to its warnings.
+        The file; a warning lists elements without equivalent.
 
     Returns
     -------
     FigureGroup
-        Figures in the file's unit and axes, see above.
+        Figures in the file's unit and axes, unless converted as described above.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Reader of glTF 2.0: ``.gltf``, ``.glb``, characters (``.vrm``) and their motions (``.vrma``).
 
-The grammar is in ``_gltf/node_file.py``; the figures made of it are described in ``_nodes``.
+The grammar is in ``_gltf/node_file.py``; ``_nodes`` describes the conversion to figures.
 """
 
 from __future__ import annotations

@@ -311,7 +311,7 @@ def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Findi
 
 
 def _pointer(finding: Finding, actor: Actor, source: Source) -> str | None:
-    """Return the JSON pointer to the first item of a finding, if the reader recorded it."""
+    """Return the JSON pointer to the first item of a finding, if the reader recorded one."""
     if finding.part == "clip":
         return next((one.place for one in actor.figure.animations if one.plays(actor.clip)), None)
     if finding.at is None:

@@ -1,4 +1,4 @@
-"""Starts the animations that figures come with."""
+"""Playback of the animations in the actors' files."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def animate(cast: Cast, wanted: str) -> None:
     Parameters
     ----------
     cast : Cast
-        Its actors are posed by their clips later.
+        The actors; their poses are computed later.
     wanted : str
-        See ``chosen_animation``; files without it stay at rest.
+        See ``chosen_animation``; figures of files without it keep their rest pose.
 
     Raises
     ------
     RigError
         If no file has the requested animation.
     FormatError
-        If its keys are invalid. If none was requested, this is only a warning.
+        If the keys of a requested animation are invalid; for others, this is only a warning.
     """
     files = _files(cast)
     if wanted and not files:
@@ -47,7 +47,7 @@ def animate(cast: Cast, wanted: str) -> None:
 
 
 def _files(cast: Cast) -> list[list[Actor]]:
-    """Return the actors that can be animated, those of one file together."""
+    """Return the actors that can be animated, grouped by file."""
     files: dict[object, list[Actor]] = {}
     for actor in cast.actors:
         if actor.figure.animations and actor.clip is None:

@@ -14,11 +14,11 @@ from viewer.rig.scene import Actor, Scene, scene_box
 
 __all__ = ["place_side_by_side", "placed_views", "stand_up"]
 
-_GAP = 0.25  # between actors side by side, in widths of the wider one
+_GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
 
 def stand_up(cast: Cast, world_up: str) -> None:
-    """Rotate actors whose files have a different up axis from the scene."""
+    """Rotate actors whose up axis differs from the scene's."""
     for actor, up in zip(cast.actors, cast.ups, strict=True):
         if up != world_up:
             quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
@@ -26,7 +26,7 @@ def stand_up(cast: Cast, world_up: str) -> None:
 
 
 def place_side_by_side(cast: Cast) -> None:
-    """Move actors without a position from their files to the right of those before them.
+    """Move actors without a position of their own to the right of those before them.
 
     Actors of one group of figures are moved together.
     """
@@ -52,7 +52,7 @@ def place_side_by_side(cast: Cast) -> None:
 
 
 def _by_group(cast: Cast) -> list[list[Actor]]:
-    """Return the actors without a position of their own, those of one group together."""
+    """Return the actors without a position of their own, grouped by figure group."""
     groups: dict[FigureGroup | int, list[Actor]] = {}
     for index, (actor, group) in enumerate(zip(cast.actors, cast.groups, strict=True)):
         if not cast.placed[index]:
@@ -61,7 +61,7 @@ def _by_group(cast: Cast) -> list[list[Actor]]:
 
 
 def placed_views(cast: Cast) -> list[CameraView]:
-    """Return the cameras of groups of figures, moved with these figures."""
+    """Return the cameras of figure groups, moved with their figures."""
     placements = {
         group: actor.placement
         for actor, group in zip(cast.actors, cast.groups, strict=True)

@@ -18,23 +18,23 @@ PROCEDURAL = {
 """Expressions that others can suppress, by kind (VRM 1.0, "Procedural override")."""
 
 OVERRIDES = ("none", "block", "blend")
-"""No effect; off while the other is above 0; faded out by the weight of the other."""
+"""Effect on other expressions: none; off while this one is above 0; faded out by its weight."""
 
 _HALF = 0.5  # a binary expression is fully on above this weight, and off otherwise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpressionRules:
-    """Rules that turn the weights of expressions into those that are shown.
+    """Rules that compute the displayed weights of expressions.
 
     Attributes
     ----------
     rows : (E,) int32
         Blend shape of each expression.
     is_binary : (E,) bool
-        Whether it is either fully on or off.
+        Whether it is always either fully on or off.
     kinds : (E,) int32
-        Index into ``PROCEDURAL``, -1 for others.
+        Index into ``PROCEDURAL``, -1 for other expressions.
     overrides : (E, 3) int32
         Effect on each kind of ``PROCEDURAL``: index into ``OVERRIDES``.
     """
@@ -54,17 +54,17 @@ class ExpressionRules:
         put("overrides", (len(self.rows), len(PROCEDURAL)), np.int32)
 
     def shown(self, weights: Floats) -> Floats:
-        """Return the weights that are shown (VRM 1.0, ``expressions.md``).
+        """Return the displayed weights (VRM 1.0, ``expressions.md``).
 
         Parameters
         ----------
         weights : (N,)
-            Of all blend shapes; those of expressions count as 0 to 1.
+            Weights of all blend shapes; those of expressions are clamped to 0 … 1.
 
         Returns
         -------
         (N,)
-            Weights of other blend shapes are unchanged.
+            Weights; those of other blend shapes are unchanged.
         """
         known = self.rows < len(weights)
         values = np.zeros(len(self.rows))

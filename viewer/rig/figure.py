@@ -78,7 +78,7 @@ class Figure:
     animations : tuple of Animation
         Motions from the figure's own file, in file order.
     record : FileRecord or None
-        What its file of nodes states besides, to be written back.
+        Other data of its glTF or FBX file, to be written back.
     """
 
     name: str

@@ -21,7 +21,7 @@ class FigureGroup:
     Attributes
     ----------
     name : str
-        Title of the file.
+        Title of the group.
     figures : tuple of Figure
         At least one; all have the same up axis and unit.
     views : tuple of CameraView

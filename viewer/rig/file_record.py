@@ -13,16 +13,16 @@ __all__ = ["FileRecord"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileRecord:
-    """What a file of nodes states besides a figure's shape and motion.
+    """Data of a file of nodes other than a figure's shape and motion.
 
     Attributes
     ----------
     copyright : str
-        Of the asset; empty if the file names none.
+        Copyright notice of the asset; empty if there is none.
     extras : Any
         Application data of the whole file, as parsed from JSON; None if there is none.
     joint_extras, part_extras, mesh_extras : mapping of int
-        Application data of joints, of the nodes of parts that are no joints, and of the meshes of
+        Application data of joints, of the nodes of parts that are not joints, and of the meshes of
         parts, by the index of the joint or part.
     mesh_names : tuple of P str
         Name of the mesh of each part.

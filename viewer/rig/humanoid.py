@@ -1,4 +1,4 @@
-"""Humanoids: joints with the standard names of human bones, as VRM files state them."""
+"""Humanoids: joints by the standard names of human bones in VRM files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SPINE_BONES = ("spine", "chest", "upperChest")
 
 
 def _human_bones() -> dict[str, str]:
-    """Return the name in the SMPL family of every bone but those of the spine."""
+    """Return the SMPL name of every bone, except for spine bones."""
     limbs = {
         **{"UpperLeg": "hip", "LowerLeg": "knee", "Foot": "ankle", "Toes": "foot"},
         **{"Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist"},
@@ -40,7 +40,7 @@ def _human_bones() -> dict[str, str]:
 
 
 HUMAN_BONES: dict[str, str] = _human_bones()
-"""Name in the SMPL family of every bone of VRM 1.0 but those of the spine."""
+"""SMPL name of every bone of VRM 1.0, except for spine bones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,7 +30,8 @@ __all__ = [
 PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person"]
 """Whether a part is drawn from outside, from the character's own eyes, or in both views.
 
-``"auto"`` parts are drawn from outside; from the eyes, without what moves with the head.
+``"auto"`` parts are drawn from outside and, without triangles that move with the head, from the
+eyes.
 """
 
 _ROW = 64  # points per row of a reduction, see bounding_box
@@ -64,7 +65,7 @@ class Mesh:
     triangle_parts : (T,) int32
         Index into ``parts``, -1 for none.
     part_views : tuple of P PartView
-        The views for which the parts are meant; empty if all are for both.
+        The views in which the parts are drawn; empty if all are drawn in both.
     """
 
     positions: Floats
@@ -357,6 +358,6 @@ def _area_vectors(positions: Floats, triangles: Ints) -> Floats:
 
 
 def first_person_parts(mesh: Mesh | None) -> frozenset[int]:
-    """Return the parts that are not meant to be seen from outside, and therefore start hidden."""
+    """Return the parts that are not drawn from outside, and therefore start hidden."""
     views = () if mesh is None else mesh.part_views
     return frozenset(part for part, view in enumerate(views) if view == "first-person")

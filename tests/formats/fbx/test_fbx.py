@@ -1,4 +1,4 @@
-"""Reading of ``.fbx``: contents, units and axes, and children that fail."""
+"""Reading of ``.fbx``: contents, units and axes, and failures of the child process."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_materials_split_a_mesh_and_quads_become_triangles(strip: NodeFile) -> N
 
 
 @needs_ufbx
-def test_influences_are_those_of_the_clusters(strip: NodeFile) -> None:
+def test_influences_agree_with_the_clusters(strip: NodeFile) -> None:
     (skin,), low = strip.skins, strip.meshes[0].primitives[0]
     assert skin.joints.tolist() == [2, 3] and skin.method == "lbs"
     assert_allclose(skin.inverse_bind[1][:3, 3], [0.0, -1.0, 0.0])
@@ -83,7 +83,7 @@ def test_keys_are_baked_at_the_frame_rate_of_the_file(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_up_axis_and_unit_stay_those_of_the_file(tmp_path: Path) -> None:
+def test_up_axis_and_unit_of_the_file_are_kept(tmp_path: Path) -> None:
     source = Source.open(write_strip(tmp_path, up="z", unit=100.0))
     content = node_file(source)
     assert (content.up, content.unit) == ("z", "m")
@@ -92,7 +92,7 @@ def test_up_axis_and_unit_stay_those_of_the_file(tmp_path: Path) -> None:
 
 
 @needs_ufbx
-def test_unknown_units_become_metres(tmp_path: Path) -> None:
+def test_unknown_units_are_converted_to_metres(tmp_path: Path) -> None:
     source = Source.open(write_strip(tmp_path, unit=30.48))  # feet
     content = node_file(source)
     assert content.unit == "m"
@@ -103,7 +103,7 @@ def test_unknown_units_become_metres(tmp_path: Path) -> None:
 
 
 @needs_ufbx
-def test_other_contents_are_refused(tmp_path: Path) -> None:
+def test_invalid_contents_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "wrong.fbx"
     path.write_text("no FBX at all\n")
     with pytest.raises(FormatError) as caught:
@@ -120,7 +120,7 @@ def test_other_contents_are_refused(tmp_path: Path) -> None:
         ("import os\nos._exit(0)\n", "exit code 0"),
     ],
 )
-def test_a_child_that_fails_is_one_line(
+def test_a_failed_child_process_is_reported_on_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str, ending: str
 ) -> None:
     (tmp_path / "ufbx.py").write_text(library)
@@ -133,9 +133,7 @@ def test_a_child_that_fails_is_one_line(
     assert ending in str(caught.value)
 
 
-def test_without_the_library_the_message_names_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("viewer.formats._fbx.child.find_spec", lambda name: None)
     with pytest.raises(FormatError) as caught:
         node_file(Source.open(write_strip(tmp_path)))
@@ -143,7 +141,7 @@ def test_without_the_library_the_message_names_it(
     assert caught.value.diagnostic.key == "F001.fbx-extra"
 
 
-def test_a_truncated_message_is_noticed() -> None:
+def test_a_truncated_message_is_detected() -> None:
     data = packed({"a": np.arange(3)}, {"b": 1})
     arrays, told = unpacked(data) or ({}, {})
     assert arrays["a"].tolist() == [0, 1, 2] and told == {"b": 1}
@@ -155,7 +153,7 @@ def test_a_truncated_message_is_noticed() -> None:
     ("stack", "time", "reference"),
     [(0, 0.0, "base_0"), (1, 15 / 24, "spin_15"), (2, 20 / 24, "wiggle_20")],
 )
-def test_a_file_of_blender_agrees_with_its_exported_frames(
+def test_a_blender_file_agrees_with_its_exported_frames(
     shared_data: Path, stack: int, time: float, reference: str
 ) -> None:
     folder = shared_data / "fbx"
@@ -170,7 +168,7 @@ def test_a_file_of_blender_agrees_with_its_exported_frames(
     lines = (folder / f"blender_279_sausage_{reference}.obj").read_text().splitlines()
     expected = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
     distances = np.linalg.norm(vertices[:, None] - expected, axis=-1)
-    assert distances.min(axis=0).max() < 1e-5  # of a figure 4 m long; the file is float32
+    assert distances.min(axis=0).max() < 1e-5  # metres, of a figure 4 m long; the file is float32
     assert distances.min(axis=1).max() < 1e-5
 
 

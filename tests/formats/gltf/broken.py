@@ -1,4 +1,4 @@
-"""Broken variants of a document that has everything: truncated, and with other JSON values."""
+"""Broken variants of a complete document: truncated, or with changed JSON values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ VALUES: tuple[Any, ...] = (
     *("", "x", "../x", "VEC3", "data:;base64,AAAA", "http://x/y", None, True, False),
     *([], [0], [[]], [None], ["x"], [1e38] * 4, [0] * 16, {}, {"extensions": {}}, {"a": [{}]}),
 )
-"""Values that are put in place of others, and removed ones: see ``changed``."""
+"""Replacement values, and a marker for removal: see ``changed``."""
 
 
 def complete() -> File:
@@ -46,7 +46,7 @@ def complete() -> File:
 
 
 def changed(seed: int, count: int) -> Iterator[bytes]:
-    """Yield documents in which one to three JSON values are others or missing."""
+    """Yield documents in which one to three JSON values are changed or missing."""
     rng = random.Random(seed)
     whole = json.loads(complete().json())
     for _ in range(count):
@@ -57,7 +57,7 @@ def changed(seed: int, count: int) -> Iterator[bytes]:
 
 
 def _change(root: dict[str, Any], rng: random.Random) -> None:
-    """Replace or remove a value somewhere below the root."""
+    """Replace or remove a random value below the root."""
     value: Any = root
     while True:
         keys = list(value) if isinstance(value, dict) else list(range(len(value)))
@@ -74,6 +74,6 @@ def _change(root: dict[str, Any], rng: random.Random) -> None:
 
 
 def truncated() -> Iterator[bytes]:
-    """Yield beginnings of a binary and of a text file."""
+    """Yield truncated copies of a binary and of a text file."""
     for data in (complete().glb(), complete().json()):
         yield from (data[:size] for size in range(1, len(data), 97))

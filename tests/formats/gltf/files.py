@@ -68,7 +68,7 @@ class File:
         return self.root["meshes"][0]["primitives"][0]
 
     def json(self, uri: str | None = None) -> bytes:
-        """Return the document as text, with its buffer inside unless a URI is given."""
+        """Return the document as text, with an embedded buffer unless a URI is given."""
         text = base64.b64encode(self.binary).decode()
         buffer = {"byteLength": len(self.binary), "uri": uri or f"data:;base64,{text}"}
         buffers = {"buffers": [buffer]} if self.binary else {}
@@ -85,7 +85,7 @@ class File:
 
 
 def glb(chunks: list[tuple[bytes, bytes]]) -> bytes:
-    """Return a binary file of chunks."""
+    """Return a binary file made of chunks."""
     body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
@@ -100,7 +100,7 @@ def source_of(data: bytes | File, path: str | Path = "a.gltf") -> Source:
 
 
 def skinned(**attributes: Any) -> File:
-    """Return a triangle that is skinned by two joints."""
+    """Return a triangle skinned to two joints."""
     file = File()
     joints = file.accessor([[0, 1, 0, 0]] * 3, "B")
     weights = file.accessor([[0.25, 0.75, 0, 0]] * 3)
@@ -115,7 +115,7 @@ def skinned(**attributes: Any) -> File:
 def animated(
     path: str = "translation", values: Any = ((0, 0, 0), (1, 0, 0)), **sampler: Any
 ) -> File:
-    """Return a node that an animation moves, with keys at 0 and 1 seconds."""
+    """Return a node with an animation whose keys are at 0 and 1 seconds."""
     file = File(nodes=[{}])
     samplers = [{"input": file.times([0.0, 1.0]), "output": file.accessor(values), **sampler}]
     channels = [{"sampler": 0, "target": {"node": 0, "path": path}}]
@@ -124,14 +124,14 @@ def animated(
 
 
 def refused(file: File | bytes) -> tuple[str, str]:
-    """Return the key and the JSON pointer of the error that a file is refused with."""
+    """Return the key and the JSON pointer of the error for which a file is refused."""
     with pytest.raises(FormatError) as caught:
         read(file)
     return caught.value.diagnostic.key, caught.value.diagnostic.pointer
 
 
 def warned(file: File | bytes) -> list[tuple[str, str]]:
-    """Return the keys and JSON pointers of the warnings of a file that is read."""
+    """Return the keys and JSON pointers of the warnings about a file."""
     source = source_of(file)
     read_nodes(source)
     return [(found.key, found.pointer) for found in source.diagnostics]

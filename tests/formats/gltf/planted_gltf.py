@@ -1,4 +1,4 @@
-"""Documents with one error each, by the code that lint reports it under."""
+"""Documents with one error each, by the code under which lint reports the error."""
 
 from __future__ import annotations
 
@@ -60,4 +60,4 @@ PLANTED = {
     "G005": (keys_at_one_time, "/animations/0/samplers"),
     "G006": (unknown_bone, "/extensions/VRMC_vrm/humanoid/humanBones"),
 }
-"""A function that makes the document, and the JSON pointer to its error."""
+"""A function that creates the document, and the JSON pointer to its error."""

@@ -38,7 +38,7 @@ def test_large_integers_are_kept() -> None:
     assert accessors(file).integers(0, ("SCALAR",), "")[:, 0].tolist() == [0, 2**32 - 1]
 
 
-def test_interleaved_attributes_have_a_stride() -> None:
+def test_interleaved_attributes_are_read_by_stride() -> None:
     file = File()
     rows = np.array([[1, 2, 3, 9, 8], [4, 5, 6, 7, 6]], dtype="<f4")
     view = file.view(rows.tobytes(), byteStride=20)
@@ -52,7 +52,7 @@ def test_interleaved_attributes_have_a_stride() -> None:
     assert found.floats(1, ("VEC2",), "", rows).tolist() == [[7, 6]]
 
 
-def test_columns_of_small_matrices_begin_at_multiples_of_4() -> None:
+def test_columns_of_small_matrices_are_aligned_to_4_bytes() -> None:
     file = File()
     data = bytes([1, 2, 0, 0, 3, 4, 0, 0])
     file.add(
@@ -90,7 +90,7 @@ def sparse(file: File, indices: list[int], values: list[float], **members: objec
     file.add("accessors", {**base, "sparse": replaced, **members})
 
 
-def test_sparse_values_replace_those_of_the_view_or_zeros() -> None:
+def test_sparse_values_replace_values_of_the_view_or_zeros() -> None:
     file = File()
     sparse(file, [1, 3], [5, 6])
     sparse(file, [0], [7], bufferView=file.view(np.arange(4, dtype="<f4").tobytes()))
@@ -123,7 +123,7 @@ def test_sparse_values_replace_those_of_the_view_or_zeros() -> None:
         ({"sparse": {"count": 1}}, "F002.gltf-missing", "/sparse"),
     ],
 )
-def test_invalid_accessors(members: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_accessors_are_refused(members: dict[str, object], key: str, pointer: str) -> None:
     file = File()
     file.accessor([1.0, 2.0, 3.0])
     file.root["accessors"][0] |= members
@@ -133,7 +133,7 @@ def test_invalid_accessors(members: dict[str, object], key: str, pointer: str) -
     assert (found.key, found.pointer) == (key, f"/accessors/0{pointer}")
 
 
-def test_accessor_without_data_cannot_take_all_memory() -> None:
+def test_accessor_without_data_cannot_exhaust_memory() -> None:
     file = File()
     file.add("accessors", {"componentType": 5126, "count": 2**31, "type": "MAT4"})
     with pytest.raises(FormatError) as caught:
@@ -141,7 +141,7 @@ def test_accessor_without_data_cannot_take_all_memory() -> None:
     assert caught.value.diagnostic.key == "F002.gltf-decoded"
 
 
-def test_sparse_index_out_of_range() -> None:
+def test_sparse_index_out_of_range_is_refused() -> None:
     file = File()
     sparse(file, [1, 4], [5, 6])
     with pytest.raises(FormatError) as caught:
@@ -149,7 +149,7 @@ def test_sparse_index_out_of_range() -> None:
     assert caught.value.diagnostic.pointer == "/accessors/0/sparse/indices"
 
 
-def test_other_type_than_expected_names_the_user() -> None:
+def test_unexpected_type_is_reported_at_the_referring_member() -> None:
     file = File()
     file.accessor([1.0])
     with pytest.raises(FormatError) as caught:
@@ -167,7 +167,7 @@ def test_other_type_than_expected_names_the_user() -> None:
         ({"byteStride": 8}, "F002.gltf-accessor", "/accessors/0"),
     ],
 )
-def test_invalid_views(view: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_views_are_refused(view: dict[str, object], key: str, pointer: str) -> None:
     file = File()
     file.accessor([1.0, 2.0, 3.0])
     file.root["bufferViews"][0] |= view

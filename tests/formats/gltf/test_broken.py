@@ -1,4 +1,4 @@
-"""Hundreds of broken documents: each is read, or refused with one line that names the file."""
+"""Hundreds of broken documents, each read or refused with one line that names the file."""
 
 from collections.abc import Iterable
 
@@ -18,7 +18,7 @@ def refusals(files: Iterable[bytes]) -> list[str]:
     for data in files:
         kept = Source("a.gltf", data, diagnostics=Collector(keeps_errors=True))
         try:
-            # Errors that are kept do not prevent others from being found.
+            # A kept error does not prevent others from being found.
             read_nodes(kept)
         except FormatError as problem:
             kept.diagnostics.add(problem.diagnostic)
@@ -32,13 +32,13 @@ def refusals(files: Iterable[bytes]) -> list[str]:
     return found
 
 
-def test_the_whole_document_is_valid() -> None:
+def test_the_unbroken_document_is_valid() -> None:
     assert warned(complete()) == []
     assert len(read(source_of(complete())).figures) == 2
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_changed_values(seed: int) -> None:
+def test_documents_with_changed_values_are_read_or_refused(seed: int) -> None:
     found = refusals(changed(seed, 80))
     assert 20 < len(found) < 80
     for line in found:
@@ -46,12 +46,12 @@ def test_changed_values(seed: int) -> None:
         assert len(line) < 400
 
 
-def test_truncated_files() -> None:
+def test_truncated_files_are_read_or_refused() -> None:
     for line in refusals(truncated()):
         assert line.startswith("a.gltf") and "\n" not in line
 
 
-def test_figures_of_changed_documents() -> None:
+def test_changed_documents_give_figures_or_are_refused() -> None:
     for data in changed(9, 60):
         for keeps_errors in (False, True):
             source = Source("a.gltf", data, diagnostics=Collector(keeps_errors=keeps_errors))

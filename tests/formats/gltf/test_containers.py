@@ -1,4 +1,4 @@
-"""Containers of glTF: chunks and lengths of GLB, JSON, and buffers inside and beside the file."""
+"""Containers of glTF: chunks and lengths of GLB, JSON, and embedded and external buffers."""
 
 import json
 import struct
@@ -32,7 +32,7 @@ def test_a_binary_file_may_end_with_a_control_z() -> None:
     assert source_of(data).data == data and warned(data) == []
 
 
-def test_unknown_chunks_are_skipped_and_repeated_ones_named() -> None:
+def test_unknown_chunks_are_skipped_and_repeated_ones_reported() -> None:
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     chunks = [(b"JSON", text), (b"NOTE", b"?"), (b"BIN\0", file.binary), (b"BIN\0", b"more")]
@@ -41,11 +41,11 @@ def test_unknown_chunks_are_skipped_and_repeated_ones_named() -> None:
 
 
 @pytest.mark.parametrize("padding", [b"\0\0\0", b"   ", b"\n\t\0"])
-def test_json_chunk_may_be_padded_with_anything_empty(padding: bytes) -> None:
+def test_json_chunk_may_be_padded_with_white_space_or_zeros(padding: bytes) -> None:
     assert read(glb([(b"JSON", TEXT + padding)])).tree.names == ("a",)
 
 
-def test_padding_that_is_not_counted_is_found() -> None:
+def test_chunks_after_uncounted_padding_are_found() -> None:
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     text += b" " * ((1 - len(text)) % 4)  # one more than a multiple of 4
@@ -55,7 +55,7 @@ def test_padding_that_is_not_counted_is_found() -> None:
     assert len(read(data).meshes) == 1 and warned(data) == []
 
 
-def test_wrong_lengths_are_warned_of_where_nothing_is_lost() -> None:
+def test_wrong_lengths_are_warnings_if_no_data_are_lost() -> None:
     data = triangle().glb()
     longer = data[:8] + struct.pack("<I", len(data) + 8) + data[12:]
     shorter = data[:8] + struct.pack("<I", 0) + data[12:]
@@ -64,7 +64,7 @@ def test_wrong_lengths_are_warned_of_where_nothing_is_lost() -> None:
         assert warned(changed) == [("G001.length", "")]
 
 
-def test_truncated_binary_chunk_is_an_error_where_data_are_missing() -> None:
+def test_truncated_binary_chunk_is_an_error_if_data_are_missing() -> None:
     data = triangle().glb()[:-12]
     source = source_of(data)
     with pytest.raises(FormatError) as caught:
@@ -107,13 +107,13 @@ def test_broken_containers_are_refused(data: bytes, key: str) -> None:
     assert refused(data)[0] == key
 
 
-def test_syntax_errors_have_a_line() -> None:
+def test_syntax_errors_have_a_line_number() -> None:
     with pytest.raises(FormatError) as caught:
         read(b'{\n"nodes": [\n{,\n')
     assert str(caught.value).startswith("a.gltf:3: expected JSON, found a syntax error")
 
 
-def test_texts_of_more_than_half_a_gigabyte_are_refused(monkeypatch) -> None:
+def test_texts_above_half_a_gigabyte_are_refused(monkeypatch) -> None:
     monkeypatch.setattr("viewer.formats._gltf.json_text._MOST_BYTES", 50)
     assert refused(TEXT) == ("F001.gltf-text", "")
     assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
@@ -143,7 +143,7 @@ def test_deviations_from_json_are_warnings() -> None:
         "data:,%00%00%00%00%00%00%80%3F",
     ],
 )
-def test_data_uris(uri: str) -> None:
+def test_data_uris_are_decoded(uri: str) -> None:
     file = File(nodes=[{"mesh": 0}])
     file.root["buffers"] = [{"uri": uri, "byteLength": 8}]
     file.root["bufferViews"] = [{"buffer": 0, "byteLength": 8}]
@@ -170,7 +170,7 @@ def test_data_uris(uri: str) -> None:
         (7, "F002.gltf-type"),
     ],
 )
-def test_uris_that_cannot_be_read(uri: object, key: str) -> None:
+def test_unreadable_uris_are_refused(uri: object, key: str) -> None:
     file = triangle()
     file.root["buffers"] = [{"uri": uri, "byteLength": 36}]
     assert refused(file) == (key, "/buffers/0/uri")
@@ -179,7 +179,7 @@ def test_uris_that_cannot_be_read(uri: object, key: str) -> None:
 @pytest.mark.parametrize(
     ("name", "uri"), [("a b.bin", "a%20b.bin"), ("ä.bin", "%C3%A4.bin"), ("50%25.bin", "50%25.bin")]
 )
-def test_files_beside_the_document(tmp_path: Path, name: str, uri: str) -> None:
+def test_external_files_are_read(tmp_path: Path, name: str, uri: str) -> None:
     file = triangle()
     (tmp_path / name).write_bytes(file.binary)
     source = Source(tmp_path / "a.gltf", file.json(uri))
@@ -187,7 +187,7 @@ def test_files_beside_the_document(tmp_path: Path, name: str, uri: str) -> None:
     assert source.also_read == [tmp_path / name]
 
 
-def test_missing_file_is_named(tmp_path: Path) -> None:
+def test_missing_file_is_named_in_the_error(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"a\.gltf#/buffers/0/uri: .*gone\.bin: cannot be read"):
         read(triangle().json("gone.bin"), tmp_path / "a.gltf")
 
@@ -198,7 +198,7 @@ def test_buffer_without_data_is_refused() -> None:
     assert refused(file) == ("F002.gltf-no-data", "/buffers/0")
 
 
-def test_extensions_that_are_required_or_used() -> None:
+def test_unknown_extensions_are_refused_if_required_and_reported_if_used() -> None:
     file = File(extensionsUsed=["ODD_a", "KHR_mesh_quantization", "ODD_b"])
     assert warned(file) == [("F007.gltf-extensions", "/extensionsUsed")]
     file.root["extensionsRequired"] = ["KHR_mesh_quantization", "ODD_b"]

@@ -16,7 +16,7 @@ POINTER = f"/meshes/0/primitives/0/extensions/{NAME}"
 
 
 def compressed(data: bytes = STREAM, **members: object) -> File:
-    """Return a mesh without uncompressed data."""
+    """Return a mesh that has only compressed data."""
     file = File(extensionsUsed=[NAME], extensionsRequired=[NAME])
     file.add("accessors", {"componentType": 5126, "count": 4, "type": "VEC3"})
     file.add("accessors", {"componentType": 5121, "count": 6, "type": "SCALAR"})
@@ -26,14 +26,14 @@ def compressed(data: bytes = STREAM, **members: object) -> File:
     return file
 
 
-def test_positions_and_triangles() -> None:
+def test_positions_and_triangles_are_decoded() -> None:
     pytest.importorskip("DracoPy")
     [primitive] = read(compressed()).meshes[0].primitives
     assert primitive.positions.tolist() == SQUARE
     assert primitive.triangles.tolist() == [[0, 1, 2], [1, 3, 2]]
 
 
-def test_counts_are_those_of_the_data() -> None:
+def test_counts_are_taken_from_the_compressed_data() -> None:
     pytest.importorskip("DracoPy")
     file = compressed()
     file.root["accessors"][0]["count"] = 2**40
@@ -53,12 +53,12 @@ def test_counts_are_those_of_the_data() -> None:
         (compressed(bufferView=4), "F002.gltf-index", f"{POINTER}/bufferView"),
     ],
 )
-def test_invalid_data(file: File, key: str, pointer: str) -> None:
+def test_invalid_data_are_refused(file: File, key: str, pointer: str) -> None:
     pytest.importorskip("DracoPy")
     assert refused(file) == (key, pointer)
 
 
-def test_without_the_library_an_uncompressed_form_is_needed(monkeypatch) -> None:
+def test_an_uncompressed_form_is_required_without_the_library(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     assert refused(compressed()) == ("F002.gltf-draco", POINTER)
     file = compressed()

@@ -1,4 +1,4 @@
-"""Animations: targets, interpolation, ranges, lazy reading, and animations that are left out."""
+"""Animations: targets, interpolation, ranges, lazy reading, and omitted animations."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def morphed(*values: float, **sampler: object) -> File:
     return file
 
 
-def test_linear_keys() -> None:
+def test_linear_keys_are_read() -> None:
     file = animated()
     file.root["animations"][0]["name"] = "walk"
     [animation] = read(file).animations
@@ -38,7 +38,7 @@ def test_linear_keys() -> None:
     assert channel.tangents is None
 
 
-def test_cubic_keys_are_in_tangent_value_and_out_tangent() -> None:
+def test_cubic_keys_consist_of_in_tangent_value_and_out_tangent() -> None:
     rows = np.arange(18).reshape(6, 3)
     channel = only(animated("scale", rows, interpolation="CUBICSPLINE"))
     assert channel.interpolation == "cubic"
@@ -47,7 +47,7 @@ def test_cubic_keys_are_in_tangent_value_and_out_tangent() -> None:
     assert channel.tangents.tolist() == [[[0, 1, 2], [6, 7, 8]], [[9, 10, 11], [15, 16, 17]]]
 
 
-def test_weights_have_a_value_per_morph_target() -> None:
+def test_weight_keys_have_a_value_per_morph_target() -> None:
     channel = only(morphed(1, 2, 3, 4, interpolation="STEP"))
     assert channel.interpolation == "step"
     assert channel.values.tolist() == [[1, 2], [3, 4]]
@@ -65,7 +65,7 @@ def test_integer_rotations_are_normalised() -> None:
     assert only(file).values == pytest.approx(np.array([[0, 0, half, half], [0, 0, -1, 0]]))
 
 
-def test_splines_of_rotations_are_kept() -> None:
+def test_splines_of_rotations_are_not_normalised() -> None:
     rows = [[0, 0, 0, 0], [0, 0, 0, 2], [0, 0, 1, 0]] * 2
     channel = only(animated("rotation", rows, interpolation="CUBICSPLINE"))
     assert channel.values.tolist() == [[0, 0, 0, 2]] * 2
@@ -78,7 +78,7 @@ def pointing(file: File, pointer: str) -> None:
     channel["target"] = {"path": "pointer", "extensions": extension}
 
 
-def test_pointers_to_nodes_and_weights() -> None:
+def test_pointers_to_nodes_and_weights_are_channels() -> None:
     file = animated()
     pointing(file, "/nodes/0/scale")
     assert (only(file).node, only(file).path) == (0, "scale")
@@ -122,7 +122,7 @@ def test_second_channel_of_a_property_is_ignored() -> None:
     assert ("G005.channel-twice", "/animations/0/channels/1/target") in warned(file)
 
 
-def test_range_is_that_of_all_samplers() -> None:
+def test_range_spans_all_samplers() -> None:
     file = animated()
     animation = file.root["animations"][0]
     animation["samplers"].append({"input": file.times([0.5, 3.0]), "output": 1})
@@ -132,7 +132,7 @@ def test_range_is_that_of_all_samplers() -> None:
 
 
 @pytest.mark.parametrize("members", [{}, {"min": ["0"], "max": [1]}, {"min": [5], "max": [0]}])
-def test_range_is_read_where_it_is_not_declared(members: dict[str, object]) -> None:
+def test_undeclared_range_is_read_from_the_keys(members: dict[str, object]) -> None:
     file = animated()
     accessor = file.root["accessors"][0]
     del accessor["min"], accessor["max"]
@@ -142,7 +142,7 @@ def test_range_is_read_where_it_is_not_declared(members: dict[str, object]) -> N
 
 
 def with_two(file: File) -> File:
-    """Return the file with a valid animation after the first, which shares its samplers."""
+    """Return the file with a second, valid animation, which shares the samplers of the first."""
     file.root["nodes"].append({})
     samplers = [{"input": file.times([0.0, 2.0]), "output": file.accessor([[0, 0, 0]] * 2)}]
     channels = [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]
@@ -161,7 +161,7 @@ def with_two(file: File) -> File:
         ([0.0, 1.0], [[0, 0], [0, 0]], "F002.gltf-kind"),
     ],
 )
-def test_animation_with_broken_keys_is_left_out(times: object, values: object, key: str) -> None:
+def test_animation_with_invalid_keys_is_omitted(times: object, values: object, key: str) -> None:
     file = animated()
     sampler = file.root["animations"][0]["samplers"][0]
     sampler |= {"input": file.accessor(np.reshape(times, (-1, 1))), "output": file.accessor(values)}
@@ -174,7 +174,7 @@ def test_animation_with_broken_keys_is_left_out(times: object, values: object, k
     assert [found.key for found in source.diagnostics.errors] == [key]
 
 
-def test_last_of_several_keys_at_a_time_counts() -> None:
+def test_last_of_several_keys_at_one_time_is_used() -> None:
     file = animated()
     times, values = file.times([0.0, 1.0, 1.0]), file.accessor([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
     file.root["animations"][0]["samplers"] = [{"input": times, "output": values}]
@@ -189,12 +189,12 @@ def test_declared_range_is_compared_with_the_keys() -> None:
     assert warned(file) == [("G005.range", "/animations/0/samplers")]
 
 
-def test_rotation_of_zeros_is_refused() -> None:
+def test_rotation_key_of_zeros_is_refused() -> None:
     file = animated("rotation", [[0, 0, 0, 1], [0, 0, 0, 0]])
     assert warned(file) == [("G005.animation", "/animations/0/samplers/0/output")]
 
 
-def test_later_animations_are_read_when_they_are_played() -> None:
+def test_keys_of_later_animations_are_read_on_playback() -> None:
     file = with_two(animated())
     sampler = file.root["animations"][1]["samplers"][0]
     sampler["output"] = file.accessor([[0, 0, 0], [np.nan, 0, 0]])
@@ -222,7 +222,7 @@ def test_later_animations_are_read_when_they_are_played() -> None:
         {"name": 5},
     ],
 )
-def test_malformed_animation_is_left_out(change: dict[str, object]) -> None:
+def test_malformed_animation_is_omitted(change: dict[str, object]) -> None:
     file = with_two(animated())
     file.root["nodes"] = [{}]
     file.root["animations"][1]["channels"][0]["target"]["node"] = 0

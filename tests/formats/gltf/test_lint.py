@@ -1,4 +1,4 @@
-"""Findings of lint in glTF files: every code of their reader, at its JSON pointer."""
+"""Findings of lint in glTF files: every code of the reader, at its JSON pointer."""
 
 from pathlib import Path
 
@@ -36,7 +36,7 @@ def test_several_errors_are_found(tmp_path: Path) -> None:
     assert ("F002", "/meshes/1/primitives/0/attributes/POSITION") in found
 
 
-def test_findings_of_checks_name_the_element(tmp_path: Path) -> None:
+def test_findings_of_checks_have_a_json_pointer(tmp_path: Path) -> None:
     file = skinned()
     file.root["nodes"][2]["name"] = "hip"
     # The first joint of the skin, node 1, has no name; the second is not where it was bound.
@@ -58,7 +58,7 @@ def test_findings_about_motion_name_the_animation(tmp_path: Path) -> None:
     path.write_bytes(file.json())
     (found,) = [finding for finding in lint_files([path])[1] if finding.code == "C003"]
     assert found.place() == f"{path}#/animations/0"
-    # At 15 sizes per second, the diagonal of the triangle's box being the root of 2.
+    # At 15 sizes per second; the size is the diagonal of the triangle's box, the root of 2.
     assert found.diagnostic.values["limit"] == "21.2 m/s"
 
 

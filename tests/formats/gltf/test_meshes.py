@@ -22,23 +22,23 @@ def only(file: File) -> Primitive:
         (6, [[1, 2, 0], [2, 3, 0]]),
     ],
 )
-def test_modes_without_indices(mode: int, triangles: list[list[int]]) -> None:
+def test_modes_without_indices_give_triangles(mode: int, triangles: list[list[int]]) -> None:
     file = File()
     file.mesh(SQUARE)
     file.primitive["mode"] = mode
     assert only(file).triangles.tolist() == triangles
 
 
-def test_degenerate_triangles_of_strips_are_left_out() -> None:
+def test_degenerate_triangles_of_strips_are_omitted() -> None:
     file = File()
     file.mesh(SQUARE)
     file.primitive.update(mode=5, indices=file.accessor([0, 1, 2, 2, 1, 1, 3], "B"))
-    # 0 1 2; 2 2 1, 2 1 1 and 1 1 3 have no area; 1 2 2 neither.
+    # After 0 1 2, the triangles 2 2 1, 2 1 1, 1 1 3 and 1 2 2 have no area.
     assert only(file).triangles.tolist() == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize("kind", ["B", "H", "I"])
-def test_indices(kind: str) -> None:
+def test_indices_select_vertices(kind: str) -> None:
     file = File()
     file.mesh(SQUARE)
     file.primitive["indices"] = file.accessor([3, 1, 0, 0, 2, 3, 1], kind)
@@ -46,7 +46,7 @@ def test_indices(kind: str) -> None:
     assert warned(file) == [("G002.corners", "/meshes/0/primitives/0/indices")]
 
 
-def test_points_and_lines_are_named_once() -> None:
+def test_points_and_lines_are_reported_once() -> None:
     file = File()
     file.mesh()
     file.primitive["mode"] = 0
@@ -55,7 +55,7 @@ def test_points_and_lines_are_named_once() -> None:
     assert warned(file) == [("F007.gltf-undrawn", "/meshes/0/primitives/0")]
 
 
-def test_primitives_that_share_vertices_keep_those_that_they_use() -> None:
+def test_primitives_that_share_vertices_keep_the_used_ones() -> None:
     file = File()
     file.mesh(SQUARE, TEXCOORD_0=file.accessor([[0, 0], [1, 0], [0, 1], [1, 1]]))
     first = file.primitive
@@ -75,16 +75,16 @@ def test_unused_vertices_of_other_primitives_are_kept() -> None:
     assert only(file).positions.tolist() == SQUARE
 
 
-def test_texture_coordinates_begin_at_the_bottom() -> None:
+def test_v_is_0_at_the_bottom_of_images() -> None:
     file = File()
     uvs = file.accessor([[0, 0], [255, 0], [0, 51]], "B", normalized=True)
     file.mesh(TEXCOORD_1=uvs)
     first, second = only(file).uvs
     assert second == pytest.approx(np.array([[0, 1], [1, 1], [0, 0.8]]), abs=1e-15)
-    assert first.shape == (3, 2)  # materials refer to sets by number
+    assert first.shape == (3, 2)  # materials refer to sets by their numbers
 
 
-def test_colors() -> None:
+def test_colours_are_linear_with_opacity() -> None:
     file = File()
     file.mesh(COLOR_0=file.accessor([[0.5, 0.25, 2], [0, 0, 0], [1, 1, 1]]))
     assert only(file).colors.tolist() == [[0.5, 0.25, 2, 1], [0, 0, 0, 1], [1, 1, 1, 1]]
@@ -110,7 +110,7 @@ def test_quantised_attributes() -> None:
     assert warned(file) == []
 
 
-def test_all_sets_of_influences_are_side_by_side() -> None:
+def test_all_sets_of_influences_are_concatenated() -> None:
     file = skinned()
     attributes = file.primitive["attributes"]
     attributes["JOINTS_1"] = file.accessor([[1, 0, 9, 0]] * 3, "H")
@@ -128,7 +128,7 @@ def test_joints_without_weights_are_ignored() -> None:
     assert warned(file) == [("G004.influence-sets", "/meshes/0/primitives/0/attributes")]
 
 
-def test_joints_must_be_those_of_the_skin() -> None:
+def test_joints_must_exist_in_the_skin() -> None:
     file = skinned()
     joints = file.accessor([[0, 1, 0, 0], [0, 1, 0, 0], [0, 2, 7, 0]], "B")
     file.primitive["attributes"]["JOINTS_0"] = joints
@@ -139,7 +139,7 @@ def test_joints_must_be_those_of_the_skin() -> None:
 
 
 def targets(file: File, **members: object) -> None:
-    """Give the first mesh two morph targets, one of them sparse."""
+    """Add two morph targets to the first mesh, one of them sparse."""
     offsets = {"componentType": 5126, "count": 3, "type": "VEC3"}
     offsets["sparse"] = {
         "count": 1,
@@ -165,7 +165,7 @@ def test_morph_targets() -> None:
     assert primitive.normal_targets.tolist() == [[[1, 0, 0]] * 3, [[0, 0, 0]] * 3]
 
 
-def test_names_of_morph_targets_elsewhere() -> None:
+def test_names_of_morph_targets_may_be_in_several_places() -> None:
     file = File()
     file.mesh()
     targets(file)
@@ -177,7 +177,7 @@ def test_names_of_morph_targets_elsewhere() -> None:
     assert read(file).meshes[0].target_names == ("", "aside")
 
 
-def test_wrong_number_of_morph_weights_is_warned_of() -> None:
+def test_wrong_number_of_morph_weights_is_a_warning() -> None:
     file = File()
     file.mesh()
     targets(file, weights=[1])
@@ -199,7 +199,7 @@ def test_primitives_must_have_the_same_morph_targets() -> None:
     assert refused(file) == ("F002.gltf-targets", "/meshes/0/primitives/1/targets")
 
 
-def test_numbers_that_are_not_finite() -> None:
+def test_non_finite_numbers_are_refused_or_replaced() -> None:
     file = File()
     file.mesh([*TRIANGLE[:2], [0, np.nan, 0]])
     assert refused(file)[0] == "F003.gltf-positions"
@@ -227,7 +227,7 @@ def test_numbers_that_are_not_finite() -> None:
         ({"targets": 1}, "F002.gltf-type", "/targets"),
     ],
 )
-def test_invalid_primitives(members: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_primitives_are_refused(members: dict[str, object], key: str, pointer: str) -> None:
     file = File()
     file.mesh()
     file.accessor([0, 1, 3, 0], "B")

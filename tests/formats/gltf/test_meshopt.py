@@ -1,4 +1,4 @@
-"""Compressed buffer views: streams written by meshoptimizer 1.0, and a group by hand."""
+"""Compressed buffer views: streams written by meshoptimizer 1.0, and a hand-made group."""
 
 import json
 from typing import Any
@@ -49,12 +49,12 @@ def stream(text: str) -> np.ndarray:
     [(VERSION_0, SHORTS), (VERSION_1, SHORTS), (WITH_XOR, FLOATS)],
     ids=["version 0", "version 1", "version 1 with XOR"],
 )
-def test_attributes(text: str, expected: np.ndarray) -> None:
+def test_attributes_are_decoded(text: str, expected: np.ndarray) -> None:
     found = decoded_attributes(stream(text), 20, 8)
     assert found is not None and found.tobytes() == expected.tobytes()
 
 
-def test_deltas_of_the_example_in_the_specification() -> None:
+def test_deltas_agree_with_the_example_in_the_specification() -> None:
     group = "175ff0bc77a9210034b5"
     # One group of 4 bits, three of zeros, and an element of zeros at the end.
     data = stream("a0" + "02" + group + "000000" + "00" * 32)
@@ -66,7 +66,7 @@ def test_deltas_of_the_example_in_the_specification() -> None:
 
 
 @pytest.mark.parametrize("stride", [2, 4])
-def test_triangles_and_indices(stride: int) -> None:
+def test_triangles_and_indices_are_decoded(stride: int) -> None:
     found = decoded_indices(stream(INDEX_STREAM), 18, stride)
     assert found is not None and found.view(f"<u{stride}").tolist() == TRIANGLES
     found = decoded_triangles(stream(TRIANGLE_STREAM), 18, stride)
@@ -122,19 +122,19 @@ def test_triangles_and_indices(stride: int) -> None:
     ],
     ids=["octahedral", "octahedral 16", "quaternion", "exponential", "color"],
 )
-def test_filters(
+def test_filters_agree_with_the_encoder(
     text: str, count: int, stride: int, name: str, dtype: str, expected: Any, step: int
 ) -> None:
     decoded = decoded_attributes(stream(text), count, stride)
     assert decoded is not None
     found = filtered(decoded, name, stride).view(dtype).reshape(count, -1).astype(np.float64)
-    if name == "QUATERNION":  # either sign is the same rotation
+    if name == "QUATERNION":  # both signs are the same rotation
         found *= np.sign(np.einsum("nc,nc->n", found, expected))[:, None]
     assert np.abs(found - expected).max() <= step
 
 
 @pytest.mark.parametrize("text", [VERSION_0, VERSION_1, WITH_XOR, TRIANGLE_STREAM, INDEX_STREAM])
-def test_damaged_streams_are_found(text: str) -> None:
+def test_damaged_streams_are_detected(text: str) -> None:
     whole = stream(text)
     size = {"a": (20, 8), "e": (18, 4), "d": (18, 4)}[text[0]]
     decoders = {"a": decoded_attributes, "e": decoded_triangles, "d": decoded_indices}
@@ -150,7 +150,7 @@ def test_damaged_streams_are_found(text: str) -> None:
 
 
 def compressed(extension: str = "EXT_meshopt_compression") -> File:
-    """Return a mesh of compressed positions and indices without uncompressed ones."""
+    """Return a mesh whose positions and indices exist only in compressed form."""
     file = File(extensionsUsed=[extension], extensionsRequired=[extension])
     positions = bytes.fromhex(VERSION_0)
     for data, mode, count, stride in (
@@ -179,7 +179,7 @@ def text_of(file: File) -> bytes:
 
 
 @pytest.mark.parametrize("extension", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
-def test_file_without_uncompressed_data(extension: str) -> None:
+def test_file_without_uncompressed_data_is_read(extension: str) -> None:
     [primitive] = read(text_of(compressed(extension))).meshes[0].primitives
     assert primitive.positions.tolist() == SHORTS[:, :3].tolist()
     assert rotated(primitive.triangles) == rotated(np.array(TRIANGLES))
@@ -200,7 +200,7 @@ def test_file_without_uncompressed_data(extension: str) -> None:
         ({"buffer": 7}, "F002.gltf-index", "/buffer"),
     ],
 )
-def test_invalid_compression(members: dict[str, object], key: str, member: str) -> None:
+def test_invalid_compression_is_refused(members: dict[str, object], key: str, member: str) -> None:
     file = compressed()
     file.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"].update(members)
     pointer = f"/bufferViews/0/extensions/EXT_meshopt_compression{member}"

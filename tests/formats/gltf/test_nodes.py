@@ -42,11 +42,11 @@ def test_tree_names_and_extras() -> None:
     assert tree.extras == {1: {"kind": 1}} and tree.extensions == {2: {"ODD": {"x": 2}}}
 
 
-def test_transforms() -> None:
+def test_transforms_are_read() -> None:
     nodes = [{}, {"translation": [1, 2, 3], "rotation": [0, 0, HALF, HALF], "scale": [2, 1, 1]}]
     tree = read(File(nodes=nodes)).tree
     assert local(tree, 0).tolist() == np.eye(4).tolist()
-    # The x axis points along y, twice as long.
+    # The x axis points along y and has length 2.
     expected = [[0, -1, 0, 1], [2, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
     assert np.abs(local(tree, 1) - expected).max() < 1e-15
 
@@ -87,7 +87,7 @@ def test_sheared_matrices_are_kept_exactly() -> None:
 
 
 def test_rounding_is_not_shear() -> None:
-    # A rotation by 30 degrees, rounded to six digits as exporters of text do.
+    # A rotation by 30 degrees, rounded to six digits as text exporters do.
     matrix = np.eye(4)
     matrix[:2, :2] = [[0.866025, -0.5], [0.5, 0.866025]]
     assert not with_matrix(matrix).matrices
@@ -114,11 +114,11 @@ def test_rounding_is_not_shear() -> None:
         ([{"matrix": [1] * 16}], "F002.gltf-affine", "/nodes/0/matrix"),
     ],
 )
-def test_invalid_nodes(nodes: list[object], key: str, pointer: str) -> None:
+def test_invalid_nodes_are_refused(nodes: list[object], key: str, pointer: str) -> None:
     assert refused(File(nodes=nodes)) == (key, pointer)
 
 
-def test_all_errors_are_found_when_they_are_kept() -> None:
+def test_all_errors_are_reported_if_errors_are_kept() -> None:
     nodes = [{"children": [1, 1]}, {"children": [0]}, {"children": [1]}]
     source = Source("a.gltf", File(nodes=nodes).json(), diagnostics=Collector(keeps_errors=True))
     tree = read_nodes(source).tree
@@ -136,14 +136,14 @@ def test_deep_trees_need_no_recursion() -> None:
     assert tree.parents.tolist() == list(range(-1, count - 1))
 
 
-def test_matrix_beside_other_transforms_counts() -> None:
+def test_matrix_overrides_other_transforms() -> None:
     columns = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]
     file = File(nodes=[{"matrix": columns, "translation": [1, 1, 1]}])
     assert read(file).tree.translations.tolist() == [[5, 0, 0]]
     assert warned(file) == [("G003.matrix-and", "/nodes/0/matrix")]
 
 
-def test_scenes() -> None:
+def test_shown_roots_are_those_of_the_default_or_first_scene() -> None:
     nodes = [{"children": [1]}, {}, {}, {}]
     scenes = [{"nodes": [2]}, {"name": "main", "nodes": [3, 0]}]
     assert read(File(nodes=nodes)).roots == (0, 2, 3)
@@ -158,7 +158,7 @@ def test_scenes() -> None:
     assert refused(File(nodes=nodes, scene=0)) == ("F002.gltf-index", "/scene")
 
 
-def test_cameras() -> None:
+def test_cameras_are_read() -> None:
     file = File(
         nodes=[{"camera": 1}],
         cameras=[
@@ -175,7 +175,7 @@ def test_cameras() -> None:
     assert warned(file) == [("G003.camera", "/cameras/2/perspective/yfov")]
 
 
-def test_document_data_are_kept() -> None:
+def test_application_data_are_kept() -> None:
     file = File(nodes=[{}], extras=[1], extensions={"VRMC_vrm": {"specVersion": "1.0"}})
     file.root["asset"]["generator"] = "by hand"
     content = read_nodes(source_of(file, "folder/hero.gltf"))

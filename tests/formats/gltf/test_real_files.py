@@ -1,4 +1,4 @@
-"""Real files, if they are next to the checkout; the numbers are those of their descriptions."""
+"""Real files, if present next to the checkout, compared with numbers from their descriptions."""
 
 from pathlib import Path
 

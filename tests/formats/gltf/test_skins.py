@@ -24,7 +24,7 @@ def test_missing_matrices_are_identities() -> None:
     assert skin.inverse_bind.tolist() == [np.eye(4).tolist()] * 2
 
 
-def test_more_matrices_than_joints_are_ignored_with_a_warning() -> None:
+def test_surplus_matrices_are_ignored_with_a_warning() -> None:
     file = bound([MOVED] * 3)
     assert read(file).skins[0].inverse_bind.shape == (2, 4, 4)
     assert warned(file) == [("G004.bind-count", "/skins/0/inverseBindMatrices")]
@@ -39,7 +39,7 @@ def test_more_matrices_than_joints_are_ignored_with_a_warning() -> None:
         ([[np.nan, *MOVED[1:]], MOVED], "F003.gltf-bind"),
     ],
 )
-def test_invalid_matrices(matrices: list[list[float]], key: str) -> None:
+def test_invalid_matrices_are_refused(matrices: list[list[float]], key: str) -> None:
     assert refused(bound(matrices)) == (key, "/skins/0/inverseBindMatrices")
 
 
@@ -53,7 +53,7 @@ def test_invalid_matrices(matrices: list[list[float]], key: str) -> None:
         ({"joints": [1, 2], "inverseBindMatrices": 0}, "F002.gltf-kind", "/inverseBindMatrices"),
     ],
 )
-def test_invalid_skins(skin: dict[str, object], key: str, pointer: str) -> None:
+def test_invalid_skins_are_refused(skin: dict[str, object], key: str, pointer: str) -> None:
     file = skinned()
     file.root["skins"] = [skin]
     assert refused(file) == (key, f"/skins/0{pointer}")
@@ -70,7 +70,7 @@ def test_skin_without_joints_is_not_used() -> None:
     assert warned(file) == [("G004.no-joints", "/skins/0/joints")]
 
 
-def test_skeleton_that_is_no_node_is_ignored() -> None:
+def test_skeleton_that_is_not_a_node_is_ignored() -> None:
     file = skinned()
     file.root["skins"][0]["skeleton"] = 3
     assert warned(file) == [("G004.skeleton", "/skins/0/skeleton")]

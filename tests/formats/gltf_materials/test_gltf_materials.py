@@ -33,7 +33,7 @@ def data_uri(data: bytes, kind: str = "image/png") -> str:
 
 
 def read(folder, **root):
-    """Return the materials of a document with these members, and its source."""
+    """Return the materials of a document with these members, and the document's source."""
     path = folder / "hero.gltf"
     path.write_text(json.dumps({"asset": {"version": "2.0"}, **root}))
     source = Source.open(path)
@@ -41,7 +41,7 @@ def read(folder, **root):
 
 
 def read_one(folder, material, **root):
-    """Return the only material of a document with one image, and its source."""
+    """Return the only material of a document with one image, and the document's source."""
     root = {"textures": [{"source": 0}], "images": [{"uri": data_uri(file_of("PNG"))}], **root}
     (found,), source = read(folder, materials=[material], **root)
     return found, source
@@ -51,7 +51,7 @@ def places(source) -> list[tuple[str, str]]:
     return [(one.key, one.pointer) for one in source.diagnostics.warnings]
 
 
-def test_members_that_are_missing_have_the_defaults_of_the_specification(tmp_path):
+def test_missing_members_have_the_defaults_of_the_specification(tmp_path):
     found, source = read_one(tmp_path, {})
     assert (found.base_color, found.metallic, found.roughness) == ((1.0, 1.0, 1.0, 1.0), 1.0, 1.0)
     assert (found.alpha_mode, found.alpha_cutoff, found.double_sided) == ("opaque", 0.5, False)
@@ -113,7 +113,7 @@ def test_every_member_is_read(tmp_path):
 # Images
 
 
-def test_images_of_all_places_and_formats_are_read(tmp_path):
+def test_images_of_all_sources_and_formats_are_read(tmp_path):
     (tmp_path / "a b.png").write_bytes(file_of("PNG"))
     grey = Image.fromarray(np.array([[0, 32768, 65535]], np.uint16))
     deep = io.BytesIO()
@@ -169,14 +169,14 @@ def test_images_of_all_places_and_formats_are_read(tmp_path):
         ({"uri": data_uri(b"\xabKTX 20\xbb\r\n\x1a\n")}, "F005.gltf-format"),
     ],
 )
-def test_images_that_cannot_be_read_leave_the_material(tmp_path, image, key):
+def test_unreadable_images_do_not_invalidate_the_material(tmp_path, image, key):
     material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.5}}
     found, source = read_one(tmp_path, material, images=[image])
     assert found.metallic == 0.5 and found.base_texture.image is None
     assert places(source) == [(key, "/images/0")]
 
 
-def test_images_are_decoded_up_to_a_limit_of_all_together(tmp_path, monkeypatch):
+def test_images_are_decoded_up_to_a_common_limit(tmp_path, monkeypatch):
     monkeypatch.setattr("viewer.media.image._MAX_PIXELS", 10)
     images = [{"uri": data_uri(file_of("PNG"))} for _ in range(3)]
     materials, source = read(
@@ -194,7 +194,7 @@ def test_images_that_no_texture_uses_are_not_read(tmp_path):
     assert read_one(tmp_path, {}, images=[{"uri": "none.png"}])[1].warnings == []
 
 
-def test_webp_replaces_its_substitute_and_basis_does_not(tmp_path):
+def test_webp_is_preferred_to_its_fallback_and_basis_is_not(tmp_path):
     images = [
         {"uri": data_uri(file_of("PNG"))},
         {"uri": data_uri(file_of("WEBP", PIXELS[::-1], lossless=True))},
@@ -264,7 +264,7 @@ def test_a_transform_without_members_changes_nothing():
 # Extensions that are not drawn, and invalid members
 
 
-def test_extensions_without_effect_are_not_named(tmp_path):
+def test_extensions_without_effect_are_not_reported(tmp_path):
     extensions = {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}, "KHR_materials_ior": {}}
     materials, source = read(
         tmp_path, materials=[{"extensions": extensions}, {"extensions": extensions}]
@@ -297,14 +297,14 @@ def test_extensions_without_effect_are_not_named(tmp_path):
         ),
     ],
 )
-def test_invalid_members_are_ignored_with_their_pointer(tmp_path, material, key, pointer):
+def test_invalid_members_are_ignored_and_reported_by_pointer(tmp_path, material, key, pointer):
     found, source = read_one(tmp_path, material)
     assert places(source) == [(key, f"/materials/0{pointer}")]
     assert (found.base_color, found.metallic) == ((1.0, 1.0, 1.0, 1.0), 1.0)
     assert (found.alpha_mode, found.textures) == ("opaque", {})
 
 
-def test_materials_that_are_no_objects_keep_their_place(tmp_path):
+def test_materials_that_are_not_objects_keep_their_index(tmp_path):
     materials, source = read(tmp_path, materials=[7, {"name": "second"}])
     assert [material.name for material in materials] == ["", "second"]
     assert places(source) == [("F006.gltf-material", "/materials/0")]
@@ -318,8 +318,8 @@ def glossy(diffuse, specular, glossiness=0.75, **slots):
     return Glossiness((*diffuse, 1.0), specular, glossiness, **slots)
 
 
-def test_dielectrics_and_metals_of_the_other_model_keep_their_colours():
-    """At the limits the equation has simple roots: m = 0 for specular 0.04, 1 for no diffuse."""
+def test_specular_glossiness_dielectrics_and_metals_keep_their_colours():
+    """In the limits, the roots are simple: m = 0 for specular 0.04, m = 1 for no diffuse."""
     plastic = from_glossiness(glossy((0.5, 0.25, 0.125), (0.04, 0.04, 0.04)), {})
     assert_allclose(plastic["base_color"], (0.5, 0.25, 0.125, 1.0), atol=1e-6)
     assert (plastic["metallic"], plastic["roughness"]) == (0.0, 0.25)

@@ -12,7 +12,7 @@ Local = Mapping[int, np.ndarray]
 
 
 def tree_of(*nodes: dict[str, Any]) -> NodeTree:
-    """Return a tree of nodes with the keys of glTF, and ``parent``."""
+    """Return a tree of nodes described with the keys of glTF, and ``parent``."""
 
     def column(key: str, default: object) -> np.ndarray:
         return np.array([node.get(key, default) for node in nodes])
@@ -36,7 +36,7 @@ def tree_of(*nodes: dict[str, Any]) -> NodeTree:
 
 
 def triangle(seed: int, n_joints: int = 0, n_influences: int = 3, **more: Any) -> Primitive:
-    """Return a triangle with random vertices, and influences of a skin's joints if it has any."""
+    """Return a triangle with random vertices, and random influences if there are joints."""
     random = np.random.default_rng(seed)
     skinned: dict[str, Any] = {}
     if n_joints:
@@ -71,13 +71,13 @@ def skin(joints: list[int], seed: int) -> NodeSkin:
 
 
 def file_of(tree: NodeTree, **more: Any) -> NodeFile:
-    """Return a file whose scene has all roots."""
+    """Return a file whose scene contains all root nodes."""
     roots = tuple(np.flatnonzero(tree.parents < 0).tolist())
     return NodeFile("hero", tree, roots, **more)
 
 
 def source() -> Source:
-    """Return the source that notes are recorded in."""
+    """Return a source, which records notes."""
     return Source("hero.glb", data=b"")
 
 
@@ -119,7 +119,8 @@ def _below(tree: NodeTree, node: int) -> list[int]:
 def vertices(file: NodeFile, moved: Local | None = None, morphs: Local | None = None) -> np.ndarray:
     """Return all vertices of the scene, mesh by mesh in tree order (glTF 2.0, 3.7).
 
-    Skinned: sum_w w world(joint) IBM (p + morphs), without the mesh node; others: world(node) p.
+    Skinned: sum_w w world(joint) IBM (p + morphs), without the mesh node's transform; others:
+    world(node) p.
     """
     tree, moved, found = file.tree, moved or {}, []
     for node in (n for root in file.roots for n in _below(tree, root)):

@@ -1,4 +1,4 @@
-"""Figures of files of nodes pose as the glTF definition says."""
+"""Figures of files of nodes, posed as glTF defines."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def figures_of(file: NodeFile) -> tuple[Figure, ...]:
 
 
 def posed(file: NodeFile, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices of a figure and of the definition, every joint rotated at random."""
+    """Return the vertices of a figure and by the definition, with all joints rotated at random."""
     pose = figure_pose(figure)
     pose.dofs[:] = np.random.default_rng(5).uniform(-2.0, 2.0, len(pose.dofs))
     moved = {}
@@ -46,7 +46,7 @@ def posed(file: NodeFile, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check(file: NodeFile) -> Figure:
-    """Hold the only figure of a file to the definition, at rest and posed; return it."""
+    """Compare the only figure of a file with the definition, at rest and posed; return it."""
     (figure,) = figures_of(file)
     for found, wanted in ((deform(figure)[0], vertices(file)), posed(file, figure)):
         assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())
@@ -64,7 +64,7 @@ def arm(**more):
     )
 
 
-def test_skin_ignores_its_node_and_follows_parents_that_are_no_joints():
+def test_skin_ignores_its_node_and_follows_parents_that_are_not_joints():
     file = file_of(arm(), meshes=(mesh(triangle(1, 2)),), skins=(skin([1, 2], 3),))
     figure = check(file)
     assert figure.skeleton.names == ("root", "hip", "knee")
@@ -73,7 +73,7 @@ def test_skin_ignores_its_node_and_follows_parents_that_are_no_joints():
     assert figure.unit == "m"
 
 
-def test_rigid_mesh_on_a_joint_needs_no_further_joint():
+def test_rigid_mesh_on_a_joint_needs_no_auxiliary_joint():
     helmet = {
         "name": "helmet",
         "parent": 2,
@@ -111,7 +111,7 @@ def test_sheared_matrix_becomes_two_joints():
 
 @pytest.mark.parametrize("agrees", [True, False])
 def test_two_skins_share_joints(agrees):
-    # Of two joints that disagree, one determines how the vertices are transformed.
+    # If two joints disagree, one of them determines the vertices' transform.
     first = skin([1, 2], 3)
     other = first.inverse_bind @ affine(9) if agrees else skin([1, 2], 7).inverse_bind
     second = NodeSkin("second", np.array([2, 1], dtype=np.int32), other[::-1])
@@ -133,14 +133,14 @@ def test_skin_that_disagrees_in_one_joint_gets_one_auxiliary_joint():
     assert figure.skeleton.n_joints == 4
 
 
-def test_mesh_on_several_nodes_and_singular_matrices():
+def test_mesh_on_several_nodes_and_singular_matrices_is_posed():
     flat = {"name": "flat", "mesh": 0, "scale": [1, 0, 1], "rotation": TURNED}
     below = {"name": "below", "parent": 0, "mesh": 0, "translation": [0, 1, 2]}
     tree = tree_of(flat, below, {"name": "free", "mesh": 0, "scale": [1, -1, 1]})
     figure = check(file_of(tree, meshes=(mesh(triangle(1)),)))
     assert figure.mesh.n_vertices == 9
     assert figure.mesh.parts == ("flat", "below", "free")
-    # A reflection turns the triangle over, so that it stays counter-clockwise from outside.
+    # Under the reflection, the triangle is flipped to stay counter-clockwise from outside.
     assert_array_equal(figure.mesh.triangles[2], [8, 7, 6])
 
 
@@ -153,7 +153,7 @@ def test_singular_inverse_bind_matrix_is_applied():
     check(file_of(tree, meshes=meshes, skins=(NodeSkin("", bound.joints, matrices),)))
 
 
-def test_skinned_mesh_is_also_used_without_its_skin():
+def test_a_mesh_can_be_used_with_and_without_a_skin():
     tree = arm(nodes=({"name": "statue", "parent": 2, "mesh": 0, "translation": [5, 0, 0]},))
     check(file_of(tree, meshes=(mesh(triangle(1, 2)),), skins=(skin([1, 2], 3),)))
 

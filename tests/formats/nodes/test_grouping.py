@@ -42,7 +42,7 @@ def two_characters(cameras=EYE, **more) -> NodeFile:
     return file_of(tree, meshes=meshes, skins=(skin([2], 3), skin([5], 4)), cameras=cameras, **more)
 
 
-def test_independent_characters_are_figures_and_the_rest_is_another():
+def test_independent_characters_and_the_rest_are_separate_figures():
     hero, villain, rest = group_of(two_characters()).figures
     assert [figure.name for figure in (hero, villain, rest)] == ["hero", "villain", "chair"]
     assert hero.skeleton.names == ("hip",)
@@ -51,7 +51,7 @@ def test_independent_characters_are_figures_and_the_rest_is_another():
     assert rest.mesh.parts == ("chair",)
 
 
-def test_skins_below_each_other_are_one_figure_named_after_the_file():
+def test_nested_skins_are_one_figure_named_after_the_file():
     tree = tree_of(
         {"name": "hip"},
         {"name": "spine", "parent": 0},
@@ -66,7 +66,7 @@ def test_skins_below_each_other_are_one_figure_named_after_the_file():
     assert figure.mesh.parts == ("body", "head")
 
 
-def test_ancestors_that_change_nothing_are_dropped_unless_they_move():
+def test_identity_ancestors_are_dropped_unless_animated():
     def names(*animations: NodeAnimation) -> tuple[str, ...]:
         tree = tree_of(
             {"name": "scene"},
@@ -98,7 +98,7 @@ def test_animations_belong_to_the_figures_that_they_move():
     assert len(rest.animations) == 1
 
 
-def test_actors_of_a_file_keep_their_places_beside_others_and_cameras_follow():
+def test_actors_of_a_file_keep_their_relative_positions_and_cameras_follow():
     first, second = (group_of(two_characters()) for _ in range(2))
     assert first.views[0].name == "eye"
     contents = Contents()
@@ -115,14 +115,14 @@ def test_actors_of_a_file_keep_their_places_beside_others_and_cameras_follow():
     assert_allclose(placements[3:], np.tile(placements[3], (3, 1, 1)))
     shift = placements[3][:3, 3]
     assert shift[0] > 0.0
-    # The camera is at (0, 0, 4) of its file and looks along -z.
+    # In its file, the camera is at (0, 0, 4) and looks along -z.
     for view, eye in zip(scene.views, ([0, 0, 4], np.add([0, 0, 4], shift)), strict=True):
         assert_allclose(-view.rotation.T @ view.translation, eye, atol=1e-12)
         assert_allclose(view.rotation.T @ [0, 0, 1], [0, 0, -1], atol=1e-12)
         assert view.size == (1620, 1080)
 
 
-def test_orthographic_cameras_are_named_as_left_out():
+def test_omitted_orthographic_cameras_are_reported():
     notes = source()
     group = figure_group(two_characters(cameras=(NodeCamera("plan", None, None, 2.0),)), notes)
     assert group.views == ()

@@ -1,4 +1,4 @@
-"""Normals, colours, materials, blend shapes and animations of figures of files of nodes."""
+"""Normals, colours, materials, blend shapes and animations of figures made from nodes."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_normals_stay_perpendicular_under_a_second_skin_that_shears():
         assert_allclose(normals[rows] @ np.stack([b - a, c - a]).T, 0.0, atol=1e-12)
 
 
-def test_vertex_colours_and_materials_of_some_primitives_only():
+def test_colours_and_materials_of_only_some_primitives_are_completed():
     colors = np.full((3, 4), 0.5)
     primitives = triangle(1, colors=colors, material=2), triangle(2), triangle(3, material=0)
     materials = tuple(Material(name) for name in "abc")
@@ -72,7 +72,7 @@ def test_vertex_colours_and_materials_of_some_primitives_only():
 
 
 def faces_with_targets():
-    """Return a file whose two meshes have the targets smile and blink, and one of its own."""
+    """Return nodes, meshes and skins of a face and its teeth, both with targets smile and blink."""
     random = np.random.default_rng(4)
     face = triangle(1, 1, targets=random.normal(size=(2, 3, 3)))
     teeth = triangle(2, 1, targets=random.normal(size=(2, 3, 3)))
@@ -85,7 +85,7 @@ def faces_with_targets():
     return tree, (mesh(face, **names), mesh(teeth, **names)), (skin([0], 3),)
 
 
-def test_targets_of_one_face_share_sliders_and_default_weights_are_the_rest_pose():
+def test_targets_of_one_face_share_sliders_and_start_at_their_default_weights():
     tree, meshes, skins = faces_with_targets()
     file = file_of(tree, meshes=meshes, skins=skins)
     figure = figure_of(file)
@@ -99,7 +99,7 @@ def test_targets_of_one_face_share_sliders_and_default_weights_are_the_rest_pose
     assert_allclose(deform(figure, pose)[0], wanted, atol=1e-12)
 
 
-def test_animated_targets_have_sliders_of_their_own():
+def test_differently_animated_targets_have_separate_sliders():
     tree, meshes, skins = faces_with_targets()
     reads = []
 
@@ -141,7 +141,7 @@ def test_equally_animated_targets_share_sliders():
 
 
 @pytest.mark.parametrize("key", ["generator", "copyright"])
-def test_asset_is_in_the_facts(key):
+def test_facts_contain_the_asset(key):
     file = file_of(tree_of({"mesh": 0}), meshes=(mesh(triangle(1)),), asset={key: "somebody"})
     assert (key, "somebody") in figure_of(file).facts
 

@@ -19,7 +19,7 @@ from viewer.rig.skinning import joint_matrices
 
 
 def motion(**more: Any) -> File:
-    """Return a motion of one second: hips and left arm rotate by 90 degrees, and the face moves."""
+    """Return a motion of one second: hips and left arm rotate by 90 degrees; the face moves."""
     expressions = {"preset": {"happy": {"node": 6}}}
     file = humanoid("VRMC_vrm_animation", "m", expressions=expressions, **more)
     file.add("nodes", {"name": "happy"})
@@ -45,7 +45,7 @@ def written(folder: Path, name: str, file: File) -> Path:
     return path
 
 
-def test_a_motion_alone_is_a_skeleton(tmp_path: Path) -> None:
+def test_a_motion_opened_alone_is_a_skeleton(tmp_path: Path) -> None:
     scene = viewer.load(written(tmp_path, "wave.vrma", motion()))
     (actor,) = scene.actors
     skeleton = actor.figure.require_skeleton()
@@ -57,7 +57,7 @@ def test_a_motion_alone_is_a_skeleton(tmp_path: Path) -> None:
     assert_allclose(arm, [0.4, 1.5 + 0.3, -0.2], atol=1e-6)
 
 
-def test_a_character_plays_a_motion_with_its_face(tmp_path: Path) -> None:
+def test_a_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> None:
     paths = (written(tmp_path, "a.vrm", character()), written(tmp_path, "wave.vrma", motion()))
     scene = viewer.load(*paths)
     (actor,) = scene.actors

@@ -23,7 +23,7 @@ AT = f"/extensions/{NAME}"
 
 
 def file_of(*constraints: dict[str, Any] | None) -> File:
-    """Return a file of a chain of nodes, a constraint or none for each."""
+    """Return a file with a chain of nodes, each with a constraint or none."""
     file = File(extensionsUsed=[NAME])
     for node, constraint in enumerate(constraints):
         item: dict[str, Any] = {"name": f"n{node}"}
@@ -48,7 +48,7 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
     assert skeleton.constraints == (
         Constraint(2, 0, "roll", (0.0, 1.0, 0.0)),
         Constraint(1, 2, "rotation", weight=0.25),
-        # It depends on its ancestors.
+        # Its position depends on its ancestors.
         Constraint(3, 0, "aim", (-1.0, 0.0, 0.0)),
     )
     assert not source.diagnostics
@@ -60,7 +60,7 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
     "constraints",
     [
         (None, {"rotation": {"source": 2}}, {"rotation": {"source": 1}}),
-        # The source's place depends on the joint that aims at it.
+        # The source's position depends on the joint that aims at it.
         (None, {"aim": {"source": 2, "aimAxis": "PositiveX"}}, None),
     ],
 )

@@ -22,7 +22,7 @@ PARENTS = {1: 0, 2: 1, 3: 2, 4: 2, 5: 2}
 
 
 def _file(**extensions: Any) -> File:
-    """Return a character of six joints without telling names, and a mesh with two targets."""
+    """Return a character of six joints with meaningless names, and a mesh with two targets."""
     # The left arm is at -x, as in a figure that faces -z.
     places = [[0, 1, 0], [0, 0.2, 0], [0, 0.2, 0], [0, 0.3, 0], [-0.3, 0, 0], [0.3, 0, 0]]
     file = File(extensionsUsed=[*extensions], extensions=extensions)
@@ -52,7 +52,7 @@ def _modern(expressions: dict[str, Any]) -> dict[str, Any]:
     return {**told, "meta": meta, "expressions": {"preset": expressions}}
 
 
-def test_bones_give_joints_their_meaning_whatever_they_are_called(tmp_path: Path) -> None:
+def test_joints_are_identified_by_bones_whatever_their_names(tmp_path: Path) -> None:
     scene, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     skeleton = figure.require_skeleton()
     meanings = dict(zip(skeleton.names, joint_meanings(skeleton), strict=True))
@@ -61,7 +61,7 @@ def test_bones_give_joints_their_meaning_whatever_they_are_called(tmp_path: Path
     assert guess_front(scene) == "-z"
 
 
-def test_bones_of_version_0_are_a_list_with_other_thumbs(tmp_path: Path) -> None:
+def test_bones_of_version_0_are_a_list_with_other_thumb_names(tmp_path: Path) -> None:
     bones = [{"bone": bone, "node": node} for bone, node in BONES.items()]
     bones += [{"bone": "leftThumbProximal", "node": 6}]
     _, figure = _loaded(_file(VRM={"humanoid": {"humanBones": bones}}), tmp_path)
@@ -92,7 +92,7 @@ def test_expressions_are_sums_of_morph_targets(tmp_path: Path) -> None:
     assert_allclose(moved(0, 0, 0.5, 1.0), np.tile([0.25, 1.0, 0.0], (3, 1)))
 
 
-def test_expressions_of_version_0_are_percentages_of_meshes(tmp_path: Path) -> None:
+def test_expressions_of_version_0_bind_meshes_in_percent(tmp_path: Path) -> None:
     group = {"name": "Joy", "binds": [{"mesh": 0, "index": 1, "weight": 50}], "isBinary": True}
     told = {"blendShapeMaster": {"blendShapeGroups": [group]}}
     _, figure = _loaded(_file(VRM=told), tmp_path)
@@ -104,7 +104,7 @@ def test_expressions_of_version_0_are_percentages_of_meshes(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_parts_for_the_first_person_start_hidden(tmp_path: Path, version: int) -> None:
+def test_first_person_parts_start_hidden(tmp_path: Path, version: int) -> None:
     told = {} if version == 0 else _modern({})
     note = {"mesh": 0, "firstPersonFlag": "FirstPersonOnly"}
     if version == 1:
@@ -134,14 +134,14 @@ def test_spring_chains_are_counted(tmp_path: Path, extension: dict[str, Any]) ->
     ]
 
 
-def test_permissions_are_facts(tmp_path: Path) -> None:
+def test_permissions_are_listed_in_the_facts(tmp_path: Path) -> None:
     _, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     facts = dict(figure.facts)
     assert facts["VRM"] == "1.0" and facts["title"] == "Ada" and facts["authors"] == "A, B"
     assert facts["redistribution"] == "not allowed"
 
 
-def test_faulty_bones_and_binds_are_ignored_and_named(tmp_path: Path) -> None:
+def test_invalid_bones_and_binds_are_ignored_and_reported(tmp_path: Path) -> None:
     told = _modern({"happy": {"morphTargetBinds": [{"node": 6, "index": 9, "weight": 1.0}]}})
     told["humanoid"]["humanBones"] |= {"head": {"node": 99}, "tail": {"node": 1}}
     scene, figure = _loaded(_file(VRMC_vrm=told), tmp_path)
@@ -152,7 +152,7 @@ def test_faulty_bones_and_binds_are_ignored_and_named(tmp_path: Path) -> None:
     assert humanoid is not None and set(humanoid.joints) == set(BONES) - {"head"}
 
 
-def test_a_character_file_of_another_program_opens(shared_data: Path) -> None:
+def test_a_character_of_another_program_opens(shared_data: Path) -> None:
     scene = viewer.load(shared_data / "gltf" / "vrm0_sphere.vrm")
     skeleton = scene.actors[0].figure.require_skeleton()
     assert skeleton.humanoid is not None and len(skeleton.humanoid.joints) == 22

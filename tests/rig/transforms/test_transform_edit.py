@@ -1,4 +1,4 @@
-"""Edits of keyed transforms: curves by their closed forms before and after."""
+"""Edits of keyed transforms: curves compared with closed forms before and after."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_curves_are_the_keyed_components_and_all_rotations():
     assert_allclose(row_values(wave(), SKELETON, chosen, times), wanted, atol=EXACT)
 
 
-def test_moved_keys_stop_before_their_neighbours_and_take_all_components():
+def test_moved_keys_stop_before_their_neighbours_with_all_components():
     clip, row = wave(), row_of(wave(), "translation", 0, 1)
     moved = move_transform_keys(clip, SKELETON, [(row, 1)], 0.25, 0.5, GAP)
     assert_array_equal(moved.channels[0].times, [0.5, 1.25, 2.0])
@@ -63,7 +63,7 @@ def test_moved_keys_stop_before_their_neighbours_and_take_all_components():
     )
 
 
-def test_angles_of_a_rotation_key_are_set_about_rest():
+def test_angles_of_a_rotation_key_are_relative_to_rest():
     clip, row = wave(), row_of(wave(), "rotation", 1, 1)
     found = (
         set_transform_key(clip, SKELETON, (row, 0), value=np.radians(20.0)).channels[2].values[0]
@@ -72,7 +72,7 @@ def test_angles_of_a_rotation_key_are_set_about_rest():
         np.array(about(1, 20.0))
     )
     assert_allclose(quaternion_to_matrix(found), wanted, atol=EXACT)
-    # Beyond 90 degrees the same rotation has other angles, so the middle one stops there.
+    # Beyond 90 degrees, the rotation has other angles, so the middle angle stops there.
     steep = set_transform_key(clip, SKELETON, (row, 0), value=2.0)
     assert row_values(steep, SKELETON, [row], np.array([0.5]))[0, 0] == pytest.approx(np.pi / 2)
 
@@ -85,7 +85,7 @@ def cubic_turn():
 
 
 @pytest.mark.parametrize("clip", [wave(), cubic_turn(), bow()])
-def test_an_added_key_keeps_the_course_of_every_curve(clip):
+def test_an_added_key_keeps_the_shape_of_every_curve(clip):
     times = np.linspace(0.0, 3.0, 61)
     before = sample_transforms(clip, times)
     for index, row in enumerate(rows_of(clip, SKELETON)):
@@ -100,14 +100,14 @@ def test_an_added_key_keeps_the_course_of_every_curve(clip):
     assert all(0.77 in one.times for one in clip.channels)
 
 
-def test_a_key_at_a_time_in_single_precision_is_changed_not_doubled():
+def test_a_key_at_a_time_rounded_to_single_precision_is_changed_not_duplicated():
     third = float(np.float32(1.0 / 3.0))
     one = channel(0, "scale", [0.0, third], np.ones((2, 3)))
     changed, key = added_key(one, 1.0 / 3.0, np.array([2.0, 2, 2]))
     assert key == 1 and len(changed.times) == 2 and changed.values[1, 0] == 2.0
 
 
-def test_deleted_keys_take_their_components_and_empty_channels_go():
+def test_keys_are_deleted_for_all_components_and_empty_channels_are_removed():
     clip = wave()
     row = row_of(clip, "translation", 0, 2)
     assert len(delete_transform_keys(clip, SKELETON, [(row, 0)]).channels[0].times) == 2
@@ -115,12 +115,12 @@ def test_deleted_keys_take_their_components_and_empty_channels_go():
     assert [one.path for one in gone.channels] == ["rotation", "rotation", "scale", "weights"]
 
 
-def test_interpolation_changes_between_keys_only():
+def test_interpolation_changes_only_values_between_keys():
     clip = set_clip_interpolation(wave(), [0, 1], "step")
     assert_array_equal(value_at(clip.channels[0], 0.99), [0.0, 0, 0])
     curved = with_interpolation(channel(0, "scale", [0.0, 1, 3], [[0.0] * 3, [1] * 3, [3] * 3]),
                                 "cubic")  # fmt: skip
-    # The slope at the middle key is that from its first to its last neighbour; ends are flat.
+    # The slope at the middle key is the one between its neighbours; ends are flat.
     assert_array_equal(curved.tangents[:, 0, 0], [0.0, 1.0, 0.0])
     keys = [about(2, 0.0), -np.array(about(2, 40.0)), about(2, 80.0)]
     turn = with_interpolation(channel(0, "rotation", [0.0, 1, 2], keys), "cubic")
@@ -156,7 +156,7 @@ def test_a_keyed_pose_is_reached_at_its_time(only_changed):
         assert_allclose(getattr(again.pose, name), getattr(wanted, name), atol=EXACT)
 
 
-def test_a_changed_cubic_rotation_turns_its_spline():
+def test_a_changed_cubic_rotation_rotates_its_spline():
     clip = cubic_turn()
     row = row_of(clip, "rotation", 1, 0)
     before = row_values(clip, SKELETON, [row, row + 1, row + 2], np.array([1.0]))[0]

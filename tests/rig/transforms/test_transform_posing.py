@@ -1,4 +1,4 @@
-"""Poses of keyed transforms: one at a time, many as frames, and all that is made of frames."""
+"""Poses of keyed transforms: single poses, frames, and features that use frames."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ def test_a_pose_has_the_transforms_of_the_keys(time):
         local_matrices(skeleton, actor.pose), plain_local(actor.figure, wave(), time), atol=EXACT
     )
     assert_allclose(actor.pose.shape_weights, plain_value(wave().channels[4], time), atol=EXACT)
-    # Sliders show the rotation: no joint hides it in a quaternion.
+    # Sliders show the whole rotation: none of it is in the quaternions.
     assert_array_equal(actor.pose.rotations, skeleton.rest_rotations)
 
 
@@ -73,7 +73,7 @@ def test_euler_angles_in_gimbal_lock_give_the_exact_rotation():
         assert_allclose(found, wanted, atol=EXACT)
 
 
-def test_what_no_channel_moves_keeps_the_pose():
+def test_joints_without_channels_keep_their_pose():
     actor = Actor(leg(), clip=clip_of(channel(1, "rotation", [0.0, 1.0], [about(2, 0.0)] * 2)))
     actor.pose.dofs[6:] = 0.3
     actor.pose.translations[2] = 1.0, 2.0, 3.0
@@ -109,7 +109,7 @@ def test_translation_dofs_take_the_offset_within_their_limits():
     assert_array_equal(places, [[0.0, 0, 0], [5, 7, 0], [3, 1, 0]])
 
 
-def test_frames_are_the_poses_and_keep_shared_rows_short():
+def test_frames_equal_the_poses_and_store_shared_rows_once():
     figure, clip = leg(), wave()
     frames = frames_of(figure, clip, TIMES)
     assert frames.scales.shape == (len(TIMES), 3, 3) and frames.shape_weights.shape[0] == len(TIMES)
@@ -150,7 +150,7 @@ def test_actors_of_one_clip_are_posed_together():
                 assert_allclose(getattr(actor.pose, name), getattr(other.pose, name), atol=EXACT)
 
 
-def test_frames_of_an_animation_follow_the_rate_of_its_keys():
+def test_frames_of_an_animation_have_the_rate_of_its_keys():
     figure = animated_leg()
     bow = figure.animations[1].clip()
     actor = Actor(figure, clip=bow)

@@ -56,7 +56,7 @@ def test_cubic_channels_follow_their_polynomial_and_its_slopes():
 
 
 def test_cubic_rotations_are_normalised_after_interpolation():
-    # Without tangents the middle is the mean of the keys: 45 degrees, of length cos(22.5 deg).
+    # With zero tangents, the middle is the mean of the keys: 45 degrees, of length cos(22.5 deg).
     keys = [about(2, 0.0), about(2, 90.0)]
     clip = clip_of(channel(0, "rotation", [0.0, 1.0], keys, "cubic", np.zeros((2, 2, 4))))
     assert_allclose(sample_transforms(clip, [0.5]).rotations[0, 0], about(2, 45.0), atol=EXACT)
@@ -66,7 +66,7 @@ def test_cubic_rotations_are_normalised_after_interpolation():
     assert_array_equal(sample_transforms(clip, [0.5]).rotations[0, 0], [0, 0, 0, 1])
 
 
-def test_channels_hold_their_ends_each_at_its_own_time():
+def test_each_channel_holds_its_end_values_outside_its_range():
     clip = clip_of(
         channel(0, "translation", [1.0], [[7.0, 8, 9]]),
         channel(1, "translation", [2.0, 3.0], [[0.0, 0, 0], [4, 0, 0]]),
@@ -81,7 +81,7 @@ def test_channels_hold_their_ends_each_at_its_own_time():
 
 
 def random_clip(rng, interpolation: str | None = None) -> TransformClip:
-    """Return channels of every kind; some share their times, most begin and end elsewhere."""
+    """Return channels of every kind; some share their times, most have different ranges."""
     shared, channels = np.sort(rng.uniform(0.0, 3.0, 9)), []
     for joint in range(6):
         for path, width in (("translation", 3), ("rotation", 4), ("scale", 3)):
@@ -120,18 +120,18 @@ def test_all_channels_agree_with_the_formulas_of_gltf(seed):
             assert_allclose(cosines, 1.0, atol=1e-12)
         else:
             assert_allclose(values, wanted, atol=1e-12)
-    # One time at a time gives the same numbers as all together.
+    # One time at a time gives the same numbers as all times together.
     single = sample_transforms(clip, times[7:8])
     assert_array_equal(single.rotations[0], found.rotations[7])
     assert_array_equal(single.translations[0], found.translations[7])
 
 
-def test_keys_of_a_clip_without_channels_give_nothing():
+def test_a_clip_without_channels_has_no_samples():
     found = sample_transforms(TransformClip("empty", (), 0.0, 1.0), [0.0, 1.0])
     assert found.rotations.shape == (2, 0, 4) and found.weights.shape == (2, 0)
 
 
-def test_the_zero_quaternion_is_no_rotation():
+def test_the_zero_quaternion_is_not_a_rotation():
     with pytest.raises(RigError, match="key 1"):
         channel(0, "rotation", [0.0, 1.0], [[0.0, 0, HALF, HALF], [0, 0, 0, 0]])
 
@@ -147,6 +147,6 @@ def test_the_zero_quaternion_is_no_rotation():
         ([0.0, 0.0123], 30.0),
     ],
 )
-def test_the_frame_rate_is_that_of_the_keys(times, rate):
+def test_the_frame_rate_is_estimated_from_the_keys(times, rate):
     clip = clip_of(channel(0, "translation", times, np.zeros((len(times), 3))))
     assert key_rate(clip) == rate

@@ -9,7 +9,7 @@ __all__ = ["isolate_part", "part_label", "set_part_shown", "show_all_parts"]
 
 
 def part_label(actor: Actor, part: int) -> str:
-    """Return the name of a part, or its number, and the view if it is meant for one only."""
+    """Return a part's name or number, followed by its view if it is drawn in only one."""
     mesh = actor.figure.require_mesh()
     view = mesh.part_views[part] if mesh.part_views else "both"
     note = f" ({view.replace('-', ' ')} only)" if view.endswith("person") else ""

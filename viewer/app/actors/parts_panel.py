@@ -40,7 +40,7 @@ def draw(state: AppState) -> None:
 
 
 def _draw_part(state: AppState, actor: Actor, part: int) -> None:
-    """Draw the check box of one part, with a menu at a right click."""
+    """Draw the check box of one part; a right-click opens a menu."""
     imgui.push_id(part)
     shown = part not in actor.hidden_parts
     label = printable(part_label(actor, part), _LONGEST)

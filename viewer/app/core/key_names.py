@@ -1,4 +1,4 @@
-"""Names of keys in menus, buttons and tooltips, which follow the keys that the user has chosen."""
+"""Names of keys in menus, buttons and tooltips, including keys changed by the user."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class KeyNames:
     Attributes
     ----------
     changed : dict
-        Label of a key in the table of keys to the name of the key that replaces it.
+        Maps the label of a key in the table of keys to the name of the key that replaces it.
     """
 
     changed: dict[str, str] = field(default_factory=dict)
@@ -25,20 +25,20 @@ class KeyNames:
 def key_name(state: AppState, usual: str) -> str:
     """Return the current name of a key, given its label in the table of keys.
 
-    Of several keys for one action, the first is named.
+    If an action has several keys, the first is named.
     """
     return state.of(KeyNames).changed.get(usual, usual).partition(" or ")[0]
 
 
 def with_key(state: AppState, text: str, usual: str) -> str:
-    """Return the text of a button or tooltip, followed by the name of its key.
+    """Return a text for a button or tooltip, followed by the name of its key.
 
     Parameters
     ----------
     state : AppState
-        Holds the names.
+        Provides the names.
     text : str
-        Effect of the key.
+        The text, which describes the key's effect.
     usual : str
         Its label in the table of keys.
     """

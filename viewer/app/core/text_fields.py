@@ -1,8 +1,8 @@
-"""Fields for text and typed numbers, which behave like those of other desktop software.
+"""Fields for text and typed numbers that behave as in other desktop software.
 
-ImGui provides selection, clipboard, undo within a field, and Tab between fields. This module adds
-that a field selects its content when it gets the focus, that Escape restores the old value, and
-that numbers may be calculations with a unit.
+ImGui provides selection, clipboard, undo within a field, and Tab between fields. In this module,
+fields also select their content when they get the focus, Escape restores the old value, and numbers
+may be calculations with a unit.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _FLAGS = imgui.InputTextFlags_
 
 
 def text_field(hidden: str, text: str, hint: str = "", flags: int = 0) -> tuple[bool, str]:
-    """Draw a field for text, which is selected when the field gets the focus.
+    """Draw a text field, whose text is selected when the field gets the focus.
 
     Parameters
     ----------
     hidden : str
         Hidden label, as from ``begin_field``.
     text, hint : str
-        The text, and what is shown in grey while it is empty.
+        The text, and a placeholder shown in grey while it is empty.
     flags : int
         ImGui's ``InputTextFlags_``.
 
@@ -52,12 +52,12 @@ def text_field(hidden: str, text: str, hint: str = "", flags: int = 0) -> tuple[
 
 
 def search_field(hidden: str, text: str, hint: str) -> str:
-    """Draw a search field, which Escape clears, and return its text."""
+    """Draw a search field, which is cleared by Escape, and return its text."""
     return imgui.input_text_with_hint(hidden, hint, text, _FLAGS.escape_clears_all)[1]
 
 
 def name_field(hidden: str, name: str, hint: str) -> tuple[bool, str]:
-    """Draw a field for the name of a file, of which all but the suffix is selected at first.
+    """Draw a field for a file name; all but the suffix is selected at first.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def name_field(hidden: str, name: str, hint: str) -> tuple[bool, str]:
     name = text_field(hidden, name, hint)[1]
     editing = imgui.internal.get_input_text_state(imgui.get_item_id())
     if imgui.is_item_activated() and editing is not None:
-        # The positions are those of bytes.
+        # The selection is counted in bytes.
         editing.set_selection(0, len(PurePath(name).stem.encode()))
     # The field also loses the focus when Escape is pressed or when something else is clicked.
     left = imgui.is_item_deactivated()
@@ -80,10 +80,10 @@ def name_field(hidden: str, name: str, hint: str) -> tuple[bool, str]:
 def number_field(
     state: AppState, hidden: str, value: float, text: str = "%.6g", is_whole: bool = False
 ) -> float | None:
-    """Draw a field for a number, and return the number when it is entered.
+    """Draw a field for a number, and return the number once it is entered.
 
-    Enter, Tab and a click elsewhere enter the number; Escape restores the old one. A text that is
-    not a number is marked while it is typed, and leads to a message if it is entered.
+    Enter, Tab or a click elsewhere enters the number; Escape restores the old one. A text that is
+    not a number is marked while it is typed, and causes a message if it is entered.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def number_field(
     text : str
         Format of the number, with its unit.
     is_whole : bool
-        Whether the number must be a whole one.
+        Whether the number must be a whole number.
 
     Returns
     -------
@@ -126,15 +126,15 @@ def number_field(
 
 
 def whole_field(state: AppState, hidden: str, value: int) -> int | None:
-    """Draw a field for a whole number; as ``number_field``."""
+    """Draw a field for a whole number; see ``number_field``."""
     number = number_field(state, hidden, value, "%d", is_whole=True)
     return None if number is None else round(number)
 
 
 def is_typed_in_place(hidden: str) -> bool:
-    """Return whether the number of a slider is being typed, or was until this frame.
+    """Return whether a slider's number is being typed, or was until the previous frame.
 
-    ``number_field`` with the slider's label then continues what ImGui began.
+    ``number_field`` with the slider's label then continues the input that ImGui began.
     """
     item = imgui.get_id(hidden)
     left: int = imgui.get_current_context().input_text_deactivated_state.id_

@@ -20,7 +20,7 @@ _FACTORS = {
     "cm": {"cm": 1.0, "m": 100.0, "mm": 0.1},
     "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0},
 }
-"""Units that may be typed: maps the unit shown by a field to the factors of other units."""
+"""Units that may be typed: maps a field's unit to the factors of other units."""
 
 _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -31,8 +31,8 @@ _OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 _SIGNS: dict[type[ast.unaryop], float] = {ast.UAdd: 1.0, ast.USub: -1.0}
 _FORMAT = re.compile(r"%[0-9.+-]*[defgi]")
 _UNIT = re.compile(rf"([^\W\d_]+|{_DEGREE}|%)\s*$")
-_LARGEST = 3.4e38  # of float32
-_LONGEST = 100  # characters: a longer text is not a number typed by hand
+_LARGEST = 3.4e38  # largest float32 value
+_LONGEST = 100  # maximum number of characters of a number typed by hand
 
 
 def unit_of(text: str) -> str:
@@ -46,7 +46,7 @@ def unit_of(text: str) -> str:
 
 
 def number_with_unit(text: str, value: float) -> str:
-    """Return a number in the format of a field, which may be a word for some numbers.
+    """Return a number in the format of a field, which may be a word for a special value.
 
     >>> number_with_unit("%.1f s", 2.0), number_with_unit("no limit", 0.0)
     ('2.0 s', 'no limit')
@@ -68,7 +68,8 @@ def read_number(text: str, unit: str = "") -> float:
     Raises
     ------
     ValueError
-        If the text is not a number, the number is too large, or its unit does not suit the field.
+        If the text is not a number, the number is too large, or its unit is not accepted by the
+        field.
 
     >>> read_number("90/2"), read_number("-(1 + 2) * .5"), read_number("1,5 s", "s")
     (45.0, -1.5, 1.5)

@@ -1,4 +1,4 @@
-"""Curves of DOFs, as the Curves panel edits them; see ``keyed.KeyedMotion``."""
+"""Curves of DOFs for the Curves panel; see ``keyed.KeyedMotion``."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class DofKeys:
         return None if channel is None else (channel.times, channel.values)
 
     def slopes(self, row: int) -> Floats | None:
-        """Return the slopes at the keys of a curve with several keys."""
+        """Return the slopes at the keys of a curve with at least two keys."""
         channel = channel_of(self.clip, row)
         return None if channel is None or len(channel.times) < 2 else slopes(channel)
 
@@ -62,7 +62,7 @@ class DofKeys:
         return clip
 
     def placed(self, place: KeyPlace, time: float | None, value: float | None, gap: float) -> Clip:
-        """Set the time or value of one key; a typed time may be that of its neighbour."""
+        """Set the time or value of one key; a typed time may equal a neighbour's."""
         return self._changed([place[0]], lambda old: set_key(old, place[1], time, value))
 
     def added(self, rows: Iterable[int], time: float, actor: Actor) -> Clip:

@@ -1,4 +1,4 @@
-"""Keyed motions as the Curves panel edits them: curves with keys, by row of the list."""
+"""Keyed motions for the Curves panel: curves with keys, by row of the panel's list."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["KeyedMotion", "keyed_of"]
 
 
 class KeyedMotion(Protocol):
-    """A motion of keys; every edit returns a new motion. Rows are those of ``curves_of``."""
+    """A keyed motion; every edit returns a new motion. Rows are as in ``curves_of``."""
 
     def keys(self, row: int) -> tuple[Floats, Floats] | None:
         """Return the times and values of a curve's keys, (N,) each; None without keys."""
@@ -32,7 +32,7 @@ class KeyedMotion(Protocol):
         """Return whether a curve of angles jumps by full rotations."""
 
     def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Motion:
-        """Move keys together; they stop at the others."""
+        """Move keys together; they stop at unselected keys."""
 
     def placed(
         self, place: KeyPlace, time: float | None, value: float | None, gap: float

@@ -1,4 +1,4 @@
-"""Curves of keyed transforms, as the Curves panel edits them; see ``keyed.KeyedMotion``."""
+"""Curves of keyed transforms for the Curves panel; see ``keyed.KeyedMotion``."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class TransformKeys:
     skeleton: Skeleton
 
     def row(self, row: int) -> TransformRow:
-        """Return what a curve shows."""
+        """Return the component that a curve shows."""
         return rows_of(self.clip, self.skeleton)[row]
 
     def channel(self, row: int) -> TransformChannel | None:
@@ -49,7 +49,7 @@ class TransformKeys:
         return channel.times, key_values(channel, self.skeleton)[:, self.row(row).component]
 
     def slopes(self, row: int) -> Floats | None:
-        """Return the slopes at cubic keys; those of rotations are no slopes of angles."""
+        """Return the slopes at cubic keys; None for rotations, whose angles have other slopes."""
         channel = self.channel(row)
         if channel is None or channel.tangents is None or channel.path == "rotation":
             return None
@@ -64,7 +64,7 @@ class TransformKeys:
         return self.row(row).path == "rotation"
 
     def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> TransformClip:
-        """Move keys together, with all components that share them."""
+        """Move keys together, including all components that share them."""
         return move_transform_keys(self.clip, self.skeleton, places, dt, dv, gap)
 
     def placed(
@@ -74,7 +74,7 @@ class TransformKeys:
         return set_transform_key(self.clip, self.skeleton, place, time, value, gap)
 
     def added(self, rows: Iterable[int], time: float, actor: Actor) -> TransformClip:
-        """Add keys on curves; rotations without keys get those of the actor's pose."""
+        """Add keys on curves; rotations without keys get the values of the actor's pose."""
         clip, now = self.clip, joint_values(self.skeleton, actor.require_pose())
         # The components of a channel share their keys.
         wanted = {(row.path, row.joint, row.channel): row for row in map(self.row, rows)}
@@ -84,7 +84,7 @@ class TransformKeys:
         return clip
 
     def deleted(self, places: Iterable[KeyPlace]) -> TransformClip:
-        """Delete keys, with all components that share them."""
+        """Delete keys, including all components that share them."""
         return delete_transform_keys(self.clip, self.skeleton, places)
 
     def sloped(self, places: Iterable[KeyPlace], side: int, slope: float) -> TransformClip:

@@ -23,9 +23,9 @@ def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Pa
     Parameters
     ----------
     state : AppState
-        Records where the files are drawn.
+        Records the positions of the files.
     dialog : FileDialog
-        The dialog, whose folder and choice are changed.
+        The dialog, whose folder and selection are changed.
     below : float
         Height to leave free, in window coordinates.
     """
@@ -37,7 +37,7 @@ def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Pa
             name = printable(path.name, 90) + ("/" if is_folder else "")
             flags = imgui.SelectableFlags_.allow_double_click
             flags |= imgui.SelectableFlags_.no_auto_close_popups
-            # The name is drawn as text: "##" in a label would hide the rest.
+            # The name is drawn as text, because "##" in a label would hide the rest.
             is_marked = path in dialog.chosen or path == dialog.current
             pressed, _ = imgui.selectable(f"##file{number}", is_marked, flags)
             note_item(state, f"file {path.name}")
@@ -68,7 +68,7 @@ def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Pa
 
 
 def _move(dialog: FileDialog) -> bool:
-    """Move through the list and the folders by keys; return whether the highlight moved."""
+    """Navigate the list and the folders by keyboard; return whether the highlight moved."""
     if imgui.get_io().want_text_input:
         return False
     keys = imgui.Key
@@ -82,7 +82,7 @@ def _move(dialog: FileDialog) -> bool:
 
 
 def is_confirmed_by_key(dialog: FileDialog) -> bool:
-    """Return whether Enter confirms the chosen files; it opens a folder that is highlighted."""
+    """Return whether Enter confirms the chosen files; a highlighted folder is opened instead."""
     enter = any(
         imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
     )

@@ -1,4 +1,4 @@
-"""Choice of the animation that actors play, among those of their file."""
+"""Choice of the animation that actors play from their file."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ __all__ = [
 ]
 
 NOT_ONE = -2
-"""Index that stands for a motion that is none of the figure's animations."""
+"""Index of a motion that is not one of the figure's animations."""
 
 _LONGEST = 48  # characters of a name
 
 
 @dataclass(slots=True)
 class Animations:
-    """Edited keys of animations that are not played now.
+    """Edited keys of animations that are not being played.
 
     Attributes
     ----------
     edited : dict
-        Clips by actor and index of the animation; those without edits are missing.
+        Clips by actor and index of the animation; clips without edits are omitted.
     """
 
     edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
@@ -48,12 +48,12 @@ def has_animations(state: AppState) -> bool:
 
 
 def no_animations(state: AppState) -> str:
-    """Return the reason why no animation of the chosen actor can be played."""
+    """Return the reason why the chosen actor has no animation to play; empty if it has one."""
     return "" if state.actor.figure.animations else "this figure has no animations"
 
 
 def played(actor: Actor) -> int:
-    """Return the index of the animation that an actor plays, -1 for none, else ``NOT_ONE``."""
+    """Return the index of an actor's animation, -1 for none, or ``NOT_ONE`` for another motion."""
     if actor.clip is None:
         return -1
     return actor.animation if isinstance(actor.clip, TransformClip) else NOT_ONE
@@ -76,8 +76,8 @@ def animation_texts(actor: Actor) -> dict[int, str]:
 def choose_animation(state: AppState, index: int) -> None:
     """Play an animation of the chosen actor from its start, in all figures of its file.
 
-    Edited keys are kept while others play. If the file's keys are invalid, the message is shown and
-    nothing changes.
+    Edited keys are kept while other animations play. If the file's keys are invalid, an error
+    message is shown and nothing changes.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def choose_animation(state: AppState, index: int) -> None:
 def _clips(
     state: AppState, chosen: Actor, index: int
 ) -> dict[Actor, tuple[int, TransformClip | None]]:
-    """Return what each actor of the file plays: index and keys. Reads keys, which may fail."""
+    """Return the index and keys that each actor of the file plays; raises FormatError."""
     edited = state.of(Animations).edited
     found: dict[Actor, tuple[int, TransformClip | None]] = {}
     for actor in _of_one_file(state, chosen):
@@ -118,7 +118,7 @@ def _clips(
         if index >= 0:
             number = counterpart(actor.figure, chosen.figure.animations[index])
         if actor is not chosen and played(actor) == NOT_ONE:
-            continue  # it has a motion from another file
+            continue  # the actor has a motion from another file
         clip = None if number < 0 else actor.figure.animations[number].clip()
         found[actor] = number, edited.get((actor, number), clip)
     return found
@@ -148,7 +148,7 @@ def _put_aside(state: AppState, actor: Actor) -> None:
 
 
 def step_animation(state: AppState, by: int) -> None:
-    """Play the next or a previous animation of the chosen actor; the last is followed by the first.
+    """Play the next or previous animation of the chosen actor; the last one wraps to the first.
 
     Parameters
     ----------

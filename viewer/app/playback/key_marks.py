@@ -21,14 +21,14 @@ def key_times(actor: Actor, joint: int) -> Floats:
     Parameters
     ----------
     actor : Actor
-        With any motion; sampled ones have no keys.
+        An actor with any motion; a sampled motion has no keys.
     joint : int
-        Only keys of this joint; -1 for those of all channels.
+        Joint whose keys are returned; -1 for the keys of all channels.
 
     Returns
     -------
     (N,)
-        Seconds on the scene's clock, increasing.
+        Seconds of scene time, increasing.
     """
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None or not isinstance(clip, Clip | TransformClip):

@@ -1,4 +1,4 @@
-"""Rows of the Joints panel: joints, their DOFs, and further values of a joint."""
+"""Rows of the Joints panel: joints, their DOFs, and other values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _known_rows: Memo[Skeleton, Rows] = Memo(kept=4)
 
 
 def row_labels(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return the labels of all joints, as they are shown."""
+    """Return the displayed labels of all joints."""
 
     def make() -> tuple[str, ...]:
         return tuple(printable(label, _LONGEST) for label in joint_labels(skeleton))
@@ -84,6 +84,6 @@ def _rows(
             listed.append((joint, -1, depths[joint]))
             if wanted or joint in opened:
                 listed += [(joint, dof, depths[joint] + 1) for dof in dofs[joint]]
-    # Parents come before their children in a skeleton, but not always immediately before.
+    # In a skeleton, parents come before their children, but not always immediately before.
     place = np.argsort(depth_first(skeleton.parents)).tolist()
     return tuple(sorted(listed, key=lambda row: place[row[0]]))

@@ -28,7 +28,7 @@ __all__ = [
 
 _LABEL_WIDTH = 4.2  # in font sizes
 _LARGEST = 1e9
-_NOTICEABLE = 1e-4  # of the longest bone, and of a scale of 1; below it are rounding errors
+_NOTICEABLE = 1e-4  # relative to the longest bone, or to a scale of 1; less is rounding
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
 
 
@@ -41,7 +41,7 @@ class _Unlocked:
     joints : frozenset of int
         Indices of the joints.
     n_choices : int
-        The state's ``n_choices`` for which they are valid.
+        The state's ``n_choices`` for which the indices are valid.
     """
 
     joints: frozenset[int] = frozenset()
@@ -49,7 +49,7 @@ class _Unlocked:
 
 
 def unlocked_joints(state: AppState) -> frozenset[int]:
-    """Return the joints whose translation and scale the user wants to see."""
+    """Return the joints whose translation and scale the user has shown."""
     unlocked = state.of(_Unlocked)
     return unlocked.joints if unlocked.n_choices == state.n_choices else frozenset()
 
@@ -72,7 +72,7 @@ def moved_joints(state: AppState) -> frozenset[int]:
 def _animated_joints(clip: TransformClip, skeleton: Skeleton) -> frozenset[int]:
     """Return the joints that a clip translates or scales noticeably away from rest.
 
-    Many exporters write channels for every joint, most of them without any effect.
+    Many exporters write channels for every joint, most of them without effect.
     """
     bones = np.linalg.norm(skeleton.rest_translations, axis=1)
     rests = {
@@ -89,7 +89,7 @@ def _animated_joints(clip: TransformClip, skeleton: Skeleton) -> frozenset[int]:
 
 
 def draw_translation(state: AppState, pose: Pose, joint: int, label: str) -> None:
-    """Draw the translation of a joint relative to its rest, along the axes of its parent."""
+    """Draw a joint's translation relative to its rest position, along the parent's axes."""
     speed = 0.002 * (box_size(state.box) or 1.0)
 
     def draw_axis(hidden: str, axis: int) -> None:
@@ -139,7 +139,7 @@ def _draw_row(
 
 
 def _is_reset(text: str) -> bool:
-    """Explain the last row, and return whether a double click resets it."""
+    """Show the tooltip of the last row, and return whether a double-click resets the row."""
     if not imgui.is_item_hovered():
         return False
     show_tooltip(f"{text}\ndrag, or Ctrl+click to type a value; double-click to reset")

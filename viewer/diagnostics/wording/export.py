@@ -109,7 +109,7 @@ MESSAGES = {
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
-    "{n:?is|are} delayed to begin at 0: {names:list8}",
+    "{n:?is|are} shifted to begin at 0: {names:list8}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
     "X005.influences": _INFLUENCES,

@@ -18,16 +18,16 @@ MESSAGES = {
     "ignored",
     "G006.bind": "expected a morph target and its weight, found target {found}: ignored",
     "G006.constraint": "invalid constraint ignored: expected {expected}",
-    "F002.constraint-cycle": "expected constraints without a cycle, found a cycle of "
+    "F002.constraint-cycle": "expected constraints without cycles, found a cycle of "
     "nodes {nodes:list12}",
     "G006.first-person": "expected a mesh and auto, both, thirdPersonOnly or firstPersonOnly, "
     "found {found:quoted}: ignored",
     "F002.vrma-bones": "expected nodes of human bones, found none",
     "F002.vrma-animation": "expected an animation of human bones, found none",
     "F002.vrma-long": "expected at most {most} frames, found {found}",
-    "F007.vrma-animations": "{n:#further animation} ignored: a motion file plays its first",
-    "F007.vrma-look": "the direction of the eyes is not shown",
-    "F007.expressions-unmatched": "no such expression on the figure: {names:list12}",
+    "F007.vrma-animations": "{n:#further animation} ignored: only the first is played",
+    "F007.vrma-look": "gaze direction is not shown",
+    "F007.expressions-unmatched": "the figure lacks expressions: {names:list12}",
     "F007.vrm-springs": "{n:#spring chain} not simulated: hair and clothes follow their joints",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
@@ -64,7 +64,7 @@ MESSAGES = {
     "data after {size} bytes",
     "F002.gltf-no-data": "expected a uri or a binary chunk, found neither",
     "F002.gltf-compressed": "expected valid compressed data, found damaged data",
-    "F002.gltf-draco": "compressed with Draco, which needs the extra draco: pip install DracoPy",
+    "F002.gltf-draco": "compressed with Draco, which requires DracoPy: pip install DracoPy",
     "F002.gltf-draco-id": "expected an attribute of the compressed data, found {found}",
     "F002.gltf-decoded-width": "expected {expected:#component}, found {found} in compressed data",
     "F002.gltf-decoded": "expected at most {most} bytes of decoded data for a file of this size, "
@@ -147,7 +147,7 @@ MESSAGES = {
     "G004.influence-sets": "sets {sets:list} have joints without weights or weights without "
     "joints: ignored",
     # Animations
-    "F002.gltf-no-keys": "expected times of at least one key, found none",
+    "F002.gltf-no-keys": "expected at least one key time, found none",
     "F002.gltf-times": "key {index}: expected ascending times, found {found:.6g} after "
     "{before:.6g}",
     "F002.gltf-outputs": "expected {expected:#element} for {keys:#key}, found {found}",

@@ -1,13 +1,13 @@
-"""Messages about figures in files of nodes: glTF, FBX."""
+"""Messages about figures in glTF and FBX files."""
 
 MESSAGES = {
     "F002.no-figure": "expected meshes, skins or a hierarchy of nodes, found nothing to show",
-    "F002.many-vertices": "expected at most {most} vertices, found {found} on all nodes",
+    "F002.many-vertices": "expected at most {most} vertices, found {found} over all nodes",
     "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
     "vertex} along the edges",
     "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
-    "F007.skinning-method": "skins {names:list} are made for another skinning method: choose it "
+    "F007.skinning-method": "skins {names:list} require another skinning method: select it "
     "with --method {method}",
     "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
     "W001.divided": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "

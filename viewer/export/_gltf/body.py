@@ -42,7 +42,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """Indices and summary of one file's contents."""
+    """Indices and statistics of one file's contents."""
 
     tree: Tree
     meshes: list[Placed]
@@ -136,7 +136,7 @@ def _add_meshes(encoding: Encoding, body: Body, tree: Tree, color: Color | None)
 
 
 def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Placed]) -> list[int]:
-    """Bind the meshes that have nodes of their own; return those that are roots of the scene."""
+    """Bind the meshes that have their own nodes; return the nodes that are roots of the scene."""
     nodes = document.root["nodes"]
     own = [placed.node for placed in meshes if placed.part.joint < 0]
     influences, skin = body.influences, body.figure.skin

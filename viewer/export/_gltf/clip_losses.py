@@ -24,14 +24,14 @@ from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import Skinning
 
-_MOST_VERTICES = 4_000_000  # compared, over all times: about two seconds
+_MOST_VERTICES = 4_000_000  # maximum number compared, over all times: about two seconds
 _FEWEST, _MOST = 3, 128  # times per animation
 _BLOCK = 64  # times at once
 _DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
 
 
 def shown_weights(figure: Figure, weights: Floats) -> Floats:
-    """Return weights (S,) after the rules of expressions, missing ones as 0."""
+    """Return the displayed weights, (S,), by the rules of expressions; missing ones are 0."""
     whole = np.zeros(figure.n_shapes)
     whole[: len(weights)] = weights
     shapes = figure.blend_shapes
@@ -39,7 +39,7 @@ def shown_weights(figure: Figure, weights: Floats) -> Floats:
 
 
 def shape_rows(clips: Sequence[TransformClip], weights: Floats) -> Floats:
-    """Return the weights at rest (S,), and a row in which animated ones are not 0: (2, S)."""
+    """Return the weights at rest and a row with non-zero animated weights: (2, S)."""
     rows = np.stack([weights, weights])
     for clip in clips:
         for channel in clip.channels:
@@ -52,7 +52,7 @@ def shape_rows(clips: Sequence[TransformClip], weights: Floats) -> Floats:
 class _Samples:
     """The rest pose and all animations at some times, of the figure and of the file.
 
-    ``clips``, ``times`` (F,): animation of each row, -1 for the rest pose, and its seconds.
+    ``clips``, ``times`` (F,): animation of each row, -1 for the rest pose, and its time in seconds.
     """
 
     frames: Frames
@@ -69,11 +69,11 @@ def clip_losses(
     how: Skinning,
     body: Body,
 ) -> list[Diagnostic]:
-    """Return notes with the largest distance of a vertex, or joint without a mesh.
+    """Return notes with the largest distance of a vertex, or of a joint if there is no mesh.
 
     ``written``: the file.
-    ``figure``, ``pose``: the original, and its pose where nothing moves it.
-    ``clips``: its motions, all of which the file has.
+    ``figure``, ``pose``: the original, and its pose where no animation moves it.
+    ``clips``: its motions, all of which are in the file.
     ``how``: the requested skinning.
     ``body``: the written shape and skin.
     """
@@ -128,7 +128,7 @@ def _distances(expected: Side, found: Side, count: int) -> Floats:
 def _sampled(
     file: GltfFile, figure: Figure, pose: Pose, clips: Sequence[TransformClip], most: int
 ) -> _Samples:
-    """Return the rest pose, and keys and times between them of each animation."""
+    """Return the rest pose, and each animation at its keys and at times between them."""
     frames, owners, seconds = [pose_frames(figure, pose)[1]], [-1], [0.0]
     moved: list[tuple[int, Keys]] = []
     animations = file.root.get("animations", [])
@@ -152,7 +152,7 @@ def _sampled(
 
 
 def _still(file: GltfFile, node: int, path: str) -> Floats:
-    """Return the value of a property that no animation moves."""
+    """Return the value of a property that is not animated."""
     item = file.root["nodes"][node]
     if path == "weights":
         return np.array(file.root["meshes"][item["mesh"]]["weights"], dtype=np.float64)
@@ -160,7 +160,7 @@ def _still(file: GltfFile, node: int, path: str) -> Floats:
 
 
 def _one(parts: list[Frames]) -> Frames:
-    """Return several frames one after the other."""
+    """Return the concatenation of several frames."""
 
     def joined(name: str) -> Floats:
         arrays = []

@@ -1,6 +1,6 @@
 """Builder of a glTF 2.0 file: its JSON, and the arrays and images in its buffer.
 
-It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``.
+Specification: Khronos Group, ``registry.khronos.org/glTF/specs/2.0``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TYPES = {
     np.dtype("<f4"): 5126,
 }
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_PADDING = 4  # alignment of arrays: size of the largest component
+_PADDING = 4  # alignment of arrays, bytes: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
 _HEADER = 28  # bytes of a .glb besides JSON and arrays
 
@@ -48,7 +48,7 @@ class Document:
         self._size = 0
 
     def add(self, kind: str, item: dict[str, Any]) -> int:
-        """Append to ``nodes``, ``meshes`` … and return the index."""
+        """Append an item to ``nodes``, ``meshes`` … and return its index."""
         items: list[dict[str, Any]] = self.root.setdefault(kind, [])
         items.append(item)
         return len(items) - 1
@@ -59,7 +59,7 @@ class Document:
         ``values`` (N, ...): one row per element, N > 0; unsigned integers are stored unchanged,
           floating-point numbers in single precision.
         ``kind``: ``"SCALAR"``, ``"VEC3"`` and so on.
-        ``target``: ``VERTICES``, ``INDICES``, or 0 for data that no mesh draws.
+        ``target``: ``VERTICES``, ``INDICES``, or 0 for data that are not drawn.
         ``bounds``: store the minimum and maximum of each component.
         Raises RigError if a number is not finite or too large for single precision.
         """
@@ -140,7 +140,7 @@ class Document:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
     def pair(self, buffer_name: str) -> tuple[bytes, bytes]:
-        """Return the JSON file, and the buffer for a file of that name next to it."""
+        """Return the JSON file, and the contents of the buffer file with that name next to it."""
         uri = quote(buffer_name.encode("utf-8", "surrogateescape"), safe="")
         return self._json({"uri": uri, "byteLength": self._size}), b"".join(self._parts)
 

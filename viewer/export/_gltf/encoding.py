@@ -50,7 +50,7 @@ class Encoding:
         return matrix
 
     def positions(self, values: Floats, is_placed: bool = True) -> int:
-        """Add positions (R, 3); those that are not placed by ``decoding`` stay as they are."""
+        """Add positions (R, 3); those that ``decoding`` does not transform are not quantised."""
         if not (self.is_quantized and is_placed):
             return self.document.array(values, "VEC3", VERTICES, bounds=True)
         return self._lengths(values - self.center, bounds=True)
@@ -76,13 +76,13 @@ class Encoding:
         return self.document.integers(stored, "VEC3")
 
     def normal_offsets(self, values: Floats) -> int:
-        """Add offsets of normals (R, 3); those beyond the range stay as they are."""
+        """Add offsets of normals (R, 3); those beyond the range are not quantised."""
         if not self.is_quantized or np.abs(values).max(initial=0.0) > 1.0:
             return self.document.array(values, "VEC3", VERTICES)
         return self.document.integers(np.rint(values * _SHORT).astype(np.int16), "VEC3")
 
     def uvs(self, values: Floats) -> int:
-        """Add texture coordinates (R, 2); repeating ones stay as they are."""
+        """Add texture coordinates (R, 2); repeating ones are not quantised."""
         if not self.is_quantized or values.min(initial=0.0) < 0.0 or values.max(initial=0.0) > 1.0:
             return self.document.array(values, "VEC2", VERTICES)
         stored = np.rint(values * _WORD).astype(np.uint16)
@@ -141,7 +141,7 @@ def _summing(weights: Floats) -> NDArray[np.uint16]:
 
 
 def quantized(document: Document, positions: Floats, offsets: list[Floats]) -> Encoding:
-    """Return an encoding whose range holds positions (V, 3) and offsets (V, 3) of them."""
+    """Return an encoding whose range contains positions (V, 3) and their offsets (V, 3)."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     most = max((float(np.abs(each).max(initial=0.0)) for each in offsets), default=0.0)
     reach = max(0.5 * float((high - low).max()), most)

@@ -23,7 +23,7 @@ Targets: TypeAlias = NDArray[np.integer]
 
 _MODES = {"linear": "LINEAR", "step": "STEP", "cubic": "CUBICSPLINE"}
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
-_RATE = 60.0  # frames per second where channels of different interpolation must be joined
+_RATE = 60.0  # frames per second at which channels of different interpolation are merged
 
 
 def add_clips(
@@ -34,9 +34,9 @@ def add_clips(
     shapes: Targets,
     weights: Floats,
 ) -> list[TransformClip]:
-    """Add an animation for each clip; return those that move something that the file has.
+    """Add an animation for each clip; return those with an effect in the file.
 
-    glTF has no times below 0, so earlier keys shift their whole animation.
+    Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
 
     ``document``: modified in place.
     ``clips``: motions with at least one channel each.
@@ -105,7 +105,7 @@ class _Keys:
 
 
 def _increasing(times: Floats) -> NDArray[np.float32]:
-    """Return times in single precision, each later than the one before, as glTF requires."""
+    """Return times in single precision, strictly increasing as glTF requires."""
     single = times.astype(np.float32)
     for key in np.flatnonzero(np.diff(single) <= 0.0).tolist():
         later = np.nextafter(single[key], np.float32(np.inf))
@@ -116,7 +116,7 @@ def _increasing(times: Floats) -> NDArray[np.float32]:
 def _joined_weights(
     channels: list[TransformChannel], rows: Targets, weights: Floats
 ) -> TransformChannel | None:
-    """Return one channel with all morph targets of a mesh, None if nothing moves them."""
+    """Return one channel for all morph targets of a mesh; None if no channel moves them."""
     own = [channel for channel in channels if np.isin(_shapes(channel), rows).any()]
     if not own:
         return None
@@ -128,7 +128,7 @@ def _joined_weights(
 
 
 def _widened(channel: TransformChannel, rows: Targets, weights: Floats) -> TransformChannel:
-    """Return a channel for other blend shapes, of which those it does not move stand still."""
+    """Return a channel extended to more blend shapes, which keep their weights."""
     place = {int(shape): column for column, shape in enumerate(_shapes(channel))}
     columns = np.array([place.get(int(row), -1) for row in rows])
     values = np.where(columns >= 0, channel.values[:, columns], weights[rows])
@@ -145,9 +145,9 @@ def _shapes(channel: TransformChannel) -> Ints:
 
 
 def _merged(channels: list[TransformChannel], rows: Targets, weights: Floats) -> TransformChannel:
-    """Return several channels as one, with keys at the times of all of them.
+    """Merge several channels into one, with keys at all of their times.
 
-    This is exact if all are linear or all are steps; others are sampled in between.
+    This is exact if all are linear or all are steps; other combinations are sampled.
     """
     times = np.unique(np.concatenate([channel.times for channel in channels]))
     modes = {channel.interpolation for channel in channels}

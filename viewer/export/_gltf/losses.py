@@ -1,4 +1,4 @@
-"""Parts of a figure that glTF cannot store, and measured errors of a file that is read back."""
+"""Parts of a figure that glTF cannot store, and errors measured by reading a file back."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Written:
     meshes : list of Placed
         Its meshes.
     start : int
-        Frame of the figure that is the first in the file.
+        Frame of the figure that comes first in the file.
     keys : dict, optional
-        Animated values of each frame; by default, those of files whose keys are the frames.
+        Animated values of each frame; by default, the file's keys, one per frame.
     """
 
     path: Path
@@ -53,7 +53,7 @@ class Written:
 
     @property
     def sources(self) -> Ints:
-        """The figure's vertex that each vertex of the file is a copy of."""
+        """The figure's vertex that each vertex of the file copies."""
         return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
@@ -67,7 +67,7 @@ def gltf_losses(
     influences: Influences | None,
     first_frame: int | None,
 ) -> list[Diagnostic]:
-    """Return notes with the largest distances between the posed figure and a file.
+    """Return notes with the largest distances between a file and the posed figure.
 
     ``written``: the file.
     ``figure``: the original, without its shape applied.
@@ -92,9 +92,10 @@ def gltf_losses(
 def sides(
     written: Written, figure: Figure, frames: Frames, how: Skinning, shape: Shape
 ) -> tuple[Side, Callable[[int | None], Side]]:
-    """Return a posed figure, and a function that returns the file, as comparable sides.
+    """Return a posed figure, and a function that returns a file in the same form.
 
-    Parameters as for ``gltf_losses``; the function takes a number of influence sets, None for all.
+    Parameters as for ``gltf_losses``; the function takes a number of influence sets, or None for
+    all.
     """
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
@@ -111,7 +112,7 @@ def sides(
 
 
 def _split(side: Side, sources: Ints) -> Side:
-    """Return a side whose vertices are duplicated as in the file."""
+    """Return a side with vertices duplicated as in the file."""
     whole = side.exact
     assert side.body is not None  # the caller checked for a mesh
     body = body_rows(side.body, sources)
@@ -128,9 +129,9 @@ def first_set_note(
     least: float,
     influences: Influences | None,
 ) -> list[Diagnostic]:
-    """Return a note about the error of programs that read four influences per vertex.
+    """Return a note about the error in programs that read only four influences per vertex.
 
-    Empty if there are not more. ``expected``, ``read``: from ``sides``.
+    Empty if no vertex has more. ``expected``, ``read``: from ``sides``.
     """
     if influences is None or influences.most <= PER_SET or expected.body is None:
         return []
@@ -183,7 +184,7 @@ def _weights_phrase(influences: Influences) -> Phrase:
 
 
 def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
-    """Return a note that lists the parts of a figure that the file does not hold."""
+    """Return a note that lists the parts of a figure that the file does not contain."""
     shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
     rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())
     mixed = 0 if shapes is None else sum(shapes.is_expression(row) for row in rows)

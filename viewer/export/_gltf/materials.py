@@ -18,12 +18,12 @@ __all__ = ["Color", "Materials", "material_losses"]
 
 Color = tuple[float, float, float]
 
-_PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour of untextured surfaces
+_PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour for untextured surfaces
 _MATTE = {"metallicFactor": 0.0, "roughnessFactor": 0.8}  # glTF surfaces are metallic by default
 _WRAPS = {"clamp": 33071, "repeat": 10497, "mirror": 33648}
 _SMOOTH, _SHARP = (9729, 9987), (9728, 9986)  # magnified, minified with mipmaps
 _MINIFIED = dict(zip(MINIFICATIONS, (9728, 9729, 9984, 9985, 9986, 9987), strict=True))
-_SHEAR = 1e-6  # shear of a texture transform, which rotation and scale cannot express
+_SHEAR = 1e-6  # larger shears of a texture transform are reported, because glTF cannot express them
 
 
 class Materials:
@@ -32,7 +32,7 @@ class Materials:
     ``document``: modified in place.
     ``mesh``: mesh with the materials.
     ``color`` (r, g, b): linear colour of surfaces without their own colour.
-    ``is_own``: whether the mesh is from a file of nodes, in which materials may have no name.
+    ``is_own``: whether the mesh is from a glTF or FBX file, where materials may be unnamed.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Materials:
         return self._add(name, {"baseColorFactor": [*self._color, 1.0], **_MATTE})
 
     def add(self, index: int) -> int:
-        """Add a material of the mesh unless it is there; return its index in the document."""
+        """Add a material of the mesh if it is missing; return its index in the document."""
         if index not in self._added:
             self._added[index] = self.plain() if index < 0 else self._surface(index)
         return self._added[index]
@@ -85,7 +85,7 @@ class Materials:
         return self._add(title, surface, self._rest(material, shown, name))
 
     def _rest(self, material: Material, shown: dict[str, Texture], name: str) -> dict[str, Any]:
-        """Return the remaining properties: normals, occlusion, emission, opacity and sides."""
+        """Return the remaining properties: normals, occlusion, emission, opacity and culling."""
         rest: dict[str, Any] = {"doubleSided": material.double_sided}
         extensions: dict[str, Any] = {}
         if "normal_texture" in shown:
@@ -126,7 +126,7 @@ class Materials:
         if key not in self._images:
             data = texture.encoded or encode_png(image)
             added = self._document.picture(data, texture.name or name)
-            # The pixels are kept alive, so that no other array gets the same id.
+            # The pixels are kept alive, so that no other array gets their id.
             self._images[key] = added, image
         source, sampler = self._images[key][0], self._sampler(texture)
         pair = source, sampler
@@ -178,8 +178,8 @@ def _same_place(one: Texture, other: Texture) -> bool:
 def _placement(matrix: Floats) -> tuple[dict[str, Any], float]:
     """Return offset, rotation and scale of KHR_texture_transform, and the omitted shear.
 
-    glTF counts v from the first image row, and so do the matrices of the extension:
-    T(offset) R(-rotation) S(scale).
+    In glTF, v = 0 at the first image row, also for the extension's matrices T(offset) R(-rotation)
+    S(scale).
     """
     (a, b, u), (c, d, v) = matrix.tolist()
     scale_u = math.hypot(a, c)

@@ -22,7 +22,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 
 _POINTS = 0  # mode of a primitive without triangles
 _LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
-_NOT_UNIT = 1e-3  # tolerance of unit length; normals may under- or overflow when squared
+_NOT_UNIT = 1e-3  # tolerance of unit length; squares of normals may underflow or overflow
 
 
 def add_mesh(
@@ -67,9 +67,9 @@ def add_mesh(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """Rows of a part in the space of its node.
+    """Vertices of a part in the space of its node.
 
-    ``positions``, ``normals`` (R, 3): of the written vertices; normals of unit length.
+    ``positions``, ``normals`` (R, 3): positions and unit normals of the written vertices.
     ``lengths`` (R, 1): lengths of the figure's own normals.
     ``linear`` (3, 3): from binding space to the space of the node.
     """
@@ -99,7 +99,7 @@ def _attributes(encoding: Encoding, mesh: Mesh, part: Part, surface: _Surface) -
         "NORMAL": encoding.normals(surface.normals),
     }
     if mesh.uvs is not None and len(mesh.uvs):
-        # In glTF, the first image row is at v = 0, in this program at v = 1.
+        # In glTF, the first image row is at v = 0; in this program, at v = 1.
         for number, uvs in enumerate((mesh.uvs, *mesh.other_uvs)):
             flipped = uvs[part.uv_indices] * [1.0, -1.0] + [0.0, 1.0]
             attributes[f"TEXCOORD_{number}"] = encoding.uvs(flipped)

@@ -44,9 +44,9 @@ def add_animation(
     tree: Tree,
     morphs: list[tuple[int, Floats]],
 ) -> int:
-    """Add rotations of all joints, other properties where they change, and the figure's placement.
+    """Add rotations of all joints, other properties that change, and the figure's placement.
 
-    Quaternions have the sign nearest to the previous frame, since some programs interpolate
+    Quaternions have the sign nearest to the previous frame, because some programs interpolate
     components.
     Times begin at 0.
 
@@ -56,11 +56,11 @@ def add_animation(
     ``skeleton``: skeleton in the written shape.
     ``frames``: frames without gaps.
     ``tree``: the nodes.
-    ``morphs``: nodes of meshes with the changing weights of their targets.
+    ``morphs``: nodes of meshes, and the changing weights of their targets.
     Returns: number of joints with translations.
-    Raises RigError if numbers do not fit single precision.
+    Raises RigError if a number exceeds single precision.
     """
-    # Single precision distinguishes eight million frames at any rate.
+    # Single precision distinguishes the times of eight million frames at any rate.
     times = (np.arange(frames.n_frames) / rate).astype(np.float32)
     keys = _Keys(document, document.array(times, "SCALAR", bounds=True))
     rotations = np.swapaxes(_continuous(frames.rotations), 0, 1)

@@ -9,7 +9,7 @@
         ├── fixed            never moves; only if some vertices have no influence
         └── mesh             only if the mesh is not skinned; a skinned mesh is a root node
 
-A figure from a file of nodes has its own root, and needs the first two nodes only if it is moved
+A figure from a glTF or FBX file has its own root, and needs the first two nodes only if it is moved
 or converted.
 """
 
@@ -58,7 +58,7 @@ class Tree:
     root : int
         The topmost node.
     place : int
-        The node that moves the whole figure; -1 without one.
+        The node that moves the whole figure; -1 if there is none.
     joints : list of J int
         Nodes of the joints, in the figure's order.
     fixed : list of int
@@ -93,17 +93,17 @@ def add_nodes(
     fixes: bool,
     bare: bool = False,
 ) -> Tree:
-    """Add all nodes except that of the mesh.
+    """Add all nodes except the mesh's.
 
     ``document``: modified in place.
     ``name``: name of the figure.
     ``up``: up axis of the figure's world.
     ``unit``: as in ``Figure.unit``.
-    ``skeleton``, ``still``: the joints and their transforms.
+    ``skeleton``, ``still``: the skeleton, and transforms of its joints at rest.
     ``pose``: pose with the figure's placement.
     ``fixes``: whether vertices need a node that never moves.
-    ``bare``: whether the only root joint is the topmost node, if the figure is neither moved nor
-    converted.
+    ``bare``: whether a single root joint may be the topmost node, if the figure is neither moved
+    nor converted.
     Raises RigError if a number is not finite.
     """
     if bare and skeleton is not None and still is not None and not fixes:

@@ -16,7 +16,7 @@ from viewer.rig.skin import influence_counts
 
 __all__ = ["Part", "parts_of"]
 
-_WORST_CONDITION = 1e5  # of an inverse bind matrix that may move vertices to a joint and back
+_WORST_CONDITION = 1e5  # maximum condition number of an inverse bind matrix that is applied
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,13 +26,14 @@ class Part:
     Attributes
     ----------
     index : int
-        Index into the mesh's parts; -1 for what belongs to none, or for a whole mesh.
+        Index into the mesh's parts; -1 for triangles without a part, or for a whole mesh.
     name, mesh_name : str
-        Of the node and of the mesh.
+        Names of the node and of the mesh.
     joint : int
-        Joint whose node has the mesh, as all vertices follow it rigidly; -1 if a skin moves them.
+        Joint whose node has the mesh, because all vertices follow it rigidly; -1 if a skin moves
+        them.
     sources, uv_indices : (R,) int32
-        Vertex and texture coordinate of the figure that each written vertex is a copy of.
+        Vertex and texture coordinate of the figure that each written vertex copies.
     triangles : (T, 3) int32
         Indices into the written vertices.
     materials : (T,) int32
@@ -58,8 +59,8 @@ class Part:
 def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Part]:
     """Return the parts of a figure; a mesh without parts is one.
 
-    A part with the name of the joint that all its vertices follow is on the node of that joint, as
-    in the file that it came from; others are skinned.
+    A part whose vertices all follow the joint of its name is attached to that joint's node, as in
+    its original file; others are skinned.
 
     ``name``: name of the mesh and its node if there are no parts.
     ``shape``: shape of a figure with a mesh.
@@ -97,9 +98,9 @@ def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Par
 
 
 def _rows(mesh: Mesh, triangles: Ints, count: int) -> dict[int, Ints]:
-    """Return the written vertices of each part, of which parts may share some.
+    """Return the written vertices of each part; parts may share vertices.
 
-    Vertices without triangles are with the vertex before them.
+    Vertices without triangles belong to the part of the preceding vertex.
     """
     owners = np.full(count, -2, dtype=np.int32)
     owners[triangles] = mesh.part_indices[:, None]
@@ -139,7 +140,7 @@ def _mesh_name(figure: Figure, index: int, name: str) -> str:
 
 
 def _targets(shape: Shape, index: int, sources: Ints) -> tuple[NDArray[np.intp], tuple[str, ...]]:
-    """Return a part's morph targets, as indices into those of the figure, and their names."""
+    """Return a part's morph targets, as indices into the figure's, and their names."""
     every = np.arange(len(shape.targets))
     shapes, record = shape.figure.blend_shapes, shape.figure.record
     if shapes is None or len(every) == 0:

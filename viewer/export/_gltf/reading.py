@@ -26,7 +26,7 @@ from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skin import Skin, influence_counts, skin_from_entries
 
 Keys: TypeAlias = dict[tuple[int, str], Floats]
-"""Animated values by node and path, a row per frame."""
+"""Animated values by node and path, one row per frame."""
 
 _TYPES = {5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -81,9 +81,9 @@ class Placed:
     node : int
         Its node.
     part : Part
-        What it was written from.
+        The part from which it was written.
     decoding : (4, 4)
-        From the file's positions to those of the figure, for quantised ones.
+        From positions in the file, which may be quantised, to the figure's.
     """
 
     node: int
@@ -101,12 +101,12 @@ def read_back(
     start: int = 0,
     sets: int | None = None,
 ) -> Side:
-    """Return the contents of a file as a comparable body.
+    """Return the contents of a file in a form that can be compared with the figure.
 
     ``file``: the written file.
-    ``tree``: indices of the nodes of joints and figure.
+    ``tree``: indices of the nodes.
     ``meshes``: its meshes, in the order of the compared vertices.
-    ``figure``: the figure as written, which says where joints with meshes of their own are bound.
+    ``figure``: the figure as written, with the bindings of joints that have their own meshes.
     ``targets`` (M,): indices of the figure's morph targets that change over time.
     ``keys``: animated values of each frame, by node and path.
     ``start``: frame of the figure that is the first in the file.
@@ -150,7 +150,7 @@ def read_back(
 
 
 def frame_keys(file: GltfFile) -> Keys:
-    """Return the animated values of a file whose keys are the frames."""
+    """Return the animated values of a file with one key per frame."""
     found: Keys = {}
     for animation in file.root.get("animations", ()):
         for channel in animation["channels"]:
@@ -187,7 +187,7 @@ def _body(
     changing: Rows,
     sets: int | None,
 ) -> tuple[Body, Floats]:
-    """Return all meshes in the first frame's shape, and the weights that change it: (F, M)."""
+    """Return all meshes in the shape of the first frame, and the weights that change it: (F, M)."""
     found = [_one_body(file, placed, keys, bound, sets) for placed in meshes]
     positions = np.concatenate([each.positions for each in found])
     skin = _joined([each.skin for each in found], bound)
@@ -242,7 +242,7 @@ def _one_body(
 def _skin(
     file: GltfFile, attributes: dict[str, int], slot: int, bound: Floats, sets: int | None
 ) -> Skin:
-    """Return the influences of a mesh; without any, all vertices follow one slot."""
+    """Return the influences of a mesh; if it has none, all vertices follow one slot."""
     count = file.root["accessors"][attributes["POSITION"]]["count"]
     names = sorted(name for name in attributes if name.startswith("JOINTS_"))
     numbers = sorted(int(name.split("_")[1]) for name in names)[:sets]
@@ -261,7 +261,7 @@ def _skin(
 
 
 def _joined(skins: list[Skin], bound: Floats) -> Skin:
-    """Return one skin with the vertices of several, one after the other."""
+    """Return one skin with the concatenated vertices of several."""
     counts = np.concatenate([influence_counts(skin) for skin in skins])
     return Skin(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),

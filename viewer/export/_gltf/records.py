@@ -1,4 +1,4 @@
-"""Application data and copyright of the glTF file that a figure came from."""
+"""Application data and copyright of a figure's original glTF file."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from viewer.rig.file_record import FileRecord
 
 
 def add_record(document: Document, record: FileRecord, joints: list[int]) -> None:
-    """Add what a figure's own file states about the whole file and about joints.
+    """Add the application data and copyright of a figure's file and of its joints.
 
     ``document``: modified in place; already has the joints.
-    ``record``: from the figure.
+    ``record``: the record of the figure.
     ``joints`` (J,): their nodes.
     """
     if record.copyright:

@@ -1,7 +1,7 @@
-"""Values of the animations of a glTF file that was written here, at given times.
+"""Evaluation of the animations of a glTF file written here.
 
-It follows the specification, glTF 2.0, section 3.11 and appendix C, in double precision, and
-shares no code with the rest of the program.
+The evaluation follows glTF 2.0, section 3.11 and appendix C, in double precision, and shares no
+code with the rest of the program.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 from viewer.export._gltf.reading import GltfFile, Keys
 from viewer.rig.arrays import Floats
 
-_PARALLEL = 1.0 - 1e-9  # cosine of rotations that are interpolated on a line
+_PARALLEL = 1.0 - 1e-9  # rotations with a larger cosine are interpolated linearly
 
 
 def key_times(animation: dict[str, Any], file: GltfFile) -> Floats:
-    """Return all times of keys of an animation, increasing: (T,)."""
+    """Return all key times of an animation, increasing: (T,)."""
     inputs = {sampler["input"] for sampler in animation["samplers"]}
     return np.unique(np.concatenate([file.floats(index)[:, 0] for index in sorted(inputs)]))
 

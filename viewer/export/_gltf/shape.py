@@ -12,7 +12,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.shape import shaped
 
-_MOST_TARGETS = 64  # limit: each target takes 12 bytes per vertex, and programs support few
+_MOST_TARGETS = 64  # maximum number: each takes 12 bytes per vertex, and programs support few
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +41,8 @@ def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
     """Return the written form of a figure's shape.
 
     Morph targets do not move joints, so a shape that affects joints or has too many targets is
-    baked into the mesh. Morph targets of the figure's own file are written whatever their weight;
-    expressions, which combine them, only where they are used.
+    baked into the mesh. Morph targets of the figure's own file are always written; expressions,
+    which combine them, only if they are used.
 
     ``figure``: figure without its shape applied.
     ``weights`` (F, S) or (1, S): weights of its blend shapes over time.

@@ -20,8 +20,8 @@ from viewer.rig.skin import (
 )
 
 PER_SET = 4
-_SUM = 1e-6  # smaller deviations from 1 are rounding errors of the original file
-_MOST_JOINTS = 65536  # joint indices have 16 bits
+_SUM = 1e-6  # smaller deviations of weight sums from 1 are rounding errors of the original file
+_MOST_JOINTS = 65536  # maximum number of joints, as indices have 16 bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class Influences:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints that the file's skin lists: one more if vertices are fixed."""
+        """Number of joints that the file's skin lists: one more if some vertices are fixed."""
         return self.skin.n_joints + bool(self.n_fixed)
 
 
@@ -58,7 +58,7 @@ def influences_of(skin: Skin) -> Influences:
     """Return a skin in the form that glTF can store.
 
     ``skin``: a skin with arbitrary weights.
-    Raises RigError if there are more joints than a file can number.
+    Raises RigError if there are more joints than a file can index.
     """
     merged = limit_influences(skin, max(1, int(influence_counts(skin).max(initial=0))))
     owners = np.repeat(np.arange(skin.n_vertices, dtype=np.int32), influence_counts(merged))
@@ -112,12 +112,12 @@ def influence_sets(
 def inverse_bind_matrices(influences: Influences, inverse_bind: Floats, decoding: Floats) -> Floats:
     """Return the matrices of all joints that the skin lists, in column-major order: (N, 16).
 
-    ``influences``: determines whether any vertices are fixed; the node of these is bound at the
+    ``influences``: determines whether any vertices are fixed; their node is bound at the
     origin. ``inverse_bind`` (J, 4, 4): matrices of the figure's joints.
-    ``decoding`` (4, 4): from stored positions to those of the figure.
+    ``decoding`` (4, 4): from stored positions to the figure's.
     """
     matrices = np.concatenate([inverse_bind, np.eye(4)[None]])[: influences.n_joints]
     if not np.array_equal(decoding, np.eye(4)):
         matrices = matrices @ decoding
-    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # exact, as readers expect
+    matrices[:, 3] = 0.0, 0.0, 0.0, 1.0  # set exactly, as readers expect
     return matrices.transpose(0, 2, 1).reshape(-1, 16)

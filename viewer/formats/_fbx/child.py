@@ -1,4 +1,4 @@
-"""The child process that reads an ``.fbx``: its limits, and the errors it can end with."""
+"""The child process that reads an ``.fbx``: its limits, and the errors with which it can end."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from viewer.formats._source import Source
 
 __all__ = ["run_worker"]
 
-_SECONDS = 60.0  # time limit, and for each further ...
-_STEP = 1 << 20  # ... bytes, which take about 0.1 s,
-_SECONDS_PER_STEP = 2.0  # ... so much more
-_MEMORY = 4 << 30  # bytes that the child may use, and for each byte of the file ...
-_MEMORY_PER_BYTE = 64  # ... so many more
+_SECONDS = 60.0  # time limit of the smallest files
+_STEP = 1 << 20  # bytes, which take about 0.1 s to read
+_SECONDS_PER_STEP = 2.0  # added to the time limit for each step
+_MEMORY = 4 << 30  # bytes that the child may use for the smallest files
+_MEMORY_PER_BYTE = 64  # added for each byte of the file
 _WORKER = "viewer.formats._fbx.worker"
 
 
@@ -57,7 +57,7 @@ def run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]
 
 
 def _environment(memory: int) -> dict[str, str]:
-    """Return the child's environment: it finds this package, and uses one thread."""
+    """Return the child's environment, in which it finds this package and uses one thread."""
     package = str(Path(viewer.__file__).resolve().parents[1])
     paths = filter(None, (package, os.environ.get("PYTHONPATH", "")))
     limits = {"VIEWER_FBX_MEMORY": str(memory), "OPENBLAS_NUM_THREADS": "1"}

@@ -93,7 +93,7 @@ def _unit(metres: float) -> str:
 
 
 def _say_unused(source: Source, told: dict[str, Any]) -> None:
-    """Record what was converted, and which elements of the file are not used."""
+    """Report unused elements of the file, and converted axes or units."""
     if told["unused"]:
         items = [counted(n, word) for word, n in told["unused"].items()]
         source.warn("F007.fbx-unused", items=items)
@@ -107,7 +107,7 @@ def _say_unused(source: Source, told: dict[str, Any]) -> None:
 
 
 def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, Any]) -> None:
-    """Record the properties of a mesh that have no equivalent."""
+    """Report the properties of a mesh that have no equivalent."""
     if mesh["color_sets"] > 1:
         source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
     for shape in mesh["shapes"]:
@@ -137,7 +137,7 @@ def _animations(source: Source, told: dict[str, Any], tree: NodeTree) -> tuple[N
 def _channels(
     source: Source, told: dict[str, Any], shapes: dict[int, tuple[int, int]], stack: int
 ) -> tuple[NodeChannel, ...]:
-    """Bake one animation stack, in a child process again."""
+    """Bake one animation stack in another child process."""
     arrays, keys = run_worker(source, str(stack))
     channels: list[NodeChannel] = []
     weights: dict[int, dict[int, Floats]] = {}  # by mesh, then by row of its shapes
@@ -158,7 +158,7 @@ def _channels(
 
 
 def _joined(rows: dict[int, Floats], still: list[float]) -> tuple[Floats, Floats]:
-    """Return the weights of all shapes of a mesh at all key times: (N,), (N, S)."""
+    """Return all key times of a mesh's shapes, (N,), and the weights at these times, (N, S)."""
     times = np.unique(np.concatenate([table[:, 0] for table in rows.values()]))
     values = np.tile(still, (len(times), 1))
     for row, table in rows.items():

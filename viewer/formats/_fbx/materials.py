@@ -18,14 +18,14 @@ from viewer.rig.material import Material, Texture
 
 __all__ = ["materials_of"]
 
-_LEAST_ALPHA = 255  # a pixel below this is not opaque
+_LEAST_ALPHA = 255  # alpha of opaque pixels
 
 
 def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[Material, ...]:
-    """Return all materials of a message; textures are found inside or beside the file.
+    """Return all materials of a message; textures may be inside the file or beside it.
 
-    A picture is searched for under the names that the file states, and under its bare file name
-    beside the file, in ``textures`` and in ``<file>.fbm``, where exporters unpack pictures.
+    A picture is searched for under the paths stated in the file, and by its file name beside the
+    file, in ``textures``, and in ``<file>.fbm``, where exporters unpack pictures.
     """
     pictures: dict[int, Bytes | None] = {}
     sets: list[str] = next((mesh["uv_sets"] for mesh in told["meshes"] if mesh["uv_sets"]), [])
@@ -89,7 +89,7 @@ def _has_alpha(image: Bytes | None) -> bool:
 
 
 def _picture_name(source: Source, names: list[str]) -> str:
-    """Return the name of the first place where the picture is, else the first name stated."""
+    """Return the first path at which the picture exists, else the first path stated."""
     folder = source.path.parent
     stated = [name.replace("\\", "/") for name in names if name]
     bare = PurePosixPath(stated[0]).name if stated else ""
@@ -102,7 +102,7 @@ def _picture_name(source: Source, names: list[str]) -> str:
 
 
 def _picture(source: Source, content: bytes, name: str) -> Bytes | None:
-    """Return the pixels of a picture inside the file, or else of one below its folder."""
+    """Return the pixels of a picture embedded in the file, or else of one below its folder."""
     if not content:
         return load_image(source, name, None) if name else None
     try:

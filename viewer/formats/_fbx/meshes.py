@@ -1,4 +1,4 @@
-"""Meshes of an ``.fbx``: polygons with attributes per corner become triangles of vertices."""
+"""Meshes of an ``.fbx``: conversion of polygons with per-corner attributes to triangles."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ __all__ = ["Placed", "mesh_on_node", "skin_of"]
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """One mesh of the message on one of its nodes.
+    """One mesh of the message, at one of its nodes.
 
     Attributes
     ----------
     prefix : str
-        Of the names of its arrays.
+        Prefix of the names of its arrays.
     told : dict
         Its JSON.
     materials : list of int
-        Material of each slot that its faces refer to.
+        Material of each slot, to which its faces refer.
     placement : (4, 4)
-        Geometry to node; the identity for skinned meshes, whose matrices include it.
+        Geometry to node; the identity for skinned meshes, whose inverse bind matrices include it.
     """
 
     prefix: str
@@ -49,7 +49,7 @@ def mesh_on_node(source: Source, arrays: Arrays, placed: Placed) -> NodeMesh:
     if not len(listed):
         return NodeMesh(placed.told["name"], ())
     picks, owners = triangulate(get("vertices"), corners[listed].astype(np.int64), counts)
-    wanted = listed[picks]  # corner of the file at each corner of each triangle
+    wanted = listed[picks]  # the file's corner at each corner of each triangle
     slots = _slots(arrays, placed)[shown[owners]]
     linear = placed.placement[:3, :3]
     if np.linalg.det(linear) < 0.0:
@@ -102,15 +102,15 @@ def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
 def _distinct(
     arrays: Arrays, placed: Placed, corners: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Ints]:
-    """Return one corner for each vertex, and the vertex of each of the given corners.
+    """Return one corner per vertex, and the vertex of each given corner.
 
-    Corners are one vertex if their position and all their attributes are equal.
+    Corners become one vertex if their positions and all attributes are equal.
     """
     keys = [arrays[f"{placed.prefix}.corners"][corners]]
     for name in _attributes(arrays, placed):
         values = arrays[f"{placed.prefix}.{name}"]
         rows = arrays[f"{placed.prefix}.{name}.corners"][corners]
-        # Equal values count as one: exporters repeat them for every corner.
+        # Equal values get one index, because exporters repeat values for every corner.
         _, number = np.unique(values + 0.0, axis=0, return_inverse=True)
         keys.append(number.reshape(-1)[rows])
     _, first, inverse = np.unique(np.stack(keys), axis=1, return_index=True, return_inverse=True)
@@ -125,7 +125,7 @@ def _primitive(
     material: int,
     influences: tuple[Ints, Floats] | None,
 ) -> Primitive:
-    """Return the primitive of some corners, which become its vertices."""
+    """Return a primitive whose vertices are the chosen corners."""
     get = _getter(arrays, placed.prefix)
     vertices = get("corners")[chosen]
     linear, shift = placed.placement[:3, :3], placed.placement[:3, 3]
@@ -162,7 +162,7 @@ def _spread(get: Any, row: int, name: str, count: int) -> Floats:
 
 
 def _normal_targets(rows: list[Floats], linear: Floats) -> Floats | None:
-    """Return the offsets of normals; None if the file has none, as they are then recomputed."""
+    """Return the offsets of normals; None if the file has none; they are then recomputed."""
     if not any(each.any() for each in rows):
         return None
     return np.array([_turned(each, linear, unit=False) for each in rows])
@@ -179,7 +179,7 @@ def _turned(normals: Floats, linear: Floats, unit: bool = True) -> Floats:
 
 
 def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
-    """Return joints and weights of the file's vertices, side by side: (V, K), (V, K)."""
+    """Return the joints and the weights of the file's vertices: (V, K), (V, K)."""
     if placed.told["skin"] is None:
         return None
     get = _getter(arrays, f"{placed.prefix}.skin")
@@ -207,7 +207,7 @@ def _with_bone(get: Any) -> NDArray[np.bool_]:
 
 
 def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -> NodeSkin | None:
-    """Return the skin of a mesh, and record which parts of it are not used."""
+    """Return the skin of a mesh, and report which parts of it are not used."""
     if told["skin"] is None:
         return None
     get = _getter(arrays, f"{prefix}.skin")

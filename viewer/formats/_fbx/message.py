@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 __all__ = ["Arrays", "packed", "unpacked"]
 
 Arrays: TypeAlias = dict[str, NDArray[Any]]
-"""Arrays by the name under which the JSON refers to them."""
+"""Arrays by the names that the JSON uses for them."""
 
 _JSON = "json"
 
@@ -27,7 +27,7 @@ def packed(arrays: Arrays, told: dict[str, Any]) -> bytes:
 
 
 def unpacked(data: bytes) -> tuple[Arrays, dict[str, Any]] | None:
-    """Return the arrays and the JSON of a message; None if it is not whole."""
+    """Return the arrays and the JSON of a message; None if it is incomplete."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}

@@ -1,8 +1,9 @@
 """Child process that reads an ``.fbx`` with ufbx and writes its contents to standard output.
 
-Run as ``python -m viewer.formats._fbx.worker FILE`` for everything but the keys, and with a number
-after it for the keys of one animation stack. It writes an ``.npz``: arrays, and JSON under
-``"json"``. Only a few ways of using ufbx's binding are safe: see ``_Scene``.
+``python -m viewer.formats._fbx.worker FILE`` returns everything except the keys; with the number of
+an animation stack after the file, it returns the keys of that stack. It writes an ``.npz``: arrays,
+and JSON under
+``"json"``. Only some uses of ufbx's binding are safe: see ``_Scene``.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ import numpy as np
 
 from viewer.formats._fbx.message import Arrays, packed
 
-_METRES = (1.0, 0.01, 0.001, 0.0254)  # metres per unit that figures can have
-_LIGHT = 1e-6  # relative; rounding of a unit stated by an exporter
+_METRES = (1.0, 0.01, 0.001, 0.0254)  # metres per unit, for the units that figures can have
+_LIGHT = 1e-6  # relative rounding error of a unit stated by an exporter
 
 
 def main(arguments: list[str]) -> None:
-    """Read a file, write the message, and leave without any clean-up."""
+    """Read a file, write the message, and exit without any clean-up."""
     _limit_memory()
     gc.disable()
     import ufbx
@@ -38,7 +39,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _limit_memory() -> None:
-    """Make a file that asks for too much memory end this process, not the machine."""
+    """Limit the memory of this process, so that a hostile file cannot exhaust the machine's."""
     limit = int(os.environ.get("VIEWER_FBX_MEMORY", "0"))
     if limit and find_spec("resource") is not None:
         import resource
@@ -49,8 +50,8 @@ def _limit_memory() -> None:
 class _Scene:
     """A scene of ufbx.
 
-    Objects of the binding do not keep their parent objects alive, so all are held until the process
-    ends. Iteration runs past the end of its lists, so they are indexed.
+    Objects of the binding do not keep their parent objects alive, so all objects are held until the
+    process ends. Iterating over a list of the binding runs past its end, so lists are indexed.
     """
 
     def __init__(self, ufbx: Any, path: str) -> None:
@@ -67,7 +68,7 @@ class _Scene:
         return value
 
     def get(self, item: Any, *names: str) -> Any:
-        """Return an attribute, or an attribute of an attribute; all are held."""
+        """Return an attribute, which may be nested; all objects on the way are held."""
         for name in names:
             item = self.keep(getattr(item, name))
         return item
@@ -78,7 +79,7 @@ class _Scene:
         return [self.keep(found[index]) for index in range(len(found))]
 
     def _options(self, wanted: dict[str, Any] | None) -> dict[str, Any]:
-        # Nodes that do not inherit their parent's scale get a helper node, which keeps them exact.
+        # Nodes that do not inherit their parent's scale get a helper node, which is exact.
         helpers = self.ufbx.InheritModeHandling.HELPER_NODES
         return {
             "inherit_mode_handling": helpers,
@@ -89,7 +90,7 @@ class _Scene:
         }
 
     def _conversion(self) -> dict[str, Any]:
-        """Return options that convert axes or units that a figure cannot have."""
+        """Return options for the conversion of axes or units that a figure cannot have."""
         settings, wanted = self.get(self.scene, "settings"), {}
         right, up, front = (int(axis) for axis in self.get(settings, "axes"))
         vectors = [_vector(axis) for axis in (right, up, front)]

@@ -12,7 +12,7 @@ from viewer.formats._fbx.message import Arrays
 __all__ = ["KeptScene", "contents_of", "integers"]
 
 _METHODS = ("lbs", "lbs", "dqs", "mix")  # ufbx.SkinningMethod
-# Elements that have no equivalent, by the list of the scene that holds them.
+# Elements without equivalent, by the list of the scene that contains them.
 _UNUSED = {
     "lights": "light",
     "cameras": "camera",
@@ -26,7 +26,7 @@ _PHYSICAL = range(3, 11)  # ufbx.ShaderType: OSL standard surface to ShaderFX gr
 
 
 class KeptScene(Protocol):
-    """A scene whose objects are held, see ``worker.py``."""
+    """A scene whose objects are held; see ``worker.py``."""
 
     ufbx: Any
     scene: Any
@@ -44,7 +44,7 @@ class KeptScene(Protocol):
 
 
 def contents_of(kept: KeptScene) -> dict[str, Any]:
-    """Return the JSON, and add its arrays to the scene's."""
+    """Return the JSON, after adding its arrays to the scene's."""
     scene = kept.scene
     settings, metadata = kept.get(scene, "settings"), kept.get(scene, "metadata")
     nodes = kept.items(scene, "nodes")
@@ -98,13 +98,13 @@ def _add_nodes(kept: KeptScene, nodes: list[Any]) -> None:
 
 
 def _transform(kept: KeptScene, transform: Any) -> list[float]:
-    """Return translation, quaternion (x, y, z, w) and scale: 10 numbers."""
+    """Return a translation, a quaternion (x, y, z, w) and a scale: 10 numbers."""
     parts = (kept.get(transform, name) for name in ("translation", "rotation", "scale"))
     return [float(number) for part in parts for number in part]
 
 
 def _matrix(matrix: Any) -> NDArray[np.float64]:
-    """Return a matrix of ufbx, which stores four columns: (4, 4)."""
+    """Return an affine matrix of ufbx, which stores four columns: (4, 4)."""
     result = np.eye(4)
     result[:3] = np.array([list(column) for column in matrix]).T
     return result
@@ -144,7 +144,7 @@ def _mesh(kept: KeptScene, at: int, mesh: Any) -> dict[str, Any]:
     return {
         "name": str(kept.get(mesh, "name")),
         "nodes": [int(node.typed_id) for node in instances],
-        # A mesh's list of materials is that of its first node; each node has its own list.
+        # A mesh lists the materials of its first node; each node has its own list.
         "materials": [
             [int(material.typed_id) for material in kept.items(node, "materials")]
             for node in instances

@@ -17,8 +17,8 @@ _PERCENT = "DeformPercent"  # property of a blend channel
 def keys_of(kept: KeptScene, stack: int) -> list[dict[str, Any]]:
     """Return a list of channels: node or element, path, and the name of the arrays.
 
-    ufbx evaluates curves, pivots and layers at the file's frame rate and at their keys, and
-    returns what has to be interpolated linearly, or by slerp.
+    ufbx evaluates curves, pivots and layers at the file's frame rate and at their keys, and returns
+    keys for linear interpolation, or slerp for rotations.
     """
     stacks = kept.items(kept.scene, "anim_stacks")
     animation = kept.get(stacks[stack], "anim")

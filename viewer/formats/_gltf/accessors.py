@@ -38,7 +38,7 @@ _INDEX_TYPES = (5121, 5123, 5125)
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """Elements of an accessor: type, components and where they lie."""
+    """Layout of an accessor's elements: type, component type and position in the buffer."""
 
     element: Element
     kind: str
@@ -48,24 +48,24 @@ class _Layout:
 
     @property
     def columns(self) -> tuple[int, int]:
-        """Number of columns and of components in each."""
+        """Number of columns, and of components per column."""
         return _TYPES[self.kind]
 
     @property
     def column_size(self) -> int:
-        """Bytes from one column of a matrix to the next, which begins at a multiple of 4."""
+        """Bytes from one column of a matrix to the next; columns are aligned to 4 bytes."""
         n_columns, n_rows = self.columns
         size = n_rows * self.dtype.itemsize
         return size if n_columns == 1 else size + -size % 4
 
     @property
     def size(self) -> int:
-        """Bytes of one element with its padding."""
+        """Bytes of one element, including padding."""
         return self.columns[0] * self.column_size
 
     @property
     def extent(self) -> int:
-        """Bytes of one element without padding after its last column."""
+        """Bytes of one element, excluding padding after its last column."""
         n_columns, n_rows = self.columns
         return (n_columns - 1) * self.column_size + n_rows * self.dtype.itemsize
 
@@ -96,7 +96,7 @@ class Accessors:
         return len(self._table)
 
     def __getitem__(self, index: int) -> Element:
-        """Return the object of an accessor."""
+        """Return the JSON object of an accessor."""
         return self._table[index]
 
     def count(self, index: int) -> int:
@@ -120,11 +120,11 @@ class Accessors:
         kinds : sequence of str
             Expected element types, such as ``"VEC3"``.
         user : str
-            JSON pointer to what refers to the accessor.
+            JSON pointer to the member that refers to the accessor.
         rows : (M,) int32, optional
             Elements to return; all if omitted.
         decoded : (N, C), optional
-            Components that were decoded elsewhere, in place of those in the buffer view.
+            Components that are already decoded, used instead of the buffer view.
 
         Returns
         -------
@@ -134,14 +134,14 @@ class Accessors:
         Raises
         ------
         FormatError
-            If it is invalid, has a different type, or its data is missing.
+            If the accessor is invalid or has a different type, or its data is missing.
         """
         layout = self._layout(index, kinds, user)
         values = self._picked(layout, rows, decoded)
         if layout.is_normalized and values.dtype.kind != "f":
-            # Signed integers have one more negative value, which is -1 too (glTF 2.0, 3.6.2.2).
+            # The lowest signed integer is clamped to -1 (glTF 2.0, 3.6.2.2).
             return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
-        with np.errstate(invalid="ignore"):  # signalling NaN
+        with np.errstate(invalid="ignore"):  # signalling NaNs
             return values.astype(np.float64)
 
     def fractions(
@@ -152,9 +152,9 @@ class Accessors:
         rows: Ints | None = None,
         decoded: NDArray[Any] | None = None,
     ) -> Floats:
-        """Return an accessor whose integers must be normalised, as colours and weights are.
+        """Return an accessor whose integers must be normalised, such as colours or weights.
 
-        Parameters, shape and errors are those of ``floats``. A missing flag causes a warning.
+        Parameters, shape and errors as for ``floats``. A missing flag causes a warning.
         """
         values = self.floats(index, kinds, user, rows, decoded)
         layout = self._layout(index, kinds, user)
@@ -173,7 +173,7 @@ class Accessors:
     ) -> NDArray[np.int64]:
         """Return an accessor as whole numbers: (N, C) or (M, C) int64.
 
-        Parameters and errors are those of ``floats``; floating-point components are also an error.
+        Parameters and errors as for ``floats``; floating-point components are also an error.
         """
         layout = self._layout(index, kinds, user)
         if layout.dtype.kind == "f" or layout.is_normalized:
@@ -296,7 +296,7 @@ class Accessors:
 
 
 def _elements(view: View, layout: _Layout, element: Element, offset: int) -> NDArray[Any]:
-    """Return the elements in a buffer view, column by column: (N, C), not copied if possible."""
+    """Return the elements in a buffer view, column by column: (N, C); a view if possible."""
     size = layout.size
     stride = view.stride or size
     if stride < size:

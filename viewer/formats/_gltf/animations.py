@@ -1,4 +1,4 @@
-"""Animations of a glTF document: names, ranges and nodes are read at once, keys when played."""
+"""Animations of a glTF document: names, ranges and nodes. Keys are read on first playback."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.formats._nodes.content import NodeAnimation, NodeChannel
 
 __all__ = ["read_animations"]
 
-_SAME_TIME = 1e-4  # s; decimals of times in JSON
+_SAME_TIME = 1e-4  # s; rounding of times in JSON
 
 
 @dataclass(slots=True)
@@ -32,8 +32,8 @@ class _Unused:
 def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation, ...]:
     """Return the animations that are valid, except for keys that are read later.
 
-    An invalid animation is omitted with a warning. The keys of the first one are read, because
-    it is the one that is played by default; those of all are if errors are kept.
+    An invalid animation is omitted with a warning. The keys of the first one are read, because it
+    is played by default; if errors are kept, all keys are read.
     """
     table = document.table("animations")
     unused = _Unused()
@@ -80,7 +80,7 @@ def _animation(
 def _channels(
     document: Document, targets: Targets, animation: Element, declared: tuple[float, float]
 ) -> tuple[NodeChannel, ...]:
-    """Return the channels of an animation, with a warning if its range is another."""
+    """Return the channels of an animation; warn if the declared range is wrong."""
     channels = read_channels(document, targets, animation)
     start, end = declared
     first = min((float(channel.times[0]) for channel in channels), default=start)
@@ -93,10 +93,10 @@ def _channels(
 def _plain_channels(
     channels: list[Any], samplers: list[Any], targets: Targets
 ) -> tuple[set[int], set[int]] | None:
-    """Return the nodes and the time accessors of channels in the form that nearly all files use.
+    """Return the nodes and the time accessors of channels; None if any is invalid or unusual.
 
-    None if any channel is invalid or unusual. Files have tens of thousands of channels, so this
-    takes less time than parsing them did.
+    Files may have tens of thousands of channels, nearly all in the form that is handled here.
+    Handling them takes less time than parsing the JSON.
     """
     try:
         moved = {(item["target"]["node"], item["target"]["path"]) for item in channels}
@@ -114,7 +114,7 @@ def _plain_channels(
 def _any_channels(
     document: Document, targets: Targets, animation: Element, unused: _Unused
 ) -> tuple[set[int], set[int]]:
-    """Return the nodes and the time accessors of any channels; raises FormatError."""
+    """Return the nodes and the time accessors of channels of any form; raises FormatError."""
     channels, samplers = animation.table("channels"), animation.table("samplers")
     nodes: set[int] = set()
     inputs: set[int] = set()
@@ -132,7 +132,7 @@ def _any_channels(
 
 
 def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[float, float]:
-    """Return the seconds of the first and the last key, as the accessors declare them."""
+    """Return the times of the first and the last key in seconds, as declared by the accessors."""
     accessors = document.table("accessors")
     ends: list[tuple[float, float]] = []
     for index in inputs:
@@ -151,7 +151,7 @@ def _required_input(document: Document, sampler: Element) -> None:
 
 
 def _declared(accessors: Table, index: int) -> tuple[float, float] | None:
-    """Return the least and greatest value that an accessor declares; None if they are unusual."""
+    """Return the minimum and maximum that an accessor declares; None if they are unusable."""
     try:
         values = accessors.items[index]
         low, high = values["min"][0], values["max"][0]
@@ -161,7 +161,7 @@ def _declared(accessors: Table, index: int) -> tuple[float, float] | None:
 
 
 def _read_range(document: Document, animation: Element, index: int) -> tuple[float, float]:
-    """Return the first and the last of the times themselves."""
+    """Return the first and the last time, read from the data."""
     samplers = animation.table("samplers")
     users = (samplers[place] for place in range(len(samplers)))
     sampler = next(user for user in users if user.values.get("input") == index)

@@ -16,7 +16,7 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Attributes", "read_colors", "read_normals", "read_positions", "read_uvs"]
 
-_MOST_UVS = 8  # sets of texture coordinates that are kept
+_MOST_UVS = 8  # maximum number of texture coordinate sets
 _NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")
 
 
@@ -31,9 +31,9 @@ class Attributes:
     element : Element
         Accessor indices by name.
     n_vertices : int
-        Elements that each accessor must have.
+        Number of elements that each accessor must have.
     rows : (V,) int32 or None
-        Vertices to read, since other primitives use the rest; None for all.
+        Vertices to read, if other primitives use the rest; None for all.
     decoded : dict
         Components of the attributes that are compressed with Draco.
     """
@@ -50,18 +50,18 @@ class Attributes:
         return self.n_vertices if self.rows is None else len(self.rows)
 
     def accessor(self, name: str) -> int:
-        """Return the accessor of an attribute, -1 if it is missing.
+        """Return the index of an attribute's accessor, -1 if the attribute is missing.
 
         Raises
         ------
         FormatError
-            If it is not an accessor, or has a different number of elements.
+            If there is no such accessor, or it has a different number of elements.
         """
         accessors = self.document.accessors
         index = self.element.index(name, len(accessors), "accessors")
         if index < 0:
             return index
-        # The counts of accessors may be wrong where the data are compressed.
+        # The counts of accessors may be wrong if the data are compressed.
         decoded, expected = self.decoded.get(name), self.n_vertices
         found = accessors.count(index) if decoded is None else len(decoded)
         if found != expected:
@@ -77,7 +77,7 @@ class Attributes:
         return read(index, kinds, user, self.rows, self.decoded.get(name))
 
     def fractions(self, name: str, *kinds: str) -> Floats | None:
-        """Return an attribute whose integers are normalised, as ``floats`` does."""
+        """Return an attribute of normalised integers; shape and errors as for ``floats``."""
         index = self.accessor(name)
         if index < 0:
             return None
@@ -85,7 +85,7 @@ class Attributes:
         return read(index, kinds, user, self.rows, self.decoded.get(name))
 
     def integers(self, name: str, *kinds: str) -> NDArray[np.int64] | None:
-        """Return an attribute of whole numbers, as ``floats`` does."""
+        """Return an attribute of whole numbers; shape and errors as for ``floats``."""
         index = self.accessor(name)
         if index < 0:
             return None
@@ -93,7 +93,7 @@ class Attributes:
         return read(index, kinds, user, self.rows, self.decoded.get(name))
 
     def sets(self, name: str) -> list[int]:
-        """Return the numbers of the attributes such as ``TEXCOORD_0``, in ascending order."""
+        """Return the set numbers of attributes such as ``TEXCOORD_0``, in ascending order."""
         found = (_NUMBERED.fullmatch(key) for key in self.element.values)
         return sorted(int(match[2]) for match in found if match and match[1] == name)
 
@@ -102,7 +102,7 @@ class Attributes:
         return row if self.rows is None else int(self.rows[row])
 
     def finite(self, name: str, values: Floats) -> Floats:
-        """Return values in which non-finite ones are set to 0, with a warning."""
+        """Return values with non-finite ones set to 0 and a warning recorded."""
         bad = _not_finite(values)
         if not bad.any():
             return values
@@ -117,7 +117,7 @@ def read_positions(attributes: Attributes) -> Floats:
     Raises
     ------
     FormatError
-        If they are missing, malformed or not finite.
+        If the positions are missing, malformed or not finite.
     """
     positions = attributes.floats("POSITION", "VEC3")
     if positions is None:
@@ -132,7 +132,7 @@ def read_positions(attributes: Attributes) -> Floats:
 
 
 def read_normals(attributes: Attributes) -> Floats | None:
-    """Return the normals, (V, 3), if there are any."""
+    """Return the normals: (V, 3); None if there are none."""
     normals = attributes.floats("NORMAL", "VEC3")
     return None if normals is None else attributes.finite("NORMAL", normals)
 
@@ -165,7 +165,7 @@ def read_colors(attributes: Attributes) -> Floats | None:
 
 def _not_finite(values: Floats) -> Bools:
     """Return a mask of the rows that are not finite: (V,)."""
-    # The sum is quick to compute; only then are rows looked at.
+    # The sum is quick to compute; rows are tested only if it is not finite.
     with np.errstate(invalid="ignore"):
         if np.isfinite(values.sum()):
             return np.zeros(len(values), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""Skinned meshes of nodes: joints of vertices must be joints of the skin."""
+"""Validation of the joint indices of skinned meshes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def checked_bindings(
     meshes: tuple[NodeMesh, ...],
     skins: tuple[NodeSkin, ...],
 ) -> tuple[NodeMesh, ...]:
-    """Return the meshes, whose influences refer to joints of each skin that they are used with.
+    """Return the meshes after checking their joint indices against all skins in use.
 
     Raises
     ------

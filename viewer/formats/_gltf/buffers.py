@@ -27,7 +27,7 @@ class View:
     stride : int
         Bytes from one element to the next; 0 if elements are tightly packed.
     offset : int
-        Place of the first byte in the buffer; multiples of 4 are aligned.
+        Position of the first byte in the buffer; data at multiples of 4 are aligned.
     """
 
     data: Bytes
@@ -59,7 +59,7 @@ class EncodedImage:
 
 
 def _located(buffer: Element, length: int) -> bytes:
-    """Return the data of a buffer's URI; errors about another file name the buffer as well."""
+    """Return the data of a buffer's URI; errors in an external file also name the buffer."""
     try:
         return uri_bytes(buffer, length)
     except FormatError as problem:
@@ -91,7 +91,7 @@ class Buffers:
         self._data: dict[int, Bytes] = {}
         self._decoded: dict[int, View] = {}
         self.n_bytes_read = len(root.source.data)
-        """Size of the document and of the files that it has needed so far."""
+        """Size of the document and of its external files read so far."""
 
     @property
     def n_views(self) -> int:
@@ -109,7 +109,7 @@ class Buffers:
         Raises
         ------
         FormatError
-            If it has no data, or the data cannot be read.
+            If the buffer has no data, or the data cannot be read.
         """
         if index not in self._data:
             self._data[index] = self._read(index)
@@ -121,7 +121,7 @@ class Buffers:
         Raises
         ------
         FormatError
-            If it is invalid, or its data cannot be read or end before it.
+            If the view is invalid or exceeds its data, or the data cannot be read.
         """
         view = self._views[index]
         compressed = meshopt_of(view)
@@ -138,7 +138,7 @@ class Buffers:
         Raises
         ------
         FormatError
-            If its data is missing, cannot be read, or is outside the folder.
+            If the image's data is missing, unreadable, or outside the folder.
         """
         image = self._images[index]
         name, kind = image.text("name"), image.text("mimeType")

@@ -11,7 +11,7 @@ from viewer.formats._nodes.content import NodeCamera
 
 __all__ = ["read_cameras"]
 
-_ANGLE = math.radians(45.0)  # vertical field of view in place of an invalid one
+_ANGLE = math.radians(45.0)  # vertical field of view that replaces an invalid one
 
 
 def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
@@ -22,7 +22,7 @@ def read_cameras(document: Document) -> tuple[NodeCamera, ...]:
         try:
             cameras.append(_camera(table[index]))
         except FormatError as problem:
-            # A figure can be seen without its camera.
+            # A figure can be shown without the file's camera.
             pointer = problem.diagnostic.pointer
             table.source.warn("G003.camera", pointer, problem=problem.diagnostic.message)
             cameras.append(NodeCamera("", _ANGLE))

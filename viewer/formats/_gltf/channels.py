@@ -1,4 +1,4 @@
-"""Channels of an animation, read when it is first played."""
+"""Channels of an animation, read when the animation is first played."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["read_channels", "sampler_of"]
 
 @dataclass(slots=True)
 class _Reading:
-    """Keys of an animation that have been read, as channels share them."""
+    """Keys of an animation read so far; channels may share them."""
 
     document: Document
     targets: Targets
@@ -26,7 +26,7 @@ class _Reading:
     times: dict[int, Floats] = field(default_factory=dict)
     keys: dict[tuple[int, str, int], Keys] = field(default_factory=dict)
     n_equal: int = 0
-    """Number of keys at the time of the next one, by which they are replaced."""
+    """Number of keys dropped because the next key has the same time."""
 
 
 def read_channels(
@@ -61,7 +61,7 @@ def sampler_of(channel: Element, samplers: Table) -> int:
     Raises
     ------
     FormatError
-        If there is none.
+        If the channel has no sampler.
     """
     index = channel.index("sampler", len(samplers), "samplers")
     if index < 0:

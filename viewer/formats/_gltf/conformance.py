@@ -1,4 +1,4 @@
-"""Violations of the specification that do not change what is shown, found only by lint."""
+"""Violations of the specification without visible effect, reported only by lint."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["check_conformance"]
 
-_ROUNDING = 1e-5  # deviation of a declared bound, relative to the largest component, that is text
+_ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
 _UNIT = 1e-3  # deviation of a quaternion's length from 1
 
 
 def check_conformance(
     document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...], skins: tuple[NodeSkin, ...]
 ) -> None:
-    """Record what Khronos' validator reports about accessors, skins, nodes and animations.
+    """Report the errors that Khronos' validator finds in accessors, skins, nodes and animations.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
 
 
 def _ancestors(node: int, parents: list[int]) -> list[int]:
-    """Return a node and its ancestors, its root last."""
+    """Return a node and its ancestors, ending with the root."""
     chain = [node]
     while parents[chain[-1]] >= 0:
         chain.append(parents[chain[-1]])

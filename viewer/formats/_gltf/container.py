@@ -6,7 +6,7 @@ r"""Containers of glTF: JSON text, or GLB with its chunks.
     chunk  length:uint32 type:uint32 bytes, padded to 4 bytes
     types  "JSON" first, then "BIN\0" if there is a binary buffer; others are skipped
 
-Lengths that contradict the size of the file are corrected with a warning where nothing is lost.
+Lengths that contradict the size of the file are corrected with a warning if no data are lost.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def open_container(source: Source) -> Container:
     Raises
     ------
     FormatError
-        If it is neither, is truncated in its JSON, or its JSON is invalid.
+        If the file is neither JSON nor GLB, or its JSON is truncated or invalid.
     """
     data = source.data
     if not data.startswith(MAGIC):
@@ -67,7 +67,7 @@ def open_container(source: Source) -> Container:
 
 
 def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:
-    """Yield type and content of each chunk."""
+    """Yield the type and the content of each chunk."""
     data = memoryview(source.data)
     end = _end(source)
     place = _HEADER.size
@@ -97,7 +97,7 @@ def _end(source: Source) -> int:
         raise source.fault("F002.gltf-version", found=version)
     if length != size:
         source.warn("G001.length", expected=length, found=size)
-    # A longer file has something after it; a truncated one ends early.
+    # A longer file has other data after its chunks; a truncated one ends early.
     return length if _HEADER.size + _CHUNK.size <= length < size else size
 
 

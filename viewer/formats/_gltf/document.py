@@ -1,4 +1,4 @@
-"""A glTF document: its JSON, its buffers and accessors, and the memory that it may take."""
+"""A glTF document: its JSON, buffers and accessors, and a limit on decoded data."""
 
 from __future__ import annotations
 
@@ -16,10 +16,8 @@ __all__ = ["Document", "open_document"]
 
 Content = TypeVar("Content")
 
-_FREE_BYTES = 256 << 20  # decoded bytes that any file may need
-_MOST_GROWTH = (
-    64  # decoded bytes per byte of file; quantised and compressed data grow about 20 times
-)
+_FREE_BYTES = 256 << 20  # decoded bytes that any file is allowed
+_MOST_GROWTH = 64  # decoded bytes per byte of file; 20 is usual for compressed data
 
 
 class Document:
@@ -64,7 +62,7 @@ class Document:
         Raises
         ------
         FormatError
-            If the file decodes to much more than its size, as files that declare huge arrays do.
+            If the decoded data are much larger than the file, which may declare huge arrays.
         """
         self._decoded += n_bytes
         most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
@@ -78,7 +76,7 @@ class Document:
         Raises
         ------
         FormatError
-            As for the function, if the first error is to be raised.
+            The function's error, unless errors are kept.
         """
         try:
             return read()

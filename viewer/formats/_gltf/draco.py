@@ -37,9 +37,9 @@ class DecodedPrimitive:
 
 
 def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:
-    """Return a compressed primitive; None if it is not compressed, or has an uncompressed form.
+    """Return a compressed primitive; None if the uncompressed form is to be read.
 
-    The uncompressed form is used only if DracoPy is not installed.
+    Where a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
 
     Raises
     ------

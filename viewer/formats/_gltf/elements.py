@@ -18,11 +18,11 @@ __all__ = ["Element", "Table", "pointer_to"]
 
 Choice = TypeVar("Choice", int, str)
 
-_BEYOND = 1 << 64  # whole numbers that no file can mean
+_BEYOND = 1 << 64  # whole numbers from here on are invalid in any file
 
 
 def pointer_to(base: str, *keys: str | int) -> str:
-    """Return the JSON pointer of a member (RFC 6901).
+    """Return a JSON pointer to a member (RFC 6901).
 
     >>> pointer_to("/nodes/3", "extensions", "a/b")
     '/nodes/3/extensions/a~1b'
@@ -35,7 +35,7 @@ def pointer_to(base: str, *keys: str | int) -> str:
 
 
 class Element:
-    """An object of the document. Members that are missing have the default of the caller.
+    """An object of the document. Missing members have the caller's default.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class Element:
         self.source, self.values, self.pointer = source, values, pointer
 
     def at(self, *keys: str | int) -> str:
-        """Return the JSON pointer of a member."""
+        """Return a JSON pointer to a member."""
         return pointer_to(self.pointer, *keys)
 
     def has(self, name: str) -> bool:
-        """Return whether there is a member of this name."""
+        """Return whether the object has a member of this name."""
         return name in self.values
 
     def fault(self, key: str, name: str = "", **values: Any) -> FormatError:
@@ -80,7 +80,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else, or missing without a default.
+            If the member is anything else, or is missing and has no default.
         """
         value = self.values.get(name)
         if value is None and default is not None and name not in self.values:
@@ -106,7 +106,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else.
+            If the member is anything else.
         """
         if name not in self.values:
             return -1
@@ -121,7 +121,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else, or missing without a default.
+            If the member is anything else, or is missing and has no default.
         """
         if name not in self.values and default is not None:
             return default
@@ -143,7 +143,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else.
+            If the member is anything else.
         """
         if name not in self.values:
             return None
@@ -166,7 +166,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else, or missing without a default.
+            If the member is anything else, or is missing and has no default.
         """
         if name not in self.values and default is not None:
             return default
@@ -181,7 +181,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else.
+            If the member is anything else.
         """
         value = self.values.get(name, default)
         if type(value) is not str:
@@ -194,7 +194,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else.
+            If the member is anything else.
         """
         value = self.values.get(name, default)
         if type(value) is not bool:
@@ -207,7 +207,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else.
+            If the member is anything else.
         """
         if name not in self.values:
             return None
@@ -222,7 +222,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is not a list; its items are checked when they are used.
+            If the member is not a list; its items are checked when they are used.
         """
         items = self.values.get(name, [])
         if type(items) is not list:
@@ -235,7 +235,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it is something else; see ``index``.
+            If the member is anything else; see ``index``.
         """
         items = self.values.get(name, [])
         if type(items) is not list:
@@ -259,7 +259,7 @@ class Element:
         Raises
         ------
         FormatError
-            If it, or the list of extensions, is not an object.
+            If the extension or the member ``extensions`` is not an object.
         """
         extensions = self.part("extensions")
         return None if extensions is None else extensions.part(name)
@@ -287,7 +287,7 @@ class Table:
         return len(self.items)
 
     def __getitem__(self, index: int) -> Element:
-        """Return an item; raises FormatError if it is not an object, IndexError after the last."""
+        """Return an item; raises FormatError if it is no object, IndexError past the end."""
         values = self.items[index]
         pointer = f"{self.pointer}/{index}"
         if type(values) is not dict:

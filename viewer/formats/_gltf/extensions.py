@@ -1,4 +1,4 @@
-"""Extensions of glTF that are read, and messages about the others."""
+"""Supported extensions of glTF, and messages about others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _CHARACTERS = (
     "VRMC_vrm",
     "VRMC_vrm_animation",
 )
-# Those of materials and textures are named by the readers of these.
+# The readers of materials and textures list their own extensions.
 _ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
 _WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
 
@@ -36,7 +36,7 @@ KNOWN = frozenset((*GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS, *_WITHOUT_EFFECT)
 
 
 def check_extensions(document: Document) -> None:
-    """Refuse a document that requires an unknown extension, and note optional ones once.
+    """Refuse a document that requires an unknown extension; report unknown optional ones once.
 
     Raises
     ------

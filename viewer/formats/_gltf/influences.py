@@ -13,7 +13,7 @@ __all__ = ["read_influences"]
 def read_influences(attributes: Attributes) -> tuple[Ints, Floats] | tuple[None, None]:
     """Return joints (V, K) int32 and weights (V, K), as stored; None if there are none.
 
-    Joints of weight 0 are 0, as files may contain any number there.
+    Joint indices of weight 0 are set to 0, because files may contain any number in these slots.
 
     Raises
     ------
@@ -37,12 +37,12 @@ def read_influences(attributes: Attributes) -> tuple[Ints, Floats] | tuple[None,
         return None, None
     all_weights = np.concatenate(weights, axis=1)
     all_joints = np.where(all_weights == 0.0, 0, np.concatenate(joints, axis=1))
-    # Indices are at most 65535 in valid files; others are found when the skin is known.
+    # Indices are at most 65535 in valid files; larger ones are reported with the skin.
     return np.minimum(all_joints, np.iinfo(np.int32).max).astype(np.int32), all_weights
 
 
 def _finite(attributes: Attributes, number: int, weights: Floats) -> Floats:
-    """Return weights, with 0 instead of those that are not finite if errors are kept."""
+    """Return weights; non-finite ones become 0 if errors are kept, else raise FormatError."""
     bad = ~np.isfinite(weights)
     if bad.any():
         row, column = (int(axis[0]) for axis in np.nonzero(bad))

@@ -1,4 +1,4 @@
-"""JSON of a glTF file: a text that may be hostile, and real files' deviations from the standard."""
+"""Parser of a glTF file's JSON, which may be hostile or deviate from the standard."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["parsed"]
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MOST_BYTES = 512 << 20  # parsing takes three times as much memory
-_THOROUGH = 1 << 20  # characters below which repeated keys are always looked for
+_THOROUGH = 1 << 20  # shorter texts are always searched for repeated keys
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -30,12 +30,12 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     data : bytes
         UTF-8 text, possibly padded.
     has_lines : bool
-        Whether the text is the whole file, so that errors have a line.
+        Whether the text is the whole file, so that errors have a line number.
 
     Raises
     ------
     FormatError
-        If it is not a valid JSON object.
+        If the text is not a valid JSON object.
     """
     if len(data) > _MOST_BYTES:
         raise source.fault("F001.gltf-text", most=_MOST_BYTES, size=len(data))
@@ -54,7 +54,7 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
             repeated.extend(key for key, count in counts.items() if count > 1)
         return values
 
-    # Looking for repeated keys takes half as long as parsing.
+    # The search for repeated keys takes half as long as parsing.
     looks = len(text) < _THOROUGH or source.diagnostics.keeps_errors
     hook = unique if looks else None
     decoder = json.JSONDecoder(object_pairs_hook=hook, parse_constant=constant)
@@ -66,7 +66,7 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
         raise source.fault("F002.gltf-json", place, reason=reason, at=problem.pos) from None
     except RecursionError:
         raise source.fault("F002.json-nesting") from None
-    except ValueError:  # the only other error that decoding raises
+    except ValueError:  # raised only for numbers with too many digits
         raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
     if type(root) is not dict:
         raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))
@@ -80,9 +80,9 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
 
 
 def _remove_nulls(root: dict[str, Any]) -> int:
-    """Remove members that are null, which some exporters write instead of leaving them out.
+    """Remove null members, which some exporters write instead of omitting them.
 
-    Returns their number. Application data are left as they are.
+    Returns their number. Application data are left unchanged.
     """
     count = 0
     left: list[Any] = [root]
@@ -107,6 +107,6 @@ def _text(source: Source, data: bytes) -> str:
     try:
         return data.decode()
     except UnicodeDecodeError as problem:
-        # Names in another encoding are only shown; keys are ASCII.
+        # Only names can be in another encoding, and they are only displayed; keys are ASCII.
         source.warn("G001.text", at=problem.start)
         return data.decode(errors="replace")

@@ -21,7 +21,7 @@ _INTERPOLATIONS: dict[str, Interpolation] = {
 }
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
-_TINY = 1e-12  # length of a quaternion that has no direction
+_TINY = 1e-12  # shorter quaternions have no direction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ def read_times(document: Document, sampler: Element) -> Floats:
     Raises
     ------
     FormatError
-        If there are none, or they are malformed, not finite or not in ascending order.
+        If the times are missing, malformed, not finite or not in ascending order.
     """
     accessor = sampler.index("input", len(document.accessors), "accessors")
     if accessor < 0:
@@ -71,16 +71,16 @@ def read_keys(
     sampler : Element
         A sampler.
     times : (N,)
-        Times of the keys; of several keys at the same time, the last one counts.
+        Times of the keys; of several keys at one time, only the last is used.
     path : str
-        Property that it moves.
+        Property that the sampler animates.
     n_shapes : int
         Number of weights per key.
 
     Raises
     ------
     FormatError
-        If the values are malformed, too many or too few, not finite, or not rotations.
+        If the values are malformed, not finite, of the wrong number, or not rotations.
     """
     names = tuple(_INTERPOLATIONS)
     interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
@@ -92,7 +92,7 @@ def read_keys(
     per_key = 3 if interpolation == "cubic" else 1
     expected = len(times) * per_key * width
     if rows.size != expected:
-        # In elements of the accessor: vectors, or single weights.
+        # Counted in elements of the accessor: vectors, or single weights.
         raise _wrong_count(sampler, expected // rows.shape[1], len(rows), len(times))
     keys = rows.reshape(len(times), per_key, width)
     _check_finite(sampler, keys)
@@ -104,7 +104,7 @@ def read_keys(
 
 
 def _without_equal(keys: Keys) -> Keys:
-    """Return keys with the last of those at the same time, as exporters repeat the final key."""
+    """Return the last of several keys at one time, because exporters repeat the final key."""
     is_kept = np.append(np.diff(keys.times) > 0.0, True)
     if is_kept.all():
         return keys
@@ -129,7 +129,7 @@ def _is_whole(document: Document, accessor: int) -> bool:
 
 
 def _rotations(sampler: Element, keys: Floats, is_whole: bool) -> Floats:
-    """Return quaternions of unit length; splines between floating-point keys are kept exactly."""
+    """Return quaternions of unit length; splines with floating-point keys are left unchanged."""
     middle = keys.shape[1] // 2
     lengths = np.linalg.norm(keys[:, middle], axis=1)
     if (lengths < _TINY).any():

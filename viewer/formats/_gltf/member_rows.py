@@ -1,4 +1,4 @@
-"""Rows of numbers that many objects of a document have, read together."""
+"""Members of all objects in a table, read together as arrays."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NUMBERS = ({int}, {float}, {int, float})
 
 
 def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
-    """Return the objects that have a member, and its numbers.
+    """Return the objects that have a member, and the member's numbers.
 
     Parameters
     ----------
@@ -44,32 +44,32 @@ def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
     items = [table.items[place][name] for place in places]
     rows = _array(items, width)
     if rows is None:
-        # At least one is invalid: the slow way finds it.
+        # At least one member is invalid; reading them one by one finds it.
         for place in places:
             table[place].numbers(name, width)
     return np.array(places, dtype=np.int32), np.zeros((0, width)) if rows is None else rows
 
 
 def _array(items: list[Any], width: int) -> Floats | None:
-    """Return lists of numbers as an array, None if any is something else."""
+    """Return lists of numbers as an array; None if any item is anything else."""
     if set(map(type, items)) - {list} or set(map(len, items)) - {width}:
         return None
     if items and set(map(type, chain.from_iterable(items))) not in _NUMBERS:
         return None
     try:
         rows = np.array(items, dtype=np.float64).reshape(-1, width)
-    except OverflowError:  # a whole number beyond double precision
+    except OverflowError:  # a whole number beyond the range of double precision
         return None
     return rows if (np.abs(rows) <= LARGEST).all() else None
 
 
 def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
-    """Return a member that is an index below ``count`` for each object, -1 if missing: (N,).
+    """Return an index below ``count`` from a member of each object, -1 if it is missing: (N,).
 
     Raises
     ------
     FormatError
-        If a member is something else; see ``Element.index``.
+        If a member is anything else; see ``Element.index``.
     """
     result = np.full(len(table), -1, dtype=np.int32)
     for place, values in enumerate(table.items):

@@ -31,7 +31,7 @@ _MODES = range(7)
 
 @dataclass(slots=True)
 class _Reading:
-    """What is known about all meshes while they are read."""
+    """State shared by all meshes while they are read."""
 
     document: Document
     users: Counter[int]
@@ -48,8 +48,7 @@ def read_meshes(document: Document) -> tuple[NodeMesh, ...]:
     Raises
     ------
     FormatError
-        If a mesh is malformed, refers to missing vertices or data, or its positions are not
-        finite.
+        If a mesh is malformed, refers to missing vertices or data, or has non-finite positions.
     """
     table = document.table("meshes")
     reading = _Reading(document, _users(table))
@@ -100,7 +99,7 @@ def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
         reading.undrawn = reading.undrawn or primitive.pointer
         return None
     if not element.has("POSITION"):
-        # Valid: an extension that is not used here may provide the vertices.
+        # Valid: an unsupported extension may provide the vertices.
         element.warn("G002.no-positions")
         return None
     document = reading.document
@@ -121,7 +120,7 @@ def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
 
 
 def _used(triangles: Ints, count: int) -> tuple[Ints | None, Ints]:
-    """Return the vertices that triangles use, and the triangles with their new indices."""
+    """Return the vertices that triangles use, and the triangles with indices into them."""
     used = np.zeros(count, dtype=np.bool_)
     used[triangles] = True
     if used.all():

@@ -49,8 +49,8 @@ def read_nodes(source: Source) -> NodeFile:
     Raises
     ------
     FormatError
-        If it is invalid, refers to data outside its folder, or requires an extension that is not
-        supported. Errors without effect on what is shown are warnings.
+        If the file is invalid, refers to data outside its folder, or requires an unsupported
+        extension. Errors without visible effect are warnings.
     """
     document = open_document(source)
     _check_version(document)
@@ -84,17 +84,17 @@ def read_nodes(source: Source) -> NodeFile:
 def _without_empty(
     tree: NodeTree, skins: tuple[NodeSkin, ...]
 ) -> tuple[NodeTree, tuple[NodeSkin, ...]]:
-    """Return nodes and skins without the skins that have no joints, and references to them."""
+    """Return nodes and skins after removing skins without joints, and references to them."""
     is_kept = np.array([len(skin.joints) > 0 for skin in skins], dtype=np.bool_)
     if is_kept.all():
         return tree, skins
-    # The last entry is that of nodes without skin, whose index is -1.
+    # Nodes without a skin have the index -1, which selects the last entry.
     numbers = np.append(np.where(is_kept, np.cumsum(is_kept) - 1, -1), -1).astype(np.int32)
     return replace(tree, skins=numbers[tree.skins]), tuple(s for s in skins if len(s.joints))
 
 
 def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
-    """Return a mesh whose primitives without a material have this one."""
+    """Return a mesh with this material assigned to primitives that have none."""
     primitives = (
         replace(one, material=index) if one.material < 0 else one for one in mesh.primitives
     )
@@ -107,7 +107,7 @@ def _object(document: Document, name: str) -> dict[str, object]:
 
 
 def _check_version(document: Document) -> None:
-    """Refuse documents of another major version, or that need a later minor one."""
+    """Refuse documents that have another major version or require a later minor version."""
     asset = document.root.part("asset")
     if asset is None:
         document.root.warn("G001.no-asset")

@@ -17,11 +17,11 @@ from viewer.rig.geometry.rotation import (
 
 __all__ = ["Transforms", "node_transforms"]
 
-_UNIT = 1e-3  # deviation of a quaternion's length from 1 that is reported
-_TINY = 1e-12  # length of a quaternion that has no direction
+_UNIT = 1e-3  # larger deviations of a quaternion's length from 1 are reported
+_TINY = 1e-12  # shorter quaternions have no direction
 # Relative error of T R S compared with the matrix: the rounding of a few products in float32.
 _EXACT = 1e-6
-_LAST_ROW = 1e-5  # deviation of the last row from 0 0 0 1 that is rounding
+_LAST_ROW = 1e-5  # smaller deviations of the last row from 0 0 0 1 are rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -91,7 +91,7 @@ def _parents(table: Table) -> Ints:
 
 
 def _check_cycles(table: Table, parents: Ints) -> None:
-    """Refuse nodes that are their own ancestors; cut their cycles if errors are kept."""
+    """Refuse nodes that are their own ancestors; break the cycles if errors are kept."""
     members = cycle_members(parents)
     left = np.nonzero(members)[0].tolist()
     seen: set[int] = set()

@@ -12,7 +12,7 @@ __all__ = ["shown_roots"]
 
 
 def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
-    """Return the root nodes of the default scene, else of the first; all if there is none.
+    """Return the root nodes of the default scene or the first one; all if there are no scenes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Targets of animation channels: the nodes and the property that a channel moves."""
+"""Targets of animation channels: the nodes and the property that a channel animates."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Moved:
     Attributes
     ----------
     path : str
-        Entry of ``TRANSFORM_PATHS``; for anything else a name for messages.
+        Entry of ``TRANSFORM_PATHS``; for other targets, a name for messages.
     nodes : tuple of int
-        Nodes; empty if it has no visible effect.
+        Nodes that the channel animates; empty if it has no visible effect.
     """
 
     path: str
@@ -36,12 +36,12 @@ class Moved:
 
     @property
     def transform_path(self) -> TransformPath:
-        """The path of a channel that moves nodes."""
+        """Path of a channel that animates nodes."""
         return cast("TransformPath", self.path)
 
 
 class Targets:
-    """Nodes that channels can move.
+    """Nodes that channels can animate.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Targets:
         return len(self._meshes[mesh].target_names) if mesh >= 0 else 0
 
     def moves(self, node: Any, path: Any) -> bool:
-        """Return whether a node and a path, as in the file, name something that is shown."""
+        """Return whether a channel of this node and path, as in the file, has a visible effect."""
         if type(node) is not int or not 0 <= node < self._tree.n_nodes:
             return False
         return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
@@ -86,12 +86,12 @@ class Targets:
         return all(self.moves(node, path) for node, path in moved)
 
     def of(self, channel: Element) -> Moved:
-        """Return what a channel moves.
+        """Return the target of a channel.
 
         Raises
         ------
         FormatError
-            If it has no target, or refers to a missing node.
+            If the channel has no target, or refers to a missing node.
         """
         target = channel.part("target")
         if target is None:
@@ -103,7 +103,7 @@ class Targets:
         return Moved(path, (node,) if self.moves(node, path) else ())
 
     def _pointed(self, target: Element) -> Moved:
-        """Return what a pointer of KHR_animation_pointer refers to."""
+        """Return the target of a JSON pointer (KHR_animation_pointer)."""
         extension = target.extension("KHR_animation_pointer")
         pointer = "" if extension is None else extension.text("pointer")
         if match := _NODE_POINTER.fullmatch(pointer):

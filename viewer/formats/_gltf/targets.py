@@ -21,7 +21,7 @@ def n_targets(mesh: Element, primitives: Table) -> int:
     Raises
     ------
     FormatError
-        If its primitives have different numbers.
+        If its primitives have different numbers of targets.
     """
     counts = [len(primitives[place].table("targets")) for place in range(len(primitives))]
     for place, found in enumerate(counts):
@@ -38,7 +38,7 @@ def read_targets(attributes: Attributes, targets: Table) -> tuple[Floats | None,
     Raises
     ------
     FormatError
-        If they are malformed.
+        If the targets are malformed.
     """
     if not len(targets):
         return None, None
@@ -49,7 +49,7 @@ def read_targets(attributes: Attributes, targets: Table) -> tuple[Floats | None,
 
 
 def _offsets(attributes: Attributes, targets: Table, name: str) -> Floats | None:
-    """Return the offsets of one attribute; None if no target has it."""
+    """Return the offsets of one attribute; None if no target has that attribute."""
     used = [place for place in range(len(targets)) if targets[place].has(name)]
     if not used:
         return None
@@ -71,7 +71,7 @@ def shape_weights(mesh: Element, count: int) -> Floats:
     Raises
     ------
     FormatError
-        If they are not numbers.
+        If the weights are not numbers.
     """
     weights = mesh.numbers("weights")
     return np.zeros(count) if weights is None else _fitted(mesh, weights, count)
@@ -80,7 +80,7 @@ def shape_weights(mesh: Element, count: int) -> Floats:
 def node_weights(
     document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]
 ) -> dict[int, Floats]:
-    """Return the weights of nodes that override those of their meshes: (S,) each."""
+    """Return the weights by which nodes override those of their meshes: (S,) each."""
     nodes = document.table("nodes")
     return {
         node: _fitted(nodes[node], weights, len(meshes[tree.meshes[node]].target_names))
@@ -117,6 +117,6 @@ def _listed(element: Element) -> list[Any]:
 
 
 def _extra(values: Any, name: str) -> Any:
-    """Return application data of an object; None if there is none."""
+    """Return a member of an object's application data; None if it is missing."""
     extras = values.get("extras") if type(values) is dict else None
     return extras.get(name) if type(extras) is dict else None

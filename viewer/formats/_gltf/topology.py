@@ -29,11 +29,11 @@ def read_triangles(
     document : Document
         The document.
     primitive : Element
-        A primitive with a mode of ``TRIANGLES``.
+        A primitive whose mode is in ``TRIANGLES``.
     n_vertices : int
         Number of its vertices.
     decoded : (T, 3), optional
-        Triangles that were decoded elsewhere.
+        Triangles that are already decoded.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def _corners(document: Document, primitive: Element, n_vertices: int) -> Ints:
 def _checked(
     document: Document, primitive: Element, corners: NDArray[np.int64], n_vertices: int
 ) -> Ints:
-    """Return vertex indices, all of which exist: (N,) int32."""
+    """Return vertex indices after checking that all exist: (N,) int32."""
     if len(corners) and int(corners.max()) >= n_vertices:
         bad = corners >= n_vertices
         entry = int(bad.argmax())

@@ -13,7 +13,7 @@ from viewer.formats._references import referenced_path, refused_text
 
 __all__ = ["data_uri_bytes", "is_data_uri", "media_type", "uri_bytes", "uri_path"]
 
-_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # of two letters at least: C: is a drive
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # at least two letters, because C: is a drive
 _SHOWN = 60  # characters of a URI in messages
 
 
@@ -35,7 +35,7 @@ def uri_bytes(element: Element, most: int | None = None) -> bytes:
     element : Element
         The buffer or image.
     most : int, optional
-        Bytes needed of a data URI; more are not decoded.
+        Maximum number of bytes to decode from a data URI.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def uri_path(element: Element) -> Path:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name that is too long
+    except OSError:  # the name is too long
         return False
 
 
@@ -86,7 +86,7 @@ def data_uri_bytes(element: Element, most: int | None = None) -> bytes:
     Raises
     ------
     FormatError
-        If it is malformed.
+        If the URI is malformed.
     """
     uri = element.text("uri")
     comma = uri.find(",")

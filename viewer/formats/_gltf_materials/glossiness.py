@@ -8,7 +8,7 @@ scaled by 1 - max(specular) as the extension does, m is the root of
 
     D m² + (d (1 - max) / (1 - D) + s - 2 D) m + D - s = 0
 
-and 0 for s below D. The base colour is that of the diffuse colour for dielectrics, that of the
+and 0 for s below D. The base colour follows from the diffuse colour for dielectrics, and from the
 specular colour for metals.
 """
 
@@ -49,7 +49,7 @@ class Glossiness:
 
 
 def read_glossiness(document: Document, element: Element) -> Glossiness:
-    """Return what the extension states."""
+    """Return the factors and textures of the extension."""
     return Glossiness(
         bounded_rows(element, "diffuseFactor", (1.0, 1.0, 1.0, 1.0)),
         bounded_rows(element, "specularFactor", (1.0, 1.0, 1.0)),
@@ -99,7 +99,7 @@ def from_glossiness(stated: Glossiness, images: dict[int, DecodedImage]) -> dict
 def _converted(stated: Glossiness, diffuse: Bytes | None, specular: Bytes) -> tuple[Bytes, Bytes]:
     """Return images of the base colour, and of roughness (green) and metallic (blue).
 
-    Both have the size of the diffuse image, or that of the specular image without one.
+    Both have the size of the diffuse image or, if there is none, of the specular image.
     """
     whole = specular if diffuse is None else diffuse
     height, width = whole.shape[:2]

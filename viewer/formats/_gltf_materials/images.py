@@ -71,11 +71,11 @@ def decoded_images(document: Document, indices: Iterable[int]) -> dict[int, Deco
 
 
 def _encoded(document: Document, index: int) -> EncodedImage | None:
-    """Return an image still encoded; None with a warning if it is missing or unsupported."""
+    """Return an encoded image; None with a warning if it is missing or unsupported."""
     try:
         image = document.buffers.image(index)
     except FormatError as problem:
-        # The place of a missing file is the file; its name says more than the pointer.
+        # An error without a JSON pointer is about the image's own file, which it names.
         has_pointer = bool(problem.diagnostic.pointer)
         said = problem.diagnostic.message if has_pointer else _named(document, problem)
         document.source.warn("F005.gltf-image", f"/images/{index}", problem=said)

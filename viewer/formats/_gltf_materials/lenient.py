@@ -1,4 +1,4 @@
-"""Members whose errors are only warnings: a file with an invalid material can still be shown."""
+"""Members whose errors are only warnings, because the shape can still be shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Content = TypeVar("Content")
 
 
 def lenient(source: Source, read: Callable[[], Content], default: Content) -> Content:
-    """Return the result of a function; after an error, a default with a warning."""
+    """Return the result of a function; after an error, warn and return a default."""
     try:
         return read()
     except FormatError as problem:
@@ -29,7 +29,7 @@ def lenient(source: Source, read: Callable[[], Content], default: Content) -> Co
 def bounded(
     element: Element, name: str, default: float, low: float = 0.0, high: float = 1.0
 ) -> float:
-    """Return a member that is a number within limits; others are clamped with a warning."""
+    """Return a member that is a number; values outside the limits are clamped with a warning."""
     value = lenient(element.source, lambda: element.number(name, default), default)
     return _clamped(element, name, (value,), low, high)[0]
 
@@ -37,7 +37,7 @@ def bounded(
 def bounded_rows(
     element: Element, name: str, default: tuple[float, ...], high: float = 1.0
 ) -> tuple[float, ...]:
-    """Return a member that is a list of numbers from 0; others are clamped with a warning."""
+    """Return a member that is a list of numbers; outliers are clamped with a warning."""
     count = len(default)
     found = lenient(element.source, lambda: element.numbers(name, count), None)
     values = default if found is None else tuple(found.tolist())
@@ -45,7 +45,7 @@ def bounded_rows(
 
 
 def chosen(element: Element, name: str, choices: tuple[str, ...], default: str) -> str:
-    """Return a member that is one of several words; others are replaced with a warning."""
+    """Return a member that is one of several strings; others become the default with a warning."""
     word = lenient(element.source, lambda: element.text(name, default), default)
     if word in choices:
         return word
@@ -56,7 +56,7 @@ def chosen(element: Element, name: str, choices: tuple[str, ...], default: str) 
 def _clamped(
     element: Element, name: str, values: tuple[float, ...], low: float, high: float
 ) -> tuple[float, ...]:
-    """Return values within limits, with a warning if they were not."""
+    """Return values clamped to limits, with a warning if any was outside."""
     within = tuple(np.clip(values, low, high).tolist())
     if within != values:
         odd = next(place for place, value in enumerate(values) if value != within[place])

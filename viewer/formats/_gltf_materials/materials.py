@@ -2,7 +2,7 @@
 
 Read: all properties of the core specification, ``KHR_texture_transform``, ``KHR_materials_unlit``,
 ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived model
-``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated, see
+``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated; see
 ``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored
 with a warning, because the shape can still be shown.
 """
@@ -34,7 +34,7 @@ DRAWN_EXTENSIONS = (
 """Extensions of materials and textures that have an effect."""
 
 _WHITE = (1.0, 1.0, 1.0, 1.0)
-_LARGEST = 1e6  # factors beyond it have no visible effect, and their products no limit
+_LARGEST = 1e6  # larger factors look the same, but their products could overflow
 _FACTORED = (("normalTexture", "normal_texture"), ("occlusionTexture", "occlusion_texture"))
 _MODES = {mode.upper(): mode for mode in ALPHA_MODES}
 _NEUTRAL: dict[str, dict[str, Any]] = {
@@ -106,12 +106,12 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element, is_unlit: bool) -> _Stated:
-    """Return the properties of a material; ``is_unlit`` if an extension of the file says so."""
+    """Return the properties of a material; ``is_unlit``: whether VRM declares it unlit."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
     if surface is None:
-        # Files with both models state the core one as a substitute of equal content.
+        # In files with both models, the core one has the same content and takes precedence.
         extension = lenient(source, lambda: element.extension(_GLOSSINESS), None)
         glossiness = None if extension is None else read_glossiness(document, extension)
         surface = Element(source, {}, element.at("pbrMetallicRoughness"))
@@ -156,7 +156,7 @@ def _emissive(element: Element) -> tuple[float, ...]:
 
 
 def _material(stated: _Stated, images: dict[int, DecodedImage]) -> Material:
-    """Return a material with its textures; metallic is in blue, roughness in green."""
+    """Return a material with its textures: metallic in the blue channel, roughness in green."""
     textures = {name: slot.texture(images) for name, slot in stated.slots.items()}
     packed = textures.get("metallic_texture")
     if packed is not None:
@@ -169,7 +169,7 @@ def _material(stated: _Stated, images: dict[int, DecodedImage]) -> Material:
 
 
 def _report(document: Document, elements: list[Element], stated: list[_Stated]) -> None:
-    """Name the extensions that are approximated or not drawn, each once."""
+    """Report the extensions that are approximated or not drawn, each once."""
     source = document.source
     missing = Counter(name for element in elements for name in _not_drawn(element))
     for name, count in missing.items():
@@ -180,7 +180,7 @@ def _report(document: Document, elements: list[Element], stated: list[_Stated]) 
 
 
 def _not_drawn(element: Element) -> list[str]:
-    """Return the extensions of a material whose effect is not drawn."""
+    """Return the extensions of a material that are not drawn."""
     extensions = lenient(element.source, lambda: element.part("extensions"), None)
     found = {} if extensions is None else extensions.values
     return [
@@ -191,7 +191,7 @@ def _not_drawn(element: Element) -> list[str]:
 
 
 def _is_neutral(name: str, values: Any) -> bool:
-    """Return whether an extension has the values that have no effect."""
+    """Return whether the values of an extension have no effect."""
     if name not in _NEUTRAL or type(values) is not dict:
         return False
     return all(values.get(key, value) == value for key, value in _NEUTRAL[name].items())

@@ -23,7 +23,7 @@ _NEAREST, _LINEAR = 9728, 9729
 _MINIFIED = dict(zip((9728, 9729, 9984, 9985, 9986, 9987), MINIFICATIONS, strict=True))
 _READABLE = "EXT_texture_webp"
 _UNREADABLE = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
-_LARGEST = 1e6  # offsets and scales beyond this cannot resolve a texel in single precision
+_LARGEST = 1e6  # with larger offsets and scales, single precision cannot resolve texels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,14 +35,14 @@ class Slot:
     image : int
         Index of the image, -1 if there is none that can be read.
     placing : dict
-        Set, transform, wrap and filters of ``Texture``.
+        Texture coordinate set, transform, wrap modes and filters, as in ``Texture``.
     """
 
     image: int
     placing: dict[str, Any]
 
     def texture(self, images: dict[int, DecodedImage], channel: int = 0) -> Texture:
-        """Return the texture, which reads single numbers from a channel."""
+        """Return the texture; scalar properties are read from ``channel``."""
         image = images.get(self.image, DecodedImage(""))
         pixels, encoded = image.pixels, image.encoded
         return Texture(image.name, pixels, channel, encoded=encoded, **self.placing)
@@ -93,7 +93,7 @@ def _image(document: Document, texture: Element) -> int:
 
 
 def _sampled(document: Document, texture: Element) -> dict[str, Any]:
-    """Return the wrap modes and filters of a texture; by default it repeats smoothly."""
+    """Return the wrap modes and filters of a texture; by default it repeats, filtered linearly."""
     source, table = document.source, document.table("samplers")
     index = lenient(source, lambda: texture.index("sampler", len(table), "samplers"), -1)
     sampler = lenient(source, lambda: table[index], None) if index >= 0 else None
@@ -107,7 +107,7 @@ def _sampled(document: Document, texture: Element) -> dict[str, Any]:
 
 
 def _constant(sampler: Element, name: str, meanings: dict[int, str], default: str) -> str:
-    """Return the meaning of an OpenGL constant; the default, with a warning, if unknown."""
+    """Return the meaning of an OpenGL constant; the default, with a warning, if it is unknown."""
     if not sampler.has(name):
         return default
     value = lenient(sampler.source, lambda: sampler.whole(name), -1)
@@ -141,7 +141,7 @@ def _pair(extension: Element, name: str, default: float) -> Floats:
 def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     """Return a texture transform with v = 0 at the bottom: F T(offset) R(-angle) S(scale) F.
 
-    F flips v: glTF puts v = 0 at the first row of the image. The transform is that of
+    F flips v: glTF puts v = 0 at the first row of the image. The transform follows
     KHR_texture_transform, whose rotation is counter-clockwise as seen on the image.
 
     Parameters

@@ -5,8 +5,7 @@
     VRM 1.0  materials[i].extensions.VRMC_materials_mtoon
     VRM 0.x  extensions.VRM.materialProperties[i].shader: "VRM/MToon", "VRM/UnlitTexture", …
 
-Exporters write base colour, texture and opacity to the core material too; they are those of the
-lit side.
+Exporters also write the lit side's base colour, texture and opacity to the core material.
 """
 
 from __future__ import annotations
@@ -24,12 +23,12 @@ _UNLIT = "VRM/Unlit"
 
 
 def unlit_by_vrm(document: Document, elements: list[Element]) -> frozenset[int]:
-    """Return the materials that VRM declares toon shaded or unlit, with a note about toon shading.
+    """Return the materials that VRM declares toon-shaded or unlit; report toon shading.
 
     Parameters
     ----------
     document : Document
-        The opened file, which receives the note.
+        The opened file, which records a note.
     elements : list of Element
         Its materials.
     """

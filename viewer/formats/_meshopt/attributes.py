@@ -5,12 +5,14 @@
     stream  header byte, block…, padding, tail
     block   up to 256 elements; version 1: 2 control bits per byte of an element; data per byte
     data    2 header bits per group of 16 elements, group…
-    group   16 deltas of 0, 1, 2, 4 or 8 bits; a delta with all bits set follows as a whole byte
+    group   16 deltas of 0, 1, 2, 4 or 8 bits; a delta with all bits set is an escape: its byte
+    follows
     tail    first element, version 1: a mode for every 4 bytes of an element
 
-The place of a group depends on the contents of those before it. Their sizes are therefore computed
-for all places at once, so that finding the groups is one look-up each; then all groups of a size
-are decoded together. Specification: Khronos Group, KHR_meshopt_compression, appendix A.
+The position of a group depends on the contents of the groups before it. Group sizes are therefore
+computed for all positions at once, so that finding each group takes one look-up; then all groups
+with the same number of bits are decoded together. Specification: Khronos Group,
+KHR_meshopt_compression, appendix A.
 """
 
 from __future__ import annotations
@@ -33,28 +35,28 @@ _ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
 _BITS = ((0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8))
 # The four group modes in a byte of header bits.
 _MODES = tuple(tuple(byte >> shift & 3 for shift in (0, 2, 4, 6)) for byte in range(256))
-_PADDING = (32, 24)  # least size of the tail, by version
+_PADDING = (32, 24)  # minimum size of the tail, by version
 
 
 @dataclass(slots=True)
 class _Groups:
-    """Groups that are not zero, with the same number of bits per delta."""
+    """Groups with the same number of bits per delta, above 0."""
 
     starts: list[int] = field(default_factory=list)
-    """Their places in the stream."""
+    """Their positions in the stream."""
     places: list[int] = field(default_factory=list)
-    """Their places in the result, in groups."""
+    """Their positions in the result, in groups."""
 
 
 def decoded_attributes(data: Bytes, count: int, stride: int) -> Bytes | None:
-    """Return decoded elements, one after the other: (count * stride,) uint8.
+    """Return the decoded elements, stored consecutively: (count * stride,) uint8.
 
     Parameters
     ----------
     data : (M,) uint8
         The stream.
     count, stride : int
-        Number of elements and bytes of each, a multiple of 4.
+        Number of elements, and bytes per element, a multiple of 4.
 
     Returns
     -------
@@ -111,7 +113,7 @@ def _scan(
     found: dict[int, _Groups],
     literals: list[tuple[int, int, int]],
 ) -> int:
-    """Find all groups and return where they end; raises IndexError after the end of the stream."""
+    """Find all groups and return where they end; raises IndexError past the end of the stream."""
     count, stride, version, block = layout
     sizes = _sizes(data)
     stream = data.tobytes()
@@ -144,7 +146,7 @@ def _find_groups(
     n_groups: int,
     table: list[tuple[bytes, _Groups | None]],
 ) -> int:
-    """Find the groups of one byte of the elements of a block, and return where they end."""
+    """Find the groups of one byte position in a block's elements, and return where they end."""
     n_headers = -(-n_groups // 4)
     headers = stream[place : place + n_headers]
     place += n_headers
@@ -159,7 +161,7 @@ def _find_groups(
 
 
 def _sizes(data: Bytes) -> dict[int, bytes]:
-    """Return the size that a group has if it begins at a byte, by its bits per delta."""
+    """Return the size of a group that begins at each byte, by its bits per delta."""
     result = {0: bytes(len(data)), 8: bytes([_GROUP]) * len(data)}
     for bits in (1, 2, 4):
         packed = 2 * bits

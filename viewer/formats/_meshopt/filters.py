@@ -17,7 +17,7 @@ FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
 
 
 def filtered(data: Bytes, name: str, stride: int) -> Bytes:
-    """Return elements after a filter.
+    """Return elements with a filter applied.
 
     Parameters
     ----------
@@ -40,19 +40,19 @@ def filtered(data: Bytes, name: str, stride: int) -> Bytes:
 
 
 def _stored(values: Floats, like: NDArray[np.integer]) -> Bytes:
-    """Return integers rounded to the nearest, halves away from zero, as bytes."""
+    """Return values as the bytes of integers, rounded to nearest with halves away from zero."""
     rounded = np.trunc(values + np.copysign(0.5, values))
     limits = np.iinfo(like.dtype)
     return np.clip(rounded, limits.min, limits.max).astype(like.dtype).view(np.uint8).reshape(-1)
 
 
 def _octahedral(rows: NDArray[np.signedinteger]) -> Bytes:
-    """Return unit vectors of points on an octahedron that was folded into a square."""
-    # Damaged data may contain 0 where the value of 1 is stored.
+    """Return the unit vectors of octahedral coordinates."""
+    # The third component stores the value of 1, which damaged data may set to 0.
     one = np.where(rows[:, 2] == 0, 1, rows[:, 2]).astype(np.float64)
     x, y = rows[:, 0] / one, rows[:, 1] / one
     z = 1.0 - np.abs(x) - np.abs(y)
-    # The lower half of the octahedron was folded outwards.
+    # The lower half of the octahedron is folded outwards.
     fold = np.maximum(-z, 0.0)
     vectors = np.stack([x - np.copysign(fold, x), y - np.copysign(fold, y), z], axis=1)
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -73,18 +73,18 @@ def _quaternions(rows: NDArray[np.signedinteger]) -> Bytes:
 
 
 def _exponential(values: NDArray[np.signedinteger]) -> Bytes:
-    """Return floats of 8 bits of exponent and 24 bits of mantissa, both signed."""
+    """Return floats from an exponent of 8 bits and a mantissa of 24 bits, both signed."""
     exponents, mantissas = values >> 24, values << 8 >> 8
     return np.ldexp(mantissas.astype(np.float64), exponents).astype("<f4").view(np.uint8)
 
 
 def _colors(rows: NDArray[np.unsignedinteger]) -> Bytes:
-    """Return colours of luma and two differences; the bits in use follow from alpha."""
+    """Return colours from luma and two chroma differences; alpha determines the number of bits."""
     signed = rows.astype(np.dtype(f"<i{rows.dtype.itemsize}")).astype(np.int64)
     alpha = rows[:, 3].astype(np.int64)
     luma = rows[:, 0].astype(np.int64)
     orange, green = signed[:, 1], signed[:, 2]
-    # The highest bit set in alpha is one above its own bits.
+    # The highest set bit of alpha is a marker; the bits below it are alpha's own.
     bits = np.frexp(np.maximum(alpha, 1).astype(np.float64))[1]
     most = (1 << bits) - 1
     own = alpha & most >> 1

@@ -17,12 +17,12 @@ _TRIANGLES, _INDICES = 0xE1, 0xD1  # first bytes of the streams
 _TABLE = 16  # bytes of the table at the end of triangles
 _TAIL = 4  # bytes at the end of indices
 _WRAP = 0xFFFFFFFF
-_MOST_BYTES = 5  # of a number with 7 bits in each byte
-_KEPT = 1 << 16  # entries of a queue before its beginning is dropped; 16 are in use
+_MOST_BYTES = 5  # maximum length of a number with 7 bits per byte
+_KEPT = 1 << 16  # entries of a queue before its oldest ones are dropped; 16 are in use
 
 
 class _Numbers:
-    """Data of the triangles that do not fit into one byte."""
+    """Data of triangles whose code does not fit into one byte."""
 
     __slots__ = ("data", "last", "place")
 
@@ -35,7 +35,7 @@ class _Numbers:
         return value
 
     def index(self) -> int:
-        """Return the next index, stored as the difference from the one before."""
+        """Return the next index, stored as the difference from the previous one."""
         value = shift = 0
         for _ in range(_MOST_BYTES):
             byte = self.byte()
@@ -51,14 +51,14 @@ class _Numbers:
 
 
 def decoded_triangles(data: Bytes, count: int, stride: int) -> Bytes | None:
-    """Return decoded vertex indices of triangles: (count * stride,) uint8.
+    """Return the decoded vertex indices of triangles: (count * stride,) uint8.
 
     Parameters
     ----------
     data : (M,) uint8
         The stream.
     count, stride : int
-        Number of indices and bytes of each, 2 or 4.
+        Number of indices, and bytes per index, 2 or 4.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def _corners(codes: bytes, numbers: _Numbers, table: bytes) -> list[int]:
 
 
 def _free(numbers: _Numbers, kind: int) -> int:
-    """Return the third vertex next to the last one, or a stored one."""
+    """Return a third vertex: adjacent to the last one, or a stored one."""
     if kind == 15:
         return numbers.index()
     numbers.last = numbers.last + (1 if kind == 14 else -1) & _WRAP
@@ -154,7 +154,8 @@ def decoded_indices(data: Bytes, count: int, stride: int) -> Bytes | None:
     numbers = _varints(data[1:-_TAIL], count)
     if numbers is None:
         return None
-    # Each index is the difference from the last one with the same lowest bit.
+    # Each index is stored as the difference from one of two previous ones, chosen by the lowest
+    # bit.
     second = (numbers & 1).astype(np.bool_)
     steps = numbers >> 2 ^ -(numbers >> 1 & 1)
     sums = [np.cumsum(np.where(second == kind, steps, 0)) for kind in (False, True)]
@@ -163,7 +164,7 @@ def decoded_indices(data: Bytes, count: int, stride: int) -> Bytes | None:
 
 
 def _varints(data: Bytes, count: int) -> NDArray[np.int64] | None:
-    """Return numbers of 7 bits per byte, of which all but the last have the eighth bit set."""
+    """Return numbers stored as 7 bits per byte; all bytes but the last have the eighth bit set."""
     ends = np.nonzero(data < 128)[0]
     if len(ends) != count or (count and ends[-1] != len(data) - 1) or (not count and len(data)):
         return None

@@ -1,1 +1,1 @@
-"""Files that describe a tree of nodes (glTF, FBX): contents, and figures made from them."""
+"""Files that describe a tree of nodes (glTF, FBX): their contents, and conversion to figures."""

@@ -21,10 +21,10 @@ __all__ = ["Bindings", "bind_rigid", "bind_skins", "inverse_binds"]
 
 # float32 rounding of the entries of a product of two matrices, relative to the largest
 _SAME = 1e-6
-# Matrices that are worse conditioned are not inverted: baking would lose more digits.
+# Worse conditioned matrices are not inverted, because baking would lose too many digits.
 _WORST_CONDITION = 1e5
 _MOST_CANDIDATES = 8
-# A first A that is closer to the identity is omitted: the vertices keep the numbers of the file.
+# If the first A is closer to the identity, the vertices keep the file's coordinates.
 _NEARLY_SCENE = 1e-3
 
 
@@ -35,7 +35,7 @@ class Bindings:
     Attributes
     ----------
     joints : Joints
-        Receives auxiliary joints.
+        The figure's joints; auxiliary ones are appended.
     worlds : (J, 4, 4)
         Rest transforms of the nodes' joints.
     matrices : dict of (4, 4)
@@ -62,14 +62,14 @@ def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
     Parameters
     ----------
     joints : Joints
-        Extended by auxiliary joints where skins disagree.
+        Auxiliary joints are appended where skins disagree.
     skins : dict of NodeSkin
-        By index in the file, in the order in which they take precedence.
+        By index in the file, in order of precedence.
 
     Returns
     -------
     Bindings
-        Of the skins.
+        Bindings of the skins.
     """
     bindings = Bindings(joints, rest_worlds(joints))
     for index, skin in skins.items():
@@ -131,7 +131,7 @@ def _rest_space(rests: Floats) -> Floats:
 
 
 def _baked_at_rest(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
-    """Return A of a skin without common joints: both are compared in the rest pose."""
+    """Return A of a skin that shares no bound joint: the skins are compared in the rest pose."""
     first = next(iter(bindings.matrices))
     space = _inverse_or_none(bindings.worlds[first] @ bindings.matrices[first])
     rests = bindings.worlds[slots] @ inverse_bind
@@ -155,7 +155,7 @@ def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
     Parameters
     ----------
     bindings : Bindings
-        Extended by the nodes.
+        Bindings of the nodes are added.
     nodes : list of int
         Nodes with such a mesh.
     """
@@ -219,7 +219,7 @@ def inverse_binds(bindings: Bindings) -> Floats:
 
 
 def _all_worlds(bindings: Bindings) -> Floats:
-    """Return the rest transforms of all joints: added ones coincide with their parents."""
+    """Return the rest transforms of all joints; auxiliary joints coincide with their parents."""
     parents = list(range(len(bindings.worlds)))
     for parent in bindings.joints.parents[len(parents) :]:
         parents.append(parents[parent])
@@ -227,7 +227,7 @@ def _all_worlds(bindings: Bindings) -> Floats:
 
 
 def _agree(one: Floats, other: Floats, reach: float) -> bool:
-    """Return whether two matrices are equal within float32 rounding; translations of ``reach``."""
+    """Return whether two matrices agree within float32 rounding of translations up to ``reach``."""
     linear, moved = np.abs(one - other)[:3, :3].max(), np.abs(one - other)[:3, 3].max()
     return bool(linear <= _SAME * np.abs(one[:3, :3]).max() and moved <= _SAME * reach)
 
@@ -242,7 +242,7 @@ def _is_identity(matrix: Floats) -> bool:
 
 
 def _inverse(matrices: Floats) -> Floats:
-    """Return the inverses of affine matrices, whose last rows stay exact: (..., 4, 4)."""
+    """Return the inverses of affine matrices, with exact last rows: (..., 4, 4)."""
     inverses = np.zeros_like(matrices)
     inverses[..., 3, 3] = 1.0
     inverses[..., :3, :3] = np.linalg.inv(matrices[..., :3, :3])

@@ -1,7 +1,7 @@
-"""Contents of a file of nodes as returned by its reader, before figures are created.
+"""Contents of a file of nodes, as its reader returns them before figures are created.
 
-Nothing is converted: names, transforms, weights and keys are those of the file, in its unit and
-axes. Readers guarantee that indices are valid, numbers are finite, and the parents form a forest.
+Nothing is converted: names, transforms, weights and keys are as in the file, in its unit and axes.
+Readers guarantee that indices are valid, numbers are finite, and the parents form a forest.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ class NodeTree:
         Local transform T R S; unit quaternions (x, y, z, w).
     matrices : dict of (4, 4)
         Local matrices of nodes that shear and therefore cannot be expressed as T R S. Their rows in
-        the three arrays above are those of the identity.
+        the three arrays above hold the identity.
     meshes, skins, cameras : (N,) int32
-        Index of each node's mesh, skin and camera, -1 for none.
+        Indices of each node's mesh, skin and camera, -1 for none.
     shape_weights : dict of (S,)
         Morph target weights of the nodes that override those of their mesh.
     extras, extensions : dict
@@ -99,7 +99,7 @@ class Primitive:
     normal_targets : (S, V, 3) or None
         Offsets of the normals; None if the file has none.
     pointer : str
-        JSON pointer to it; empty in other files.
+        JSON pointer to it; empty for files without JSON.
     """
 
     positions: Floats
@@ -205,7 +205,7 @@ class NodeAnimation:
     read : callable
         Returns the channels; called at most once, may raise a ``FormatError``.
     pointer : str
-        JSON pointer to it; empty in other files.
+        JSON pointer to it; empty for files without JSON.
     """
 
     name: str
@@ -249,9 +249,9 @@ class NodeExpression:
     binds : tuple of (int, int, float)
         Node, morph target of its mesh, and the weight of that target at weight 1.
     is_binary : bool
-        Whether it is either fully on or off.
+        Whether it is always either fully on or off.
     kind : str
-        Key of ``PROCEDURAL``; empty for others.
+        Key of ``PROCEDURAL``; empty for other expressions.
     overrides : dict of str
         Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
     """
@@ -270,7 +270,7 @@ class NodeFile:
     Attributes
     ----------
     name : str
-        The file's stem.
+        The file's name without its suffix.
     tree : NodeTree
         All nodes.
     roots : tuple of int
@@ -294,11 +294,11 @@ class NodeFile:
     constraints : tuple of Constraint
         Nodes (instead of joints) that follow others, in the order of evaluation.
     part_views : dict of PartView
-        The views for which the meshes of some nodes are meant.
+        The views in which the meshes of some nodes are drawn.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
     has_pointers : bool
-        Whether elements have JSON pointers, ``/nodes/3`` for instance.
+        Whether elements have JSON pointers, such as ``/nodes/3``.
     """
 
     name: str

@@ -17,7 +17,7 @@ def facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]
     Parameters
     ----------
     file : NodeFile
-        Its asset.
+        The file, whose asset information is reported.
     pieces : list of Piece
         The primitives of the figure.
     """

@@ -35,9 +35,9 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     Parameters
     ----------
     file : NodeFile
-        As read.
+        The contents, as read.
     source : Source
-        Receives notes.
+        Records notes.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def _is_skinned(file: NodeFile, node: int) -> bool:
 
 
 def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Refuse a file whose meshes, repeated by many nodes, would fill the memory."""
+    """Refuse a file whose meshes, repeated at many nodes, would exhaust the memory."""
     sizes = [sum(len(p.positions) for p in mesh.primitives) for mesh in file.meshes]
     meshes = (int(file.tree.meshes[node]) for members in groups for node in members.meshes)
     count = sum(sizes[mesh] for mesh in meshes)
@@ -99,7 +99,7 @@ def _check_vertices(file: NodeFile, groups: list[Members], source: Source) -> No
 
 
 def _note_normals(pieces: list[Piece], source: Source) -> None:
-    """Record which primitives have no normals, and how many vertices flat shading adds."""
+    """Report primitives without normals, and the number of vertices that flat shading adds."""
     split = [piece for piece in pieces if piece.shading == "flat"]
     added = sum(piece.n_vertices - len(piece.primitive.positions) for piece in split)
     if added:
@@ -110,7 +110,7 @@ def _note_normals(pieces: list[Piece], source: Source) -> None:
 
 
 def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Record skins that the file deforms by another method than LBS, which is chosen by hand."""
+    """Report skins that the file deforms by a method other than LBS, which the user selects."""
     used = (file.skins[skin] for members in groups for skin in members.skins)
     others: dict[str, list[str]] = {}
     for skin in used:
@@ -121,7 +121,7 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights, at the first of them."""
+    """Record sums of weights that are not 1, and vertices without weights, at the first one."""
     odd = [piece for piece in pieces if piece.influences.n_deviating]
     if odd:
         n = sum(piece.influences.n_deviating for piece in odd)
@@ -134,6 +134,6 @@ def _note_weights(pieces: list[Piece], source: Source) -> None:
 
 
 def _weights_of(piece: Piece) -> str | None:
-    """Return the JSON pointer to the weights of a primitive; None without one."""
+    """Return the JSON pointer to the weights of a primitive; None if there is none."""
     pointer = piece.primitive.pointer
     return f"{pointer}/attributes/WEIGHTS_0" if pointer else None

@@ -10,15 +10,15 @@ from viewer.rig.mesh import triangle_areas, vertex_normals
 __all__ = ["flat_shaded"]
 
 _MOST_TRIANGLES = 200_000
-# Cells per unit of a normal's components: faces closer than half a degree share a normal.
+# Grid cells per unit of normal components: faces within half a degree share a normal.
 _CELLS = 128
 
 
 def flat_shaded(positions: Floats, triangles: Ints) -> tuple[Ints, Ints, Floats, bool]:
-    """Split vertices between faces of different direction.
+    """Split vertices between faces with different normals.
 
     Coplanar faces keep a common vertex, so a cube has 24 vertices. Large primitives are shaded
-    smoothly instead: they would have up to six times as many vertices.
+    smoothly instead, because they could become six times as large.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def flat_shaded(positions: Floats, triangles: Ints) -> tuple[Ints, Ints, Floats,
     Returns
     -------
     sources : (R,) int32
-        Vertex of which each split vertex is a copy; vertices without triangles are kept.
+        Original of each split vertex; vertices without triangles are kept.
     triangles : (T, 3) int32
         Indices into the split vertices.
     normals : (R, 3)

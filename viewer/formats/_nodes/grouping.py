@@ -12,8 +12,8 @@ from viewer.rig.arrays import Bools, Ints
 
 __all__ = ["Members", "group_nodes", "is_skinned", "scene_order"]
 
-_MOST_TREES = 16  # maximum number of root trees of rigid meshes that are separate figures
-_MOST_COPIES = 4  # times the number of nodes: joints of all figures that share ancestors
+_MOST_TREES = 16  # maximum number of separate figures made from root trees of rigid meshes
+_MOST_COPIES = 4  # maximum number of joints of all figures, relative to the number of nodes
 
 
 @dataclass(slots=True, eq=False)
@@ -25,7 +25,7 @@ class Members:
     nodes : list of int
         Nodes that become joints, parents first.
     skins : list of int
-        Skins of the figure; those of meshes come first, in the order of the meshes.
+        Skins of the figure; skins of meshes come first, in the order of the meshes.
     meshes : list of int
         Nodes whose meshes are parts of the figure, in tree order.
     name : str
@@ -46,15 +46,15 @@ def is_skinned(mesh: NodeMesh, skin: int) -> bool:
 def group_nodes(file: NodeFile) -> list[Members]:
     """Return the figures of a file, in the order of their first node.
 
-    Skins that share a joint, or of which one has a joint below a joint of another, belong to one
-    figure. Meshes without a skin belong to the figure that has their node or an ancestor as a
+    Skins belong to one figure if they share a joint, or if one has a joint below a joint of the
+    other. Meshes without a skin belong to the figure that has their node or an ancestor as a
     joint; the others form one figure per root tree, or a single figure if the file has no skins.
     A file without meshes and skins is one figure of its animated nodes, or of all its nodes.
 
     Parameters
     ----------
     file : NodeFile
-        As read.
+        The contents, as read.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def scene_order(file: NodeFile) -> list[int]:
 
 
 class _Grouping:
-    """Work in progress: the figures so far, by a key."""
+    """State of the division: the figures found so far, by key."""
 
     def __init__(self, file: NodeFile) -> None:
         self.file, self.tree = file, file.tree
@@ -91,7 +91,7 @@ class _Grouping:
         self.same = list(range(len(file.skins)))
         self.owners = self._owners()
         self.figures: dict[tuple[str, int], Members] = {}
-        # Nodes of each figure that must be joints; their ancestors follow.
+        # Nodes of each figure that must be joints; their ancestors are added later.
         self.wanted: dict[tuple[str, int], set[int]] = {}
 
     def result(self) -> list[Members]:
@@ -128,7 +128,7 @@ class _Grouping:
         return [*used] + [n for n in rest if all(j in self.place for j in skins[n].joints.tolist())]
 
     def _owners(self) -> dict[int, int]:
-        """Return a skin for each node that is a joint or lies below one, and join the skins."""
+        """Return a skin for each node that is a joint or below one; unite skins of one figure."""
         of_node: dict[int, list[int]] = {}
         for skin in self.skins:
             for node in self.file.skins[skin].joints.tolist():
@@ -196,7 +196,7 @@ class _Grouping:
         return any(self.parents[node] >= 0 for node in self._bare())
 
     def _close(self) -> None:
-        """Add the ancestors of all joints; too many figures become one."""
+        """Add the ancestors of all joints; merge figures if there are too many."""
         trees = [key for key in self.figures if key[0] == "root"]
         if len(trees) > _MOST_TREES:
             self._merge(trees)
@@ -230,7 +230,7 @@ class _Grouping:
         return sorted(found, key=self.place.__getitem__)
 
     def _trimmed(self, nodes: list[int], wanted: set[int]) -> list[int]:
-        """Return the nodes without topmost ones that have no effect."""
+        """Return the nodes, except for topmost ones without effect."""
         children: dict[int, int] = {}
         for node in nodes:
             above = self.parents[node]
@@ -287,7 +287,7 @@ def _drawn_meshes(file: NodeFile) -> set[int]:
 
 
 def _preorder(tree: NodeTree, tops: Iterable[int]) -> list[int]:
-    """Return the nodes of some trees, each before its children, which are in file order."""
+    """Return the nodes of some trees in preorder, with children in file order."""
     order = np.argsort(tree.parents, kind="stable")
     starts = np.searchsorted(tree.parents[order], np.arange(tree.n_nodes + 1)).tolist()
     # Reversed, so that the first child is taken from the stack first.

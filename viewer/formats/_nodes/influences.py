@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Influences", "divided", "of_rows", "on_joint"]
 
-_NO_SUM = 1e-12  # smaller sums of weights cannot be scaled to 1
+_NO_SUM = 1e-12  # smaller sums of weights are not scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,9 +25,9 @@ class Influences:
     joints, weights : (N,) int32, (N,)
         Joint of the figure and weight of each; the weights of a vertex sum to 1.
     deviation : float
-        Largest deviation of a sum from 1 before the division.
+        Largest deviation of a sum of weights from 1 before normalisation.
     n_deviating : int
-        Number of sums farther from 1 than the rounding of 8-bit weights.
+        Number of sums that deviate by more than the rounding of 8-bit weights.
     n_unbound : int
         Number of vertices without any weight.
     """
@@ -41,27 +41,27 @@ class Influences:
 
 
 def on_joint(n_vertices: int, joint: int) -> Influences:
-    """Return influences of vertices that follow one joint rigidly."""
+    """Return the influences of vertices that follow one joint rigidly."""
     counts, joints = np.ones(n_vertices, np.int32), np.full(n_vertices, joint, np.int32)
     return Influences(counts, joints, np.ones(n_vertices))
 
 
 def divided(primitive: Primitive, slots: Ints) -> Influences:
-    """Return a skinned primitive's influences, divided by their sums (glTF 2.0, 3.7.3.1).
+    """Return a skinned primitive's influences, normalised to sums of 1 (glTF 2.0, 3.7.3.1).
 
     A vertex without weights follows the joint of its first slot, as in Blender and three.js.
 
     Parameters
     ----------
     primitive : Primitive
-        With (V, K) joints and weights.
+        A primitive with (V, K) joints and weights.
     slots : (M,) int32
         Joint of the figure for each joint of the skin.
 
     Returns
     -------
     Influences
-        Influences without the slots whose weight is 0.
+        Influences whose weight is not 0.
     """
     assert primitive.joints is not None and primitive.weights is not None
     weights = primitive.weights.astype(np.float64)
@@ -85,7 +85,7 @@ def divided(primitive: Primitive, slots: Ints) -> Influences:
 
 
 def of_rows(influences: Influences, rows: Ints) -> Influences:
-    """Return the influences of some vertices, or of copies of them, in the order given."""
+    """Return the influences of the given vertices, which may repeat."""
     starts = np.concatenate([[0], np.cumsum(influences.counts)])
     counts = influences.counts[rows]
     firsts = np.concatenate([[0], np.cumsum(counts)])

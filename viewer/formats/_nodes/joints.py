@@ -1,4 +1,4 @@
-"""Joints made from nodes, with auxiliary joints for nodes that shear or have a second binding."""
+"""Joints made from nodes, with auxiliary joints for shear and second bindings."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class Joints:
     names, parents, translations, rotations, scales : list
         As in ``Skeleton``.
     own : dict of int
-        Joint of each node: the one that its animation moves.
+        Joint of each node, which its animation moves.
     carrier : dict of int
-        Joint with the whole transform of each node, which children and meshes follow; an
-        auxiliary joint below its own if the node shears.
+        Joint with the whole transform of each node, which children and meshes follow: the node's
+        own joint, or an auxiliary one below it if the node shears.
     """
 
     nodes: list[int] = field(default_factory=list)
@@ -65,7 +65,7 @@ class Joints:
         return len(self.nodes) - 1
 
     def add_auxiliary(self, parent: int, rotation: Floats = _NO_ROTATION) -> int:
-        """Append a joint that the file does not have, at the origin of its parent."""
+        """Append a joint without a node, at the origin of its parent."""
         return self.add(-1, "", parent, np.zeros(3), rotation, np.ones(3))
 
 
@@ -84,7 +84,7 @@ def make_joints(tree: NodeTree, nodes: list[int]) -> Joints:
     Returns
     -------
     Joints
-        One per node, and the auxiliary ones of nodes that shear.
+        One joint per node, and auxiliary joints of nodes that shear.
     """
     joints = Joints()
     parents = tree.parents.tolist()
@@ -115,7 +115,7 @@ def _add_sheared(joints: Joints, node: int, name: str, parent: int, matrix: Floa
 
 
 def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return rotations U, V^T and factors S with U S V^T = M; a reflection is in a negative factor.
+    """Return rotations U, V^T and factors S with U S V^T = M; reflections have a negative factor.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def rest_worlds(joints: Joints) -> Floats:
-    """Return the rest transforms of all joints, to figure space: (J, 4, 4)."""
+    """Return the joint-to-figure matrices of the rest pose: (J, 4, 4)."""
     local = np.zeros((len(joints.nodes), 4, 4))
     local[:, 3, 3] = 1.0
     local[:, :3, 3] = joints.translations
@@ -152,22 +152,22 @@ def skeleton_of(
     humanoid: Mapping[str, int] | None = None,
     constraints: Iterable[Constraint] = (),
 ) -> Skeleton:
-    """Return the skeleton: every joint of the file is a ball joint about its rest.
+    """Return the skeleton: every joint of the file is a ball joint about its rest pose.
 
     Parameters
     ----------
     joints : Joints
-        The joints.
+        Joints of the figure.
     humanoid : mapping of str to int, optional
-        Node of each human bone; those that are no joints of this figure are ignored.
+        Node of each human bone; nodes that are not joints of this figure are ignored.
     constraints : iterable of Constraint
-        Constraints between nodes; those of other figures are ignored.
+        Constraints between nodes; constraints of other figures are ignored.
 
     Returns
     -------
     Skeleton
-        With J joints, of which the auxiliary ones have no DOFs, and those that follow others
-        locked ones; the others have no limits.
+        Skeleton of J joints. Auxiliary joints have no DOFs, constrained joints have locked DOFs,
+        and all other DOFs have no limits.
     """
     is_auxiliary = np.array(joints.nodes) < 0
     balls = np.flatnonzero(~is_auxiliary).astype(np.int32)
@@ -179,7 +179,7 @@ def skeleton_of(
         for each in constraints
         if each.joint in joints.own and each.source in joints.own
     )
-    # A pose has no effect on a joint that follows another.
+    # A pose has no effect on constrained joints.
     is_free = ~np.isin(balls, [each.joint for each in followers])
     limits = np.where(np.repeat(is_free, 3)[:, None], [-np.inf, np.inf], 0.0)
     return Skeleton(

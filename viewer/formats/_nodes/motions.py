@@ -1,4 +1,4 @@
-"""Animations of a file of nodes, as those of its figures."""
+"""Conversion of a file's animations to animations of its figures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Reader: TypeAlias = Callable[[], tuple[NodeChannel, ...]]
 
 
 def read_once(animations: tuple[NodeAnimation, ...]) -> list[Reader]:
-    """Return functions that return the channels of each animation, which are read only once."""
+    """Return a function per animation that returns its channels, which are read only once."""
     return [_once(animation.read) for animation in animations]
 
 
@@ -51,7 +51,7 @@ def animations_of(
     Parameters
     ----------
     animations : tuple of NodeAnimation
-        Those of the file.
+        The file's animations.
     readers : list of callable
         From ``read_once``; shared by all figures.
     joints : mapping of int
@@ -75,7 +75,7 @@ def animations_of(
 def _bound(
     readers: list[Reader], joints: Mapping[int, int], columns: Mapping[int, Ints]
 ) -> list[Callable[[], tuple[TransformChannel, ...]]]:
-    """Return functions that return the channels of one figure."""
+    """Return a function per animation that returns the channels of one figure."""
 
     def bound(read: Reader) -> Callable[[], tuple[TransformChannel, ...]]:
         def channels() -> tuple[TransformChannel, ...]:
@@ -83,7 +83,7 @@ def _bound(
             for number, channel in enumerate(read()):
                 moved = _channel(channel, joints, columns)
                 if moved is not None:
-                    # Nodes that share blend shapes have equal keys: one channel is enough.
+                    # Nodes that share blend shapes have equal keys, so one channel is enough.
                     shapes = None if moved.shapes is None else moved.shapes.tobytes()
                     found.setdefault((moved.path, shapes or number), moved)
             return tuple(found.values())
@@ -102,7 +102,7 @@ def _clip(
 def _channel(
     channel: NodeChannel, joints: Mapping[int, int], columns: Mapping[int, Ints]
 ) -> TransformChannel | None:
-    """Return a channel of a joint or of blend shapes; None if it moves another figure."""
+    """Return the channel of a joint or of blend shapes; None if it moves another figure."""
     is_shape = channel.path == "weights"
     if channel.node not in (columns if is_shape else joints):
         return None

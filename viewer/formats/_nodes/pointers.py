@@ -1,4 +1,4 @@
-"""JSON pointers to the elements of the file that the parts of a figure come from."""
+"""JSON pointers to the elements of a file from which a figure was made."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def remember_pointers(
     joints: Joints,
     pieces: list[Piece],
 ) -> None:
-    """Let a source find nodes, joints of skins and primitives; files without pointers have none.
+    """Register the JSON pointers of nodes, skin joints and primitives, if the file has any.
 
     Parameters
     ----------
     source : Source
         The file.
     skeleton : Skeleton
-        That of the figure.
+        The figure's skeleton.
     file : NodeFile
         Its contents.
     members : Members
@@ -65,7 +65,7 @@ def remember_pointers(
 
 
 def _joint(file: NodeFile, members: Members, node: int, kind: str) -> str:
-    """Return the pointer of a joint's node, or of its place in a skin; empty if it is auxiliary."""
+    """Return the pointer to a joint's node, or to its entry in a skin; empty if it is auxiliary."""
     if node < 0:
         return ""
     for index in members.skins if kind == "bindings" else ():

@@ -1,4 +1,4 @@
-"""Application data and names of a file of nodes that a figure keeps to be written back."""
+"""Application data and names of a file of nodes, kept by a figure to be written back."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def record_of(
     Parameters
     ----------
     file : NodeFile
-        Its asset, nodes and meshes.
+        The file, with its asset, nodes and meshes.
     joints : Joints
         The joints of the figure.
     nodes : list of int

@@ -19,10 +19,10 @@ __all__ = ["blend_shapes_of", "shape_columns"]
 
 
 def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> dict[int, Ints]:
-    """Return the blend shape of each morph target of each node.
+    """Return the blend shapes that correspond to each node's morph targets.
 
-    Nodes share their blend shapes if they have the same names of targets, the same default weights,
-    and the same keys in all animations: they are parts of one face. Only animations of such nodes
+    Nodes are parts of one face and share their blend shapes if they have the same target names, the
+    same default weights, and the same keys in all animations. Only animations of such nodes
     are read.
 
     Parameters
@@ -32,12 +32,12 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     nodes : list of int
         Nodes with a mesh.
     readers : list of callable
-        Return the channels of each animation.
+        Functions that return the channels of each animation.
 
     Returns
     -------
     dict of (S,) int32
-        Of the nodes with morph targets.
+        Blend shapes by node, for nodes with morph targets.
     """
     shaped = [node for node in nodes if _mesh(file, node).target_names]
     looks = {node: _look(file, node) for node in shaped}
@@ -47,7 +47,7 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     count = 0
     for node in shaped:
         names = _mesh(file, node).target_names
-        # Targets without names could be anything.
+        # Targets without names need not correspond.
         is_alone = counts[looks[node]] == 1 or not all(names)
         key = (node,) if is_alone else (*looks[node], _keys(file, node, readers))
         if key not in known:
@@ -63,7 +63,7 @@ def _look(file: NodeFile, node: int) -> tuple[tuple[str, ...], tuple[float, ...]
 
 
 def _keys(file: NodeFile, node: int, readers: list[Reader]) -> tuple[object, ...]:
-    """Return all keys of a node's morph targets, to be compared."""
+    """Return all keys of a node's morph targets in a form that can be compared."""
     found: list[object] = []
     for number, (animation, read) in enumerate(zip(file.animations, readers, strict=True)):
         if node not in animation.nodes:
@@ -71,7 +71,7 @@ def _keys(file: NodeFile, node: int, readers: list[Reader]) -> tuple[object, ...
         try:
             channels = read()
         except FormatError:
-            # The animation is refused when it is played; until then its keys are unknown.
+            # The error is raised when the animation is played; until then its keys are unknown.
             return (node,)
         for channel in channels:
             if channel.node == node and channel.path == "weights":
@@ -128,7 +128,7 @@ def blend_shapes_of(
         names=(*names, *(each.name for each in mixed)),
         offsets=offsets(of_normals=False),
         groups=("morph",) * shape[0],
-        # In glTF, a target without normals keeps them; flat normals follow the surface.
+        # In glTF, a target without normals leaves them unchanged; flat normals follow the surface.
         normal_offsets=offsets(of_normals=True) if has_normals else None,
         rest_weights=np.array([*(target.weight for target in targets), *(0.0 for _ in mixed)]),
         rules=_rules(mixed, len(targets)) if mixed else None,
@@ -138,14 +138,14 @@ def blend_shapes_of(
 def _expressions(
     file: NodeFile, columns: dict[int, Ints], n_targets: int
 ) -> tuple[list[NodeExpression], Floats]:
-    """Return the expressions of this figure, and each as a sum of its S morph targets: (E, S)."""
+    """Return the figure's expressions, and their weights of its S morph targets: (E, S)."""
     found: list[NodeExpression] = []
     sums: list[Floats] = []
     for each in file.expressions:
         row = np.zeros(n_targets)
         for node, index, weight in each.binds:
             if node in columns:
-                # Nodes that share a target are bound one by one.
+                # An expression binds each of the nodes that share a target.
                 column = columns[node][index]
                 row[column] = max(row[column], weight, key=abs)
         if row.any():
@@ -172,7 +172,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Name, name with that of its part, and default weight of a morph target."""
+    """Name, name including its part's, and default weight of a morph target."""
 
     name: str
     full_name: str
@@ -191,7 +191,7 @@ def _offsets(
 ) -> Floats:
     """Return the offsets of all vertices, or of their normals, in binding space: (S + E, V, 3).
 
-    ``sums`` (E, S): the expressions, which follow the S morph targets.
+    ``sums`` (E, S): weights of the expressions, which follow the S morph targets.
     """
     offsets = np.zeros((sums.shape[1], count, 3))
     first = 0

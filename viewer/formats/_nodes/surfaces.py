@@ -25,17 +25,17 @@ class Piece:
     Attributes
     ----------
     node, part : int
-        Its node, and the index of its part.
+        Node of the mesh, and index of the figure's part.
     primitive : Primitive
         As in the file.
     baked : (4, 4)
         Mesh space to binding space.
     influences : Influences
-        Of the V vertices.
+        Influences of the V vertices.
     sources : (V,) int32
-        Vertex of the primitive of which each vertex is a copy: flat shading splits vertices.
+        Vertex of the primitive that each vertex copies, because flat shading splits vertices.
     triangles : (T, 3) int32
-        Of the piece's vertices, counter-clockwise from outside in binding space.
+        Indices of the piece's vertices, counter-clockwise from outside in binding space.
     normals : (V, 3)
         Mesh space.
     shading : "file", "flat" or "smooth"
@@ -68,7 +68,7 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
     nodes : list of int
         Nodes with a mesh; each is a part.
     bindings : Bindings
-        Of all their skins, and of the nodes themselves where a skin does not move their mesh.
+        Bindings of all their skins, and of nodes whose mesh no skin moves.
     """
     pieces = []
     for part, node in enumerate(nodes):
@@ -89,7 +89,7 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
 def _piece(
     node: int, part: int, primitive: Primitive, baked: Floats, influences: Influences
 ) -> Piece:
-    """Return one piece; triangles that a reflection reverses are turned over again."""
+    """Return one piece; triangles that a reflection reverses are flipped back."""
     sources = np.arange(len(primitive.positions), dtype=np.int32)
     triangles, normals, shading = primitive.triangles, primitive.normals, "file"
     if normals is None:
@@ -104,13 +104,13 @@ def _piece(
 
 
 def _counted_as(split: Influences, whole: Influences) -> Influences:
-    """Return the influences of split vertices, with the findings about the file's vertices."""
+    """Return the influences of split vertices, with the statistics of the file's vertices."""
     found = whole.deviation, whole.n_deviating, whole.n_unbound
     return Influences(split.counts, split.joints, split.weights, *found)
 
 
 def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
-    """Return the mesh of a figure; attributes of only some primitives get neutral values elsewhere.
+    """Return the mesh of a figure; primitives without an attribute get neutral values.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _part_views(file: NodeFile, nodes: list[int]) -> tuple[PartView, ...]:
 
 
 def part_name(file: NodeFile, node: int) -> str:
-    """Return the name of a node's part: that of the node, or of its mesh."""
+    """Return the name of a node's part: the node's name, or else its mesh's."""
     return file.tree.names[node] or file.meshes[int(file.tree.meshes[node])].name
 
 
@@ -171,7 +171,7 @@ def _normals(piece: Piece) -> Floats:
 
 
 def normal_matrix(piece: Piece) -> Floats:
-    """Return A^-1, with which rows of normals are multiplied: n' = A^-T n. (3, 3)."""
+    """Return A^-1, (3, 3), which multiplies rows of normals: n' = A^-T n."""
     return np.asarray(np.linalg.inv(piece.baked[:3, :3]), dtype=np.float64)
 
 

@@ -15,8 +15,8 @@ from viewer.rig.geometry.rotation import nearest_rotations
 __all__ = ["views_of"]
 
 _HEIGHT = 1080  # pixels
-_ASPECT = 16.0 / 9.0  # of a camera that leaves it to the window
-# From x right, y up, z backwards to x right, y down, z forward.
+_ASPECT = 16.0 / 9.0  # of cameras that use the window's aspect ratio
+# Converts x right, y up, z backwards to x right, y down, z forward.
 _TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 
 
@@ -32,12 +32,12 @@ def views_of(
     order : list of int
         Nodes of the scene, parents first.
     cameras : tuple of NodeCamera
-        Those of the file.
+        The file's cameras.
 
     Returns
     -------
     views : tuple of CameraView
-        In the space of the scene.
+        Cameras in the space of the scene.
     left_out : list of str
         Names of the orthographic cameras.
     """
@@ -70,7 +70,7 @@ def _with_ancestors(tree: NodeTree, order: list[int], nodes: list[int]) -> list[
 
 
 def _view(name: str, world: Floats, vertical_angle: float, aspect: float) -> CameraView:
-    """Return a view with square pixels; scales above the camera do not matter."""
+    """Return a view with square pixels; scales of its ancestors are ignored."""
     size = max(1, round(_HEIGHT * aspect)), _HEIGHT
     focal = 0.5 * _HEIGHT / math.tan(0.5 * vertical_angle)
     rotation = _TO_OPENCV @ nearest_rotations(world[:3, :3])[0].T

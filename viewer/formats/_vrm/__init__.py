@@ -1,1 +1,1 @@
-"""VRM 0.x and 1.0: what these glTF files say about a humanoid character."""
+"""VRM 0.x and 1.0: properties of humanoid characters in glTF files."""

@@ -35,7 +35,7 @@ __all__ = ["EXTENSION", "read_motion"]
 
 EXTENSION = "VRMC_vrm_animation"
 _MOST_FRAMES = 1_000_000
-_ON_FRAME = 1e-6  # fraction of a frame
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame
 
 
 def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
@@ -44,15 +44,15 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     Parameters
     ----------
     file : NodeFile
-        With the extension.
+        A file with the extension.
     source : Source
-        Receives messages about invalid bones and what is not used.
+        Records messages about invalid bones and unused contents.
 
     Raises
     ------
     FormatError
-        If there is no animation of a human bone, its keys are invalid, or it is longer than a
-        million frames.
+        If no human bone is animated, or the animation has invalid keys or more than a million
+        frames.
     """
     pointer = f"/extensions/{EXTENSION}"
     told = file.extensions[EXTENSION]
@@ -85,7 +85,7 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
 def _moving(
     file: NodeFile, read: Reader, nodes: list[int], humanoid: dict[str, int] | None = None
 ) -> tuple[Figure, TransformClip]:
-    """Return a skeleton of some nodes, and how the first animation moves it."""
+    """Return a skeleton made of some nodes, and its motion in the first animation."""
     joints = make_joints(file.tree, nodes)
     figure = Figure(
         file.name,
@@ -128,7 +128,7 @@ def _weights(file: NodeFile, told: object, read: Reader, times: Floats) -> dict[
     if not nodes:
         return {}
     order = list(dict.fromkeys(nodes.values()))
-    # Without their ancestors: the weight is the local translation.
+    # Ancestors are ignored, because the weight is the local translation.
     figure, clip = _moving(file, read, order)
     moved = frames_of(figure, clip, times).translations
     places = np.array([file.tree.translations[node] for node in order]) + moved

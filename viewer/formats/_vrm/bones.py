@@ -1,4 +1,4 @@
-"""Nodes of human bones, as VRM files state them."""
+"""Nodes of human bones in VRM files."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def read_humanoid(
     Parameters
     ----------
     source : Source
-        Receives messages about invalid bones, which are ignored.
+        Records messages about invalid bones, which are ignored.
     file : NodeFile
-        Its nodes.
+        The file, with its nodes.
     told : mapping
         The extension with the humanoid.
     version : int
         0 or 1.
     pointer : str
-        Place of the extension.
+        JSON pointer to the extension.
     """
     bones = part(told, "humanoid", "humanBones")
     given: list[tuple[Any, Any]] = []

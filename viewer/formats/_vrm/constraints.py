@@ -41,7 +41,7 @@ def read_constraints(tree: NodeTree, source: Source) -> tuple[Constraint, ...]:
     tree : NodeTree
         Nodes with their extensions.
     source : Source
-        Receives messages.
+        Records messages.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def _pointer(node: int) -> str:
 
 
 def _constraint(tree: NodeTree, node: int, told: Any) -> Constraint | str:
-    """Return the constraint of a node, or what was expected."""
+    """Return the constraint of a node, or a description of the expected value."""
     kinds = [kind for kind in _KINDS if part(told, kind) is not None]
     if len(kinds) != 1:
         return "one of roll, aim and rotation"
@@ -93,11 +93,12 @@ def _constraint(tree: NodeTree, node: int, told: Any) -> Constraint | str:
 def _ordered(
     tree: NodeTree, found: dict[int, Constraint], source: Source
 ) -> tuple[Constraint, ...]:
-    """Return constraints after those on which they depend (depth first)."""
+    """Return the constraints, each after those on which it depends (depth first)."""
     needed = {node: _needed(tree, found, each) for node, each in found.items()}
     ordered: dict[int, Constraint] = {}
     for first in found:
-        # The path from the first constraint to the current one, and what is left to visit there.
+        # The path from the first constraint to the current one, each with dependencies still to
+        # visit.
         path = {first: iter(needed[first])} if first not in ordered else {}
         while path:
             node = next(reversed(path))
@@ -118,7 +119,7 @@ def _needed(tree: NodeTree, found: dict[int, Constraint], each: Constraint) -> l
     """Return the constrained nodes on which a constraint depends."""
     if each.kind != "aim":
         return [each.source] if each.source in found else []
-    # The places of both nodes follow their ancestors, not their own rotations.
+    # The positions of both nodes depend on their ancestors, not on their own rotations.
     above = [*_ancestors(tree, each.joint), *_ancestors(tree, each.source)]
     return [node for node in dict.fromkeys(above) if node in found]
 

@@ -1,4 +1,4 @@
-"""Parts that are drawn from the eyes of the character only, or from outside only."""
+"""Parts that are drawn only from the character's eyes, or only from outside."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _VIEWS: dict[str, PartView] = {
 def read_part_views(
     file: NodeFile, told: Mapping[str, Any], version: int, pointer: str, source: Source
 ) -> dict[int, PartView]:
-    """Return the view for which each annotated node's mesh is meant.
+    """Return the view in which each annotated node's mesh is drawn.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ def read_part_views(
         0 annotates meshes (``firstPersonFlag: "FirstPersonOnly"``), 1 nodes
         (``type: "firstPersonOnly"``).
     pointer : str
-        Place of the extension.
+        JSON pointer to the extension.
     source : Source
-        Receives messages about invalid annotations, which are ignored.
+        Records messages about invalid annotations, which are ignored.
     """
     listed = part(told, "firstPerson", "meshAnnotations")
     found: dict[int, PartView] = {}
@@ -56,7 +56,7 @@ def read_part_views(
 
 
 def _nodes(file: NodeFile, each: Any, version: int) -> list[int]:
-    """Return the nodes with the mesh that is annotated."""
+    """Return the nodes whose mesh is annotated."""
     if version == 0:
         mesh = part(each, "mesh")
         has_mesh = is_index(mesh, len(file.meshes))

@@ -1,4 +1,4 @@
-"""Access to nested properties of parsed JSON that may have any form."""
+"""Access to nested properties of parsed JSON of any structure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["is_index", "part"]
 
 
 def part(told: Any, *names: str) -> Any:
-    """Return a nested property; None if it is missing or something else on the way.
+    """Return a nested property; None if it is missing or a value on the way is not an object.
 
     Parameters
     ----------

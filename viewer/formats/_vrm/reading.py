@@ -27,7 +27,7 @@ __all__ = ["with_vrm"]
 
 _PERCENT = 100.0
 _OVERRIDES = {"mouth": "overrideMouth", "blink": "overrideBlink", "look": "overrideLookAt"}
-# Heading for each property, under its names in versions 1.0 and 0.x.
+# Heading of each property, and the property's names in versions 1.0 and 0.x.
 _META = {
     "title": ("name", "title"),
     "authors": ("authors", "author"),
@@ -46,18 +46,18 @@ _META = {
     "political or religious use": ("allowPoliticalOrReligiousUsage",),
     "antisocial use": ("allowAntisocialOrHateUsage",),
 }
-_LONGEST = 200  # characters of a property
+_LONGEST = 200  # maximum number of characters of a property
 
 
 def with_vrm(file: NodeFile, source: Source) -> NodeFile:
-    """Return a file with what its VRM extensions say about its characters, if any.
+    """Return a file with the humanoid, expressions and constraints of its VRM extensions, if any.
 
     Parameters
     ----------
     file : NodeFile
         As read by the glTF reader.
     source : Source
-        Receives messages.
+        Records messages.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
 
 
 def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
-    """Return facts about the parts for one view only, and the constraints."""
+    """Return facts about parts that are drawn in one view only, and about constraints."""
     names = file.tree.names
     shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
     facts = [
@@ -103,7 +103,7 @@ def _shortened(text: str) -> str:
 def _expressions(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> tuple[NodeExpression, ...]:
-    """Return the expressions that bind morph targets; say which change materials only."""
+    """Return the expressions that bind morph targets; report those that only change materials."""
     if version == 0:
         groups = part(told, "blendShapeMaster", "blendShapeGroups")
         named = [(each.get("name"), each) for each in groups or () if isinstance(each, dict)]

@@ -12,14 +12,14 @@ _EXTENSION = "VRMC_springBone"
 
 
 def note_springs(file: NodeFile, source: Source) -> None:
-    """Say once how many spring chains are not simulated.
+    """Report the number of spring chains, which are not simulated.
 
     Parameters
     ----------
     file : NodeFile
-        Its extensions. In version 0, every bone of a group starts a chain.
+        The file, with its extensions. In version 0, every bone of a group starts a chain.
     source : Source
-        Receives the note.
+        Records the note.
     """
     springs = part(file.extensions, _EXTENSION, "springs")
     count = len(springs) if isinstance(springs, list) else 0

@@ -17,16 +17,16 @@ class Constraint:
     Attributes
     ----------
     joint : int
-        Joint that is rotated; what a pose says about its rotation has no effect.
+        Joint that is rotated; its rotation in a pose has no effect.
     source : int
         Joint that determines the rotation.
     kind : str
-        ``"roll"`` takes over the source's rotation about one axis, ``"rotation"`` all of it, and
+        ``"roll"`` copies the source's rotation about one axis, ``"rotation"`` copies all of it, and
         ``"aim"`` points an axis at the source.
     axis : (float, float, float)
         Unit vector in the joint's own axes; unused by ``"rotation"``.
     weight : float
-        0 leaves the joint in its rest pose, 1 rotates it completely.
+        0 leaves the joint in its rest pose, 1 applies the full rotation.
     """
 
     joint: int

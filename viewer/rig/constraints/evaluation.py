@@ -1,12 +1,12 @@
 """Evaluation of constraints: rotations of joints that follow other joints.
 
-With the rest rotations r and current rotations q of source s and joint j, quaternions relative to
-their parents, a constraint of weight w sets ``q_j = slerp(r_j, target, w)``, where ``target`` is
+With the rest rotations r and current rotations q of source s and joint j, as quaternions relative
+to their parents, a constraint of weight w sets ``q_j = slerp(r_j, target, w)``, where ``target`` is
 
 - rotation: ``r_j r_s^-1 q_s``;
 - roll: ``r_j twist(d, axis)``, where ``d = r_j^-1 q_s r_s^-1 r_j`` is the source's rotation from
-  its rest pose in the joint's axes, and its twist the part about the axis that is left when the
-  smallest rotation of the axis is taken out;
+its rest pose in the joint's axes, and its twist is the part about the axis (swing-twist
+decomposition);
 - aim: ``p^-1 arc(p r_j axis, direction) p r_j``, where p is the world rotation of the parent, and
   the arc is the smallest rotation from the axis to the direction of the source.
 
@@ -48,7 +48,8 @@ def constrained(
 ) -> Floats:
     """Return the rotations of joints with all constraints applied, in the skeleton's order.
 
-    The result depends on no rotation of a constrained joint, so applying it twice changes nothing.
+    The result does not depend on the rotations of constrained joints, so the function is
+    idempotent.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ def _world(
 
 
 def _twist(rotation: Floats, axis: Floats) -> Floats:
-    """Return the part of a rotation about an axis; none after half a rotation across it."""
+    """Return the twist of a rotation about an axis; the identity if it is undefined."""
     along = (rotation[..., :3] @ axis)[..., None] * axis
     found, length = _unit(np.concatenate([along, rotation[..., 3:]], axis=-1))
     return np.where(length > _SHORT, found, _NONE)
@@ -128,7 +129,7 @@ def _twist(rotation: Floats, axis: Floats) -> Floats:
 def _arc(start: Floats, end: Floats) -> Floats:
     """Return the smallest rotation from one unit vector to another: (..., 4)."""
     across = np.cross(start, end)
-    # Opposite vectors: half a rotation about any perpendicular axis.
+    # Opposite vectors: rotate by 180 degrees about any perpendicular axis.
     other = np.cross(start, np.eye(3)[np.abs(start).argmin(axis=-1)])
     scalar = 1.0 + np.einsum("...a,...a->...", start, end)[..., None]
     found, _ = _unit(np.concatenate([across, scalar], axis=-1))
@@ -137,7 +138,7 @@ def _arc(start: Floats, end: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> tuple[Floats, Floats]:
-    """Return unit vectors, and the lengths, with a last axis of 1."""
+    """Return unit vectors, and lengths with a last axis of size 1."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.maximum(length, _SHORT), length
 

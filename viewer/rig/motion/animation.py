@@ -1,4 +1,4 @@
-"""Named animations of a figure, whose keys are read when they are first played."""
+"""Named animations of a figure, whose keys are read on first playback."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Animation"]
 
 
 class Animation:
-    """One of the animations of a figure.
+    """An animation of a figure.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class Animation:
     read : callable
         Returns the keys; called at most once, may raise a ``FormatError``.
     place : str
-        Where the file has it, as a JSON pointer; empty if unknown.
+        JSON pointer to it in the file; empty if unknown.
     """
 
     __slots__ = ("_clip", "_read", "end", "name", "place", "start")
@@ -41,7 +41,7 @@ class Animation:
         self._clip: TransformClip | None = None
 
     def plays(self, clip: object) -> bool:
-        """Return whether a motion is that of this animation."""
+        """Return whether a motion is the one of this animation."""
         return clip is not None and clip is self._clip
 
     def clip(self) -> TransformClip:

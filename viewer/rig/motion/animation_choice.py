@@ -1,4 +1,4 @@
-"""Choice of one of a figure's animations by name or number, and its start."""
+"""Selection of a figure's animation by name or number, and its start."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from viewer.rig.scene import Actor, figure_pose
 __all__ = ["NONE", "animation_labels", "chosen_animation", "counterpart", "play_animation"]
 
 NONE = "none"
-"""Name that stands for no animation."""
+"""Name that selects no animation."""
 
 
 def animation_labels(figure: Figure) -> tuple[str, ...]:
-    """Return a different label for each animation: its name, or its number if it has none.
+    """Return a unique label for each animation: its name, or its number if it has none.
 
     >>> from viewer.rig.mesh import Mesh
     >>> named = [Animation(name, 0.0, 1.0, lambda: None) for name in ("walk", "", "walk")]
@@ -39,15 +39,15 @@ def animation_labels(figure: Figure) -> tuple[str, ...]:
 
 
 def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None:
-    """Return the animation that a text names.
+    """Return the animation selected by a text.
 
     Parameters
     ----------
     figures : sequence of Figure
-        Figures with animations; numbers refer to the figure that has the most.
+        Figures with animations; numbers refer to the figure with the most animations.
     wanted : str
-        A name or label, compared exactly and then without case; a number from 1; ``NONE``; or
-        empty for the first animation.
+        A name or label, matched exactly or else ignoring case; a number from 1; ``NONE``; or an
+        empty text for the first animation.
 
     Returns
     -------
@@ -85,10 +85,10 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
 
 
 def counterpart(figure: Figure, animation: Animation) -> int:
-    """Return the index of a figure's own part of an animation of its file, -1 if it has none.
+    """Return the index of a figure's counterpart of another figure's animation, -1 if it has none.
 
-    Figures of one file have animations of the same names; of several with one name, the range
-    decides.
+    Figures of one file have animations with the same names; the range distinguishes animations of
+    equal name.
     """
     found = [
         (other.start != animation.start or other.end != animation.end, index)
@@ -102,22 +102,22 @@ def counterpart(figure: Figure, animation: Animation) -> int:
 def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) -> None:
     """Let an actor play one of its figure's animations, or none, in place.
 
-    What the animation does not move returns to the file's pose. The placement of the figure and
-    shapes that neither animation moves are kept.
+    Joints that the animation does not move return to the file's pose. The figure's placement and
+    blend shapes that neither animation moves are kept.
 
     Parameters
     ----------
     actor : Actor
-        With a pose if it has animations.
+        An actor, which has a pose if it has animations.
     index : int
         Index of the animation; -1 for none.
     clip : TransformClip, optional
-        Edited keys of the animation; those of the file if omitted.
+        Edited keys of the animation; the file's keys if omitted.
 
     Raises
     ------
     FormatError
-        If the keys are invalid; nothing changes then.
+        If the keys are invalid; the actor is then unchanged.
     """
     chosen: TransformClip | None = None
     if index >= 0:
@@ -128,7 +128,7 @@ def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) 
 
 
 def _returned(actor: Actor, pose: Pose) -> Pose:
-    """Return the file's pose with the present placement and shape."""
+    """Return the file's pose with the current placement and shape."""
     own = figure_pose(actor.figure)
     own.figure_scale, own.figure_translation = pose.figure_scale, pose.figure_translation
     weights = pose.shape_weights.copy()

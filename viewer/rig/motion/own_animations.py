@@ -1,4 +1,4 @@
-"""All motions that a figure has, as keys: those of its file, one of them perhaps edited."""
+"""All keyed motions of a figure: the animations of its file, one of which may be edited."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def has_own_animations(actor: Actor) -> bool:
-    """Return whether an actor has animations, and plays one of them, an edit of one, or none.
+    """Return whether an actor has animations, and plays one of them, edited or not, or none.
 
-    False if constraints move its joints besides, as keys do not contain their effect.
+    False if constraints also move its joints, because keys do not contain their effect.
     """
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None or skeleton.constraints:
@@ -31,9 +31,9 @@ def keeps_keys(scene: Scene, actor: Actor) -> bool:
 
 
 def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformClip, ...]:
-    """Return the animations of an actor, with the edits of the one that it plays.
+    """Return the animations of an actor, including edits of the one that it plays.
 
-    Animations without keys are left out.
+    Animations without keys are omitted.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformCl
 
 
 def still_pose(actor: Actor) -> Pose:
-    """Return an actor's pose without what its motion changes, which is as in the file.
+    """Return an actor's pose, with everything that its motion changes reset to the file's pose.
 
     Parameters
     ----------
     actor : Actor
-        With a pose.
+        An actor with a pose.
     """
     own, pose = figure_pose(actor.figure), actor.require_pose().copy()
     if not isinstance(actor.clip, TransformClip):

@@ -28,7 +28,7 @@ class SkeletonMotion:
     up_notes : tuple of Phrase
         Explain how the up axis was estimated, and give any contrary evidence.
     expressions : mapping of str to (N,)
-        Weights of facial expressions in the clip's rows, by their names in VRM 1.0.
+        Weights of facial expressions at each row of the clip, by their names in VRM 1.0.
     """
 
     figure: Figure

@@ -24,7 +24,7 @@ _OLD = {
 def expression_weights(
     expressions: Mapping[str, Floats], figure: Figure
 ) -> tuple[Floats | None, list[Diagnostic]]:
-    """Return blend shape weights of a figure over time; other shapes keep those of its rest pose.
+    """Return a figure's blend shape weights over time; other shapes keep their rest weights.
 
     Parameters
     ----------

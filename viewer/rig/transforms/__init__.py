@@ -1,1 +1,1 @@
-"""Keyed transforms: their values at given times, the resulting poses, and edits of their keys."""
+"""Keyed transforms: evaluation, resulting poses, and editing of keys."""

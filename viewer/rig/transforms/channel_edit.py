@@ -13,12 +13,12 @@ from viewer.rig.transforms.sampling import sample_transforms
 
 __all__ = ["added_key", "key_at", "value_at", "with_interpolation", "without_keys"]
 
-# Seconds: files store times in single precision, which has this relative error.
+# Tolerances of times: seconds, and the relative rounding error of single precision in files.
 _SAME, _SINGLE = 1e-6, 2.0**-22
 
 
 def key_at(channel: TransformChannel, time: float) -> int:
-    """Return the key at a time, up to the rounding of files; -1 if there is none."""
+    """Return the key at a time, within the rounding of files; -1 if there is none."""
     near = int(np.abs(channel.times - time).argmin())
     is_same = abs(channel.times[near] - time) <= max(_SAME, _SINGLE * abs(time))
     return near if is_same else -1
@@ -49,8 +49,8 @@ def added_key(
     time : float
         Seconds. An existing key at this time is changed instead.
     value : (C,), optional
-        Its value; by default the curve keeps its course. A cubic key with a value gets the slope
-        from its previous to its next neighbour.
+        Its value; by default the curve keeps its shape. A cubic key with a value gets the slope
+        between its neighbours.
     """
     there = key_at(channel, time)
     if there >= 0:
@@ -62,7 +62,7 @@ def added_key(
         given = value_at(channel, time)
     elif value is None:
         given, tangent = _spline(channel, time)
-    assert given is not None  # either given, or computed above
+    assert given is not None  # given, or computed above
     tangents = channel.tangents
     if tangents is not None:
         tangents = np.insert(tangents, key, np.stack([tangent, tangent]), axis=0)
@@ -80,7 +80,7 @@ def _with_value(channel: TransformChannel, key: int, value: Floats) -> Transform
     values = channel.values.copy()
     values[key] = value
     if channel.path == "rotation" and len(values) > 1:
-        # The sign that is nearer to a neighbour: cubic keys are interpolated as they are.
+        # Choose the sign nearer to a neighbour, because cubic interpolation does not.
         neighbour = values[key - 1 if key else 1]
         values[key] *= -1.0 if values[key] @ neighbour < 0.0 else 1.0
     if channel.tangents is None:
@@ -91,7 +91,7 @@ def _with_value(channel: TransformChannel, key: int, value: Floats) -> Transform
 
 
 def _smooth(times: Floats, values: Floats) -> Floats:
-    """Return the slope from the previous to the next key, 0 at both ends: (N, C)."""
+    """Return the slopes between each key's neighbours, 0 at both ends: (N, C)."""
     slopes = np.zeros(values.shape)
     if len(times) > 2:
         slopes[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])[:, None]
@@ -114,7 +114,7 @@ def _spline(channel: TransformChannel, time: float) -> tuple[Floats, Floats]:
 
 
 def without_keys(channel: TransformChannel, keys: Iterable[int]) -> TransformChannel | None:
-    """Return a channel without some keys; None if none is left."""
+    """Return a channel without some keys; None if no key remains."""
     stays = np.ones(len(channel.times), dtype=np.bool_)
     stays[list(keys)] = False
     if not stays.any():

@@ -38,9 +38,9 @@ __all__ = [
 ]
 
 Place = tuple[int, int]
-"""Index of a curve in ``rows_of``, and of one of its keys."""
+"""Index of a curve in ``rows_of``, and index of one of its keys."""
 
-_STEEPEST = math.radians(90.0)  # the middle angle, beyond which the same rotation has others
+_STEEPEST = math.radians(90.0)  # limit of the middle angle; above it, angles are ambiguous
 
 
 def with_transform_channel(
@@ -68,7 +68,7 @@ def move_transform_keys(
     Parameters
     ----------
     clip : TransformClip
-        Contains these keys.
+        The motion, which contains these keys.
     skeleton : Skeleton
         Defines the angles of rotations.
     places : iterable of (row, key)
@@ -78,7 +78,7 @@ def move_transform_keys(
     dv : float
         Change of the value of each selected component: radians, length, factor or weight.
     gap : float
-        Smallest distance of keys, seconds, above 0.
+        Minimum distance between keys, seconds, above 0.
     """
     for index, chosen in _by_channel(clip, skeleton, places).items():
         channel = clip.channels[index]
@@ -112,19 +112,19 @@ def set_transform_key(
 def add_transform_key(
     clip: TransformClip, row: TransformRow, time: float, value: Floats | None = None
 ) -> TransformClip:
-    """Return a clip with one more key of a channel; a key at this time is changed instead.
+    """Return a clip with a key added to a channel; an existing key at this time is changed instead.
 
     Parameters
     ----------
     clip : TransformClip
         The motion.
     row : TransformRow
-        Any component; without a channel, one is added.
+        Any component; if it has no channel, one is added.
     time : float
         Seconds.
     value : (C,), optional
-        Value of the key, quaternion for rotations; by default that of the curve there, which then
-        keeps its course. Required without a channel.
+        Value of the key, a quaternion for rotations; by default the value of the curve, which keeps
+        its shape. Required if the row has no channel.
     """
     if row.channel >= 0:
         channel = added_key(clip.channels[row.channel], time, value)[0]
@@ -150,7 +150,7 @@ def delete_transform_keys(
 def set_transform_slope(
     clip: TransformClip, row: TransformRow, key: int, side: int, slope: float
 ) -> TransformClip:
-    """Return a clip with another slope, per second, on one side of a cubic key: 0 incoming."""
+    """Return a clip with another slope per second at a cubic key: side 0 incoming, 1 outgoing."""
     channel = clip.channels[row.channel]
     if channel.tangents is None:
         return clip
@@ -162,7 +162,7 @@ def set_transform_slope(
 def set_clip_interpolation(
     clip: TransformClip, channels: Iterable[int], mode: Interpolation
 ) -> TransformClip:
-    """Return a clip with another interpolation of some channels, by index."""
+    """Return a clip with the interpolation of some channels changed."""
     for index in channels:
         clip = with_transform_channel(clip, index, with_interpolation(clip.channels[index], mode))
     return clip
@@ -186,7 +186,7 @@ def _by_channel(
 
 
 def _line(channel: TransformChannel) -> Channel:
-    """Return a curve with the times of a channel, to move them by the rules of curves."""
+    """Return a curve with the key times of a channel, which can then be moved like a curve's."""
     count = len(channel.times)
     return Channel(0, channel.times, np.zeros(count), (("flat", "flat"),) * count)
 
@@ -214,7 +214,7 @@ def _with_value(
     values[key] = new = -new if new @ old < 0.0 else new
     if channel.tangents is None:
         return replace(channel, values=values)
-    # The spline turns with its key: q' = d q, so its tangents become d t.
+    # The spline rotates with its key: q' = d q, so its tangents become d t.
     tangents = channel.tangents.copy()
     turn = multiply(new, old * [-1.0, -1.0, -1.0, 1.0]) / (old @ old)
     tangents[key] = multiply(turn, tangents[key])

@@ -1,4 +1,4 @@
-"""Keys of the whole pose of a figure, as keyed transforms."""
+"""Keying of a figure's whole pose as transforms."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.rig.transforms.channel_edit import added_key, value_at
 
 __all__ = ["joint_values", "key_transform_pose"]
 
-_UNCHANGED = 1e-9  # lengths, factors and weights this close to their curve count as unchanged
+_UNCHANGED = 1e-9  # lengths, factors and weights within this of their curve are unchanged
 _SAME_ROTATION = 1e-9  # difference of unit quaternions, about half the angle in radians
 
 
@@ -35,12 +35,12 @@ def key_transform_pose(
 ) -> TransformClip:
     """Return a clip with a key of the pose at one time.
 
-    Channels are added for what differs from the file's pose and has none.
+    Properties that differ from the file's pose and have no channel get one.
 
     Parameters
     ----------
     clip : TransformClip
-        The motion; its range grows to contain the time.
+        The motion; its range is extended to contain the time.
     figure : Figure
         Figure of the pose.
     pose : Pose
@@ -48,7 +48,7 @@ def key_transform_pose(
     time : float
         Seconds.
     only_changed : bool
-        Key only what differs from the clip at this time.
+        Key only properties that differ from the clip at this time.
     """
     skeleton = figure.require_skeleton()
     now, rest = joint_values(skeleton, pose), figure_pose(figure)
@@ -81,7 +81,7 @@ def _new_joints(
     rest: dict[TransformPath, Floats],
     time: float,
 ) -> list[TransformChannel]:
-    """Return channels of joints that have left the file's pose and have none."""
+    """Return channels for joints that differ from the file's pose and have none."""
     known = {(channel.path, channel.joint) for channel in clip.channels}
     return [
         TransformChannel(joint, path, np.array([time]), values[joint][None])
@@ -96,7 +96,7 @@ def _new_joints(
 def _new_weights(
     clip: TransformClip, now: Floats, rest: Floats, time: float
 ) -> list[TransformChannel]:
-    """Return a channel of the blend shapes that have left the file's weights and have none."""
+    """Return a channel for blend shapes that differ from the file's weights and have none."""
     known = {
         shape
         for channel in clip.channels

@@ -17,7 +17,7 @@ _FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
-    """Set what the channels animate, in place; everything else keeps its value.
+    """Set the values that the channels animate, in place; all others are unchanged.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, po
     row : int
         Index of the time.
     skeleton : Skeleton
-        Holds the DOF table and the rest pose.
+        Provides the DOF table and the rest pose.
     pose : Pose
         Rotations become DOFs of ball joints, and quaternions elsewhere, as in
         ``set_joint_rotations``.
@@ -38,7 +38,7 @@ def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, po
 
 
 def apply_placements(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
-    """Set all that the channels animate except rotations, in place; see ``apply_transforms``."""
+    """Set all values that the channels animate except rotations; see ``apply_transforms``."""
     if len(samples.translated):
         set_joint_translations(skeleton, pose, samples.translated, samples.translations[row])
     pose.scales[samples.scaled] = samples.scales[row]
@@ -53,10 +53,10 @@ def set_joint_translations(
     Parameters
     ----------
     skeleton : Skeleton
-        Holds the DOF table.
+        Provides the DOF table.
     pose : Pose
         A joint's translation DOFs take the offset from rest, within their limits; the pose's
-        translations take what is left.
+        translations take the remainder.
     joints : (N,)
         Joints to move.
     translations : (N, 3)

@@ -11,7 +11,7 @@ from viewer.rig.motion.transform_clip import TransformClip
 __all__ = ["key_rate"]
 
 _RATES = (DEFAULT_RATE, 24.0, 25.0, 60.0)
-_ON_FRAME = 1e-3  # frames: files store seconds in single precision
+_ON_FRAME = 1e-3  # tolerance in frames, because files store seconds in single precision
 
 _known: Memo[TransformClip, float] = Memo()
 
@@ -22,13 +22,13 @@ def key_rate(clip: TransformClip) -> float:
     Parameters
     ----------
     clip : TransformClip
-        Its keys may begin at any time.
+        A clip whose keys may begin at any time.
 
     Returns
     -------
     float
-        The first of 30, 24, 25 and 60 at which all keys are on frames, counted from time 0;
-        ``DEFAULT_RATE`` if there is none.
+        The first of 30, 24, 25 and 60 at which all keys lie on frames, counted from time 0;
+        ``DEFAULT_RATE`` if there is no such rate.
     """
     return _known.get(clip, (), lambda: _estimated(clip))
 

@@ -1,7 +1,8 @@
 """Curves of keyed transforms: the components of their channels, with rotations as Euler angles.
 
-A rotation is shown as the angles x, y, z of the joint about its rest rotation, R = R_rest Rz Ry Rx,
-which are also the DOFs of a ball joint. Other channels are shown as the values of their keys.
+A rotation is shown as the Euler angles x, y, z of the joint relative to its rest rotation, R =
+R_rest Rz Ry Rx,
+which are also the DOFs of a ball joint. Other channels are shown as they are stored.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class TransformRow:
     path : str
         Entry of ``TRANSFORM_PATHS``.
     joint : int
-        Joint that moves; -1 for weights.
+        Animated joint; -1 for weights.
     component : int
         0 to 2 for x, y, z, or the component of a channel of weights.
     channel : int
@@ -55,7 +56,7 @@ class TransformRow:
 
 
 def rows_of(clip: TransformClip, skeleton: Skeleton) -> tuple[TransformRow, ...]:
-    """Return the curves of a clip: of each joint its rotation and what has keys, then weights."""
+    """Return the curves of a clip: each joint's rotation and keyed properties, then weights."""
     return _rows.get(clip, id(skeleton), lambda: _listed(clip, skeleton))
 
 
@@ -80,20 +81,20 @@ def _listed(clip: TransformClip, skeleton: Skeleton) -> tuple[TransformRow, ...]
 
 
 def angles_of(skeleton: Skeleton, joint: int, quaternions: Floats) -> Floats:
-    """Return a joint's angles about x, y, z from rest, radians: (..., 3) for rotations (..., 4)."""
+    """Return Euler angles x, y, z from rest in radians, (..., 3), for rotations (..., 4)."""
     base = quaternion_to_matrix(skeleton.rest_rotations[joint])
     return matrix_to_euler(base.T @ quaternion_to_matrix(quaternions))
 
 
 def from_angles(skeleton: Skeleton, joint: int, angles: Floats) -> Floats:
-    """Return the rotation (4,) relative to the parent of a joint with angles (3,) from rest."""
+    """Return a joint's rotation relative to its parent, (4,), for Euler angles from rest (3,)."""
     x, y, z = (axis_rotations(axis, angles[axis]) for axis in range(3))
     base = quaternion_to_matrix(skeleton.rest_rotations[joint])
     return matrix_to_quaternion(base @ z @ y @ x)
 
 
 def key_values(channel: TransformChannel, skeleton: Skeleton) -> Floats:
-    """Return the values of a channel's keys as curves: (N, C), three angles for rotations."""
+    """Return the curve values of a channel's keys, (N, C): three angles for rotations."""
     if channel.path == "rotation":
         return angles_of(skeleton, channel.joint, channel.values)
     return channel.values

@@ -1,4 +1,4 @@
-"""Values of transform clips at given times: arcs, lines, steps and cubic splines (glTF 2.0)."""
+"""Evaluation of transform clips: slerp, linear, step and cubic interpolation (glTF 2.0)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class TransformSamples:
     scales : (T, M, 3)
         Factors.
     weights : (T, W)
-        Of the shapes ``weighted``.
+        Weights of the shapes ``weighted``.
     """
 
     rotated: Ints
@@ -55,11 +55,11 @@ class TransformSamples:
 def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
     """Return the values of all channels at given times.
 
-    Linear: p0 + u (p1 - p0), for rotations spherical along the shorter arc. Step: p0. Cubic, over
+    Linear: p0 + u (p1 - p0); for rotations, spherical along the shorter arc. Step: p0. Cubic, over
     a span of h seconds (glTF 2.0, appendix C):
     (2 u^3 - 3 u^2 + 1) p0 + h (u^3 - 2 u^2 + u) b0 + (3 u^2 - 2 u^3) p1 + h (u^3 - u^2) a1, with
-    a the incoming and b the outgoing tangents; rotations are normalised afterwards. Before its
-    first and after its last key a channel keeps the value of that key.
+    incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
+    first key and after its last, a channel keeps the value of that key.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
     Returns
     -------
     TransformSamples
-        Exactly the keys' values at keys; rotations are normalised.
+        At the time of a key, exactly the key's value; rotations are normalised.
     """
     table = _tables.get(clip, (), lambda: transform_table(clip.channels))
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
@@ -98,7 +98,7 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
 
 
 def _places(timelines: Timelines, times: Floats) -> tuple[Ints, Floats]:
-    """Return the key before each time, and the fraction of the span that has passed: (T, U)."""
+    """Return the key before each time, and the fraction of the span elapsed since: (T, U)."""
     passed = np.searchsorted(timelines.union, times, side="right")
     keys = np.searchsorted(timelines.ranks, timelines.ends + passed[:, None], side="right") - 1
     keys = np.maximum(keys, timelines.first)
@@ -119,7 +119,7 @@ def _arcs(arcs: Arcs, spans: Ints, fractions: Floats) -> Floats:
 
 
 def _lines(curves: Curves, spans: Ints, fractions: Floats) -> Floats:
-    """Return lines and steps: (T, C)."""
+    """Return linear and step interpolation: (T, C)."""
     rows = curves.bases + spans.take(curves.timelines, axis=1) * curves.strides
     start = curves.values.take(rows)
     rise = curves.values.take(rows + curves.strides) - start
@@ -135,7 +135,7 @@ def _cubics(curves: Curves, timelines: Timelines, spans: Ints, fractions: Floats
     u, start = fractions.take(curves.timelines, axis=1), curves.values.take(rows)
     rise = curves.values.take(following) - start
     leaving, arriving = curves.outgoing.take(rows), curves.incoming.take(following)
-    # The basis functions of both keys sum to 1, so p0 is exact at u = 0.
+    # The basis functions of both values sum to 1, so this form gives exactly p0 at u = 0.
     bend = (u - 1.0) * (u - 1.0) * leaving + u * (u - 1.0) * arriving
     return start + u * u * (3.0 - 2.0 * u) * rise + durations * u * bend
 

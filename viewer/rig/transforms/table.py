@@ -13,12 +13,12 @@ from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformChannel, 
 
 __all__ = ["Arcs", "Curves", "Targets", "Timelines", "TransformTable", "transform_table"]
 
-_SMALLEST = 1e-9  # radians; a smaller angle gives the same weights as a line
+_SMALLEST = 1e-9  # radians; at smaller angles slerp equals linear interpolation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timelines:
-    """U different lists of key times; most channels of a file share one.
+    """U distinct lists of key times; most channels of a file share one.
 
     Attributes
     ----------
@@ -27,14 +27,14 @@ class Timelines:
     first, last : (U,)
         Index of each timeline's first and last key.
     durations : (K,)
-        Seconds until the next key of the timeline, inf after its last.
+        Seconds until the next key of the timeline, inf after its last key.
     union : (M,)
-        All different times, increasing.
+        All distinct times, increasing.
     ends : (U,) int64
         u (M + 1) of each timeline u.
     ranks : (K,) int64
-        ``ends`` + the number of times of ``union`` up to the key, for a key of timeline u:
-        increasing, so that one search finds the spans of all timelines.
+        For a key of timeline u, ``ends`` + the number of times of ``union`` up to the key. It is
+        increasing, so one search finds the spans of all timelines.
     """
 
     times: Floats
@@ -48,16 +48,16 @@ class Timelines:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arcs:
-    """R rotations that follow arcs between their keys, or hold the earlier one.
+    """R rotations that follow arcs between their keys, or stay at the earlier key.
 
     Attributes
     ----------
     timelines : (R,)
-        Timeline of each.
+        Timelines.
     bases : (R,)
-        Row of its first key.
+        Row of each rotation's first key.
     slopes : (R,)
-        1; 0 for steps, which stay at the earlier key.
+        1 for arcs, 0 for steps, which stay at the earlier key.
     keys : (N, 4)
         Unit quaternions with signs such that neighbours are less than 180 degrees apart. The last
         key of each channel is repeated, so that every key has a successor.
@@ -80,11 +80,11 @@ class Curves:
     Attributes
     ----------
     timelines : (C,)
-        Timeline of each.
+        Timelines.
     bases, strides : (C,)
-        Index of its first value, and the distance to its next.
+        Index of each component's first value, and the step from one value to the next.
     slopes : (C,)
-        1; 0 for steps. Empty for cubic curves.
+        1 for lines, 0 for steps; empty for cubic curves.
     values : (N,)
         All values; the last key of each channel is repeated.
     incoming, outgoing : (N,)
@@ -134,7 +134,7 @@ def transform_table(channels: Sequence[TransformChannel]) -> TransformTable:
     numbered = list(zip(channels, of_channel, strict=True))
 
     def chosen(wanted: Callable[[TransformChannel], bool]) -> list[tuple[TransformChannel, int]]:
-        # The order of paths makes the components of each path adjacent.
+        # Sorting by path makes the components of each path adjacent.
         found = [one for one in numbered if wanted(one[0])]
         return sorted(found, key=lambda one: TRANSFORM_PATHS.index(one[0].path))
 
@@ -150,7 +150,7 @@ def transform_table(channels: Sequence[TransformChannel]) -> TransformTable:
 
 
 def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
-    """Return the different lists of times, and the index of the list of each channel."""
+    """Return the distinct lists of times, and each channel's index into them."""
     known: dict[bytes, int] = {}
     of_channel = [known.setdefault(times.tobytes(), len(known)) for times in every]
     parts = [np.frombuffer(raw, dtype=np.float64) for raw in known]
@@ -172,12 +172,12 @@ def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
     for channel, _ in channels:
         unit = channel.values / np.linalg.norm(channel.values, axis=1, keepdims=True)
         unit = np.concatenate([unit, unit[-1:]])
-        # A quaternion and its negative are one rotation: the nearer one gives the shorter arc.
+        # A quaternion and its negative are the same rotation; the nearer one gives the shorter arc.
         far = np.einsum("na,na->n", unit[1:], unit[:-1]) < 0.0
         unit[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
         chords = np.linalg.norm(np.diff(unit, axis=0, append=unit[-1:]), axis=1)
         keys.append(unit)
-        # The chord is accurate at small angles, where the arc cosine loses half the digits.
+        # The chord is accurate at small angles, where the arccosine loses half the digits.
         angles.append(np.maximum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0)), _SMALLEST))
         bases.append(row)
         row += len(unit)
@@ -217,7 +217,7 @@ def _targets(
     lines: list[TransformChannel],
     cubics: list[TransformChannel],
 ) -> Targets:
-    """Return the targets of a path, those of arcs or lines first."""
+    """Return the targets of a path: targets of arcs or lines first, then of cubic curves."""
     plain = arcs if path == "rotation" else lines
     indices = [np.zeros(0, dtype=np.int32)]
     for channel in (*plain, *cubics):
@@ -232,7 +232,7 @@ def _targets(
 
 
 def _components(path: str, channels: list[TransformChannel]) -> slice:
-    """Return where the components of a path lie among those of ordered channels."""
+    """Return the range of a path's components among all components of ordered channels."""
     widths = [(channel.path, channel.n_components) for channel in channels]
     place = TRANSFORM_PATHS.index
     start = sum(width for other, width in widths if place(other) < place(path))
