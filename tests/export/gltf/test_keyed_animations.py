@@ -217,3 +217,11 @@ def test_times_below_zero_delay_the_animation(tmp_path):
     file = Plain(tmp_path / "early.glb")
     (sampler,) = file.root["animations"][0]["samplers"]
     assert file.array(sampler["input"])[:, 0].tolist() == [0.0, 1.0]
+
+
+def test_a_mesh_without_skin_is_below_the_figure(tmp_path):
+    export_clips(Actor(replace(two_parts(), skin=None)), tmp_path / "loose.glb")
+    nodes = Plain(tmp_path / "loose.glb").root["nodes"]
+    (place,) = (node for node in nodes if node.get("name") == "bender")
+    below = [nodes[child]["name"] for child in place["children"]]
+    assert below == ["root", "bar", "box"]

@@ -81,7 +81,8 @@ def add_body(
     """
     figure, influences = body.figure, body.influences
     fixes, record = influences is not None and influences.n_fixed > 0, figure.record
-    bare = record is not None and is_still
+    # A mesh that is not bound is below the node that moves the whole figure.
+    bare = record is not None and is_still and (influences is not None or figure.mesh is None)
     tree = add_nodes(
         document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes, bare
     )
