@@ -112,8 +112,14 @@ class Window:
     def wait_until_changed(self, before, region=None):
         x, y, width, height = region or (0, 0, 1400, 900)
         part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
+
+        def changed():
+            # A change may go away again before the picture is still: a highlight, half a frame.
+            still = self.wait_until_quiet()
+            return still if (still[part] != before[part]).any() else None
+
         _wait_for(lambda: (self.screen()[part] != before[part]).any(), "a change")
-        return self.wait_until_quiet()
+        return _wait_for(changed, "a change that stays")
 
     def wait_until_shown(self, wanted, part):
         _wait_for(lambda: (self.screen()[part] == wanted[part]).all(), "an earlier picture")

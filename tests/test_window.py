@@ -49,6 +49,7 @@ def display():
         "-screen",
         "0",
         "1400x900x24",
+        "-r",  # a key that is released late, on a busy machine, must not repeat
         "-noreset",  # a server that resets when its last client leaves refuses the next
         "-nolisten",
         "tcp",
