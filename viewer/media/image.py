@@ -76,7 +76,7 @@ def decode_pictures(files: Sequence[tuple[Path, bytes]]) -> list[Bytes | FormatE
     -------
     list of (H, W, 4) uint8 or FormatError
         First row at the top, read-only; the error of an image that is not readable, or that
-        exceeds what all images together may have.
+        exceeds the number of pixels allowed for all images together.
     """
     from PIL import Image
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import moderngl
 import numpy as np
@@ -20,10 +21,14 @@ from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.shown import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
 
 __all__ = ["Casters"]
+
+_sizes: Memo[Figure, float] = Memo()
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +90,11 @@ class Casters:
 
     def largest_mesh(self) -> float:
         """Return the size of the largest mesh at rest, scene units; 0 without meshes."""
-        sizes: dict[int, float] = {}
         found = 0.0
         for actor in self.actors:
-            mesh = actor.figure.mesh
-            if actor.is_drawn and mesh is not None:
-                size = sizes.setdefault(id(mesh), box_size(bounding_box(mesh.positions)))
+            figure = actor.figure
+            if actor.is_drawn and figure.mesh is not None:
+                size = _sizes.get(figure, None, partial(_mesh_size, figure))
                 scale = stretch(placement_of(actor, self.options)[None])[0]
                 found = max(found, float(scale) * size)
         return found
@@ -100,3 +104,8 @@ class Casters:
         drawn = [actor for actor in self.actors if actor.is_drawn]
         found = [bounds.spheres(actor, self.options) for actor in drawn]
         return [spheres for spheres in found if len(spheres) and np.isfinite(spheres).all()]
+
+
+def _mesh_size(figure: Figure) -> float:
+    """Return the size of a figure's mesh at rest, figure units."""
+    return box_size(bounding_box(figure.require_mesh().positions))

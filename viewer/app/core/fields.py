@@ -21,7 +21,6 @@ __all__ = [
     "begin_field",
     "drag_float",
     "drag_int",
-    "field_width",
     "in_row",
     "slider_float",
     "slider_int",
@@ -76,13 +75,6 @@ def begin_field(label: str, width: float = 0.0, column: float = 0.0, needs: floa
         imgui.set_cursor_pos_x(left + reserved + gap)
     imgui.set_next_item_width(-1.0)
     return hidden
-
-
-def field_width(label: str, width: float) -> float:
-    """Return the width of a label and its widget, given in font sizes, in window coordinates."""
-    text = label.partition("##")[0]
-    gap = imgui.get_style().item_inner_spacing.x
-    return imgui.calc_text_size(text).x + gap + width * imgui.get_font_size()
 
 
 def slider_float(

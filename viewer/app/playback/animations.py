@@ -17,7 +17,6 @@ __all__ = [
     "Animations",
     "animation_texts",
     "choose_animation",
-    "has_animations",
     "no_animations",
     "played",
     "step_animation",
@@ -40,11 +39,6 @@ class Animations:
     """
 
     edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
-
-
-def has_animations(state: AppState) -> bool:
-    """Return whether any actor of the scene has animations."""
-    return any(actor.figure.animations for actor in state.scene.actors)
 
 
 def no_animations(state: AppState) -> str:

@@ -51,7 +51,7 @@ def node_file(source: Source) -> NodeFile:
             if key not in first_mesh:
                 first_mesh[key] = len(meshes)
                 placed = Placed(prefix, mesh, materials, placement)
-                meshes.append(mesh_on_node(source, arrays, placed))
+                meshes.append(mesh_on_node(arrays, placed))
             of_node[node] = first_mesh[key]
             skin_of_node[node] = len(skins) - 1 if skin is not None else -1
     tree = _tree(told["names"], arrays, of_node, skin_of_node)

@@ -39,7 +39,7 @@ class Placed:
     placement: Floats
 
 
-def mesh_on_node(source: Source, arrays: Arrays, placed: Placed) -> NodeMesh:
+def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
     """Return a mesh with one primitive per material."""
     get = _getter(arrays, placed.prefix)
     faces, corners = get("faces"), get("corners")

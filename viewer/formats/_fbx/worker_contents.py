@@ -55,13 +55,10 @@ def contents_of(kept: KeptScene) -> dict[str, Any]:
     return {
         "names": [str(kept.get(node, "name")) for node in nodes],
         "unit": 1.0 if is_metres else float(settings.unit_meters),
-        "original_unit": float(settings.unit_meters),
         "up": "y" if is_y_up else "z",
         "converted": kept.converted,
-        "rate": float(settings.frames_per_second),
         "version": int(metadata.version),
         "creator": str(kept.get(metadata, "creator")),
-        "is_text": bool(kept.get(metadata, "ascii")),
         "warnings": [str(kept.get(each, "description")) for each in warnings],
         "unused": {
             word: len(kept.get(scene, name))

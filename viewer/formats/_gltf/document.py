@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from viewer.errors import FormatError
 from viewer.formats._gltf.accessors import Accessors
@@ -85,10 +85,6 @@ class Document:
                 raise
             self.source.diagnostics.add(problem.diagnostic)
             return neutral
-
-    def extras(self) -> Any:
-        """Return the application data of the root; None if there is none."""
-        return self.root.values.get("extras")
 
 
 def open_document(source: Source) -> Document:

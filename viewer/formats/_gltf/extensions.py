@@ -21,7 +21,6 @@ GEOMETRY = (
 
 _CHARACTERS = (
     "VRM",
-    "VRMC_materials_mtoon",
     "VRMC_node_constraint",
     "VRMC_springBone",
     "VRMC_vrm",

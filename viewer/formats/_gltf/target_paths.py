@@ -59,11 +59,6 @@ class Targets:
             if mesh >= 0 and meshes[mesh].target_names
         }
 
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes."""
-        return self._tree.n_nodes
-
     def n_shapes(self, node: int) -> int:
         """Return the number of morph targets of a node's mesh."""
         mesh = int(self._tree.meshes[node])
@@ -76,7 +71,7 @@ class Targets:
         return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
 
     def moves_all(self, moved: set[tuple[Any, Any]]) -> bool:
-        """Return whether all nodes and paths name something that is shown.
+        """Return whether all channels with these nodes and paths have a visible effect.
 
         Files have tens of thousands of them, most of which are transforms.
         """

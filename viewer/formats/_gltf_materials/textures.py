@@ -41,11 +41,11 @@ class Slot:
     image: int
     placing: dict[str, Any]
 
-    def texture(self, images: dict[int, DecodedImage], channel: int = 0) -> Texture:
-        """Return the texture; scalar properties are read from ``channel``."""
+    def texture(self, images: dict[int, DecodedImage]) -> Texture:
+        """Return the texture with its pixels."""
         image = images.get(self.image, DecodedImage(""))
         pixels, encoded = image.pixels, image.encoded
-        return Texture(image.name, pixels, channel, encoded=encoded, **self.placing)
+        return Texture(image.name, pixels, encoded=encoded, **self.placing)
 
 
 def read_slot(document: Document, parent: Element, name: str) -> Slot | None:

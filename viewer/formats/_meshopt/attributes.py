@@ -5,8 +5,7 @@
     stream  header byte, block…, padding, tail
     block   up to 256 elements; version 1: 2 control bits per byte of an element; data per byte
     data    2 header bits per group of 16 elements, group…
-    group   16 deltas of 0, 1, 2, 4 or 8 bits; a delta with all bits set is an escape: its byte
-    follows
+    group   16 deltas of 0, 1, 2, 4 or 8 bits; if all bits of a delta are set, its byte follows
     tail    first element, version 1: a mode for every 4 bytes of an element
 
 The position of a group depends on the contents of the groups before it. Group sizes are therefore

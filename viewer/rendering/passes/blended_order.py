@@ -43,6 +43,7 @@ class SortedTriangles:
         self._buffer: moderngl.Buffer | None = None
         self._triangles: Ints = np.zeros((0, 3), np.int32)
         self._key: tuple[object, ...] = ()
+        self._positions, self._n_updates = np.zeros((0, 3), np.float32), -1
 
     def sort(self, mesh: PosedMesh, source: IndexSet, along: Floats) -> None:
         """Sort the triangles, and upload them if their order may have changed.
@@ -64,7 +65,10 @@ class SortedTriangles:
         key = mesh.n_updates, along.tobytes()
         if key == self._key:
             return
-        heights = mesh.posed_positions() @ along.astype(np.float32)
+        if mesh.n_updates != self._n_updates:
+            # Reading waits for the GPU, so a moving camera uses the positions of the last pose.
+            self._positions, self._n_updates = mesh.posed_positions(), mesh.n_updates
+        heights = self._positions @ along.astype(np.float32)
         depths = heights[self._triangles].sum(axis=1)
         stops = np.cumsum([run.count // 3 for run in given])
         parts = np.split(depths, stops[:-1])
