@@ -30,9 +30,9 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
 
     ``source``: the file.
     ``template``: figure with the joints that the file refers to.
-    ``pose``: pose of the template. Returns (N, 2, 3): the template's point and the target's for
-    each pair. Raises FormatError at a line that is not a pair or names an unknown joint, or at the
-    last line
+    ``pose``: pose of the template.
+    Returns (N, 2, 3): the template's point and the target's for each pair.
+    Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
       if there are fewer than three pairs.
     """
     skeleton = template.require_skeleton()

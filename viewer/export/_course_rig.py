@@ -18,10 +18,11 @@ def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:
     """Return the skeleton in the form of ``.skel`` files, with the pose as its rest pose.
 
     ``skeleton``: skeleton without rest rotations and scales; its lengths already include the
-    figure's scale. ``pose``: becomes the file's pose; the figure's translation is added to the
-    roots' offsets. Returns ``skeleton``: joints in depth-first order. Returns ``order`` (J,) int32:
-    the old index of each new joint. Raises RigError if a joint has properties that the format
-    cannot store.
+      figure's scale.
+    ``pose``: becomes the file's pose; the figure's translation is added to the roots' offsets.
+    Returns ``skeleton``: joints in depth-first order.
+    Returns ``order`` (J,) int32: the old index of each new joint.
+    Raises RigError if a joint has properties that the format cannot store.
     """
     _check(skeleton, pose)
     order = depth_first(skeleton.parents)

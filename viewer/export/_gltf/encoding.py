@@ -53,18 +53,18 @@ class Encoding:
         """Add positions (R, 3); those that ``decoding`` does not transform are not quantised."""
         if not (self.is_quantized and is_placed):
             return self.document.array(values, "VEC3", VERTICES, bounds=True)
-        return self._lengths(values - self.center, bounds=True)
+        return self._lengths(values - self.center)
 
     def offsets(self, values: Floats, is_placed: bool = True) -> int:
         """Add offsets of positions (R, 3)."""
         if not (self.is_quantized and is_placed):
             return self.document.array(values, "VEC3", VERTICES, bounds=True)
-        return self._lengths(values, bounds=True)
+        return self._lengths(values)
 
-    def _lengths(self, values: Floats, bounds: bool) -> int:
+    def _lengths(self, values: Floats) -> int:
         stored = np.rint(values / self.reach * _SHORT).astype(np.int16)
         self._note("positions", np.abs(stored * (self.reach / _SHORT) - values))
-        return self.document.integers(stored, "VEC3", bounds)
+        return self.document.integers(stored, "VEC3", True)
 
     def normals(self, values: Floats) -> int:
         """Add unit vectors (R, 3)."""

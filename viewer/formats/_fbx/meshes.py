@@ -55,12 +55,14 @@ def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
     if np.linalg.det(linear) < 0.0:
         wanted = wanted[:, ::-1]
     weights = _influences(arrays, placed)
+    attributes = _numbered(arrays, placed)
     primitives = []
     for slot in np.unique(slots).tolist():
         rows = wanted[slots == slot]
-        chosen, inverse = _distinct(arrays, placed, np.unique(rows))
+        used = np.unique(rows)
+        chosen, inverse = _distinct(corners, attributes, used)
         renumbered = np.zeros(len(corners), dtype=np.int32)
-        renumbered[np.unique(rows)] = inverse
+        renumbered[used] = inverse
         has_slot = 0 <= slot < len(placed.materials)
         primitives.append(
             _primitive(
@@ -99,20 +101,25 @@ def _attributes(arrays: Arrays, placed: Placed) -> list[str]:
     return [name for name in names if f"{placed.prefix}.{name}" in arrays]
 
 
+def _numbered(arrays: Arrays, placed: Placed) -> list[NDArray[np.intp]]:
+    """Return an index of the value of each attribute at every corner of the file: (C,) each."""
+    found = []
+    for name in _attributes(arrays, placed):
+        values = arrays[f"{placed.prefix}.{name}"]
+        # Equal values get one index, because exporters repeat values for every corner.
+        _, number = np.unique(values + 0.0, axis=0, return_inverse=True)
+        found.append(number.reshape(-1)[arrays[f"{placed.prefix}.{name}.corners"]])
+    return found
+
+
 def _distinct(
-    arrays: Arrays, placed: Placed, corners: NDArray[np.intp]
+    vertices: Ints, attributes: list[NDArray[np.intp]], corners: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Ints]:
     """Return one corner per vertex, and the vertex of each given corner.
 
     Corners become one vertex if their positions and all attributes are equal.
     """
-    keys = [arrays[f"{placed.prefix}.corners"][corners]]
-    for name in _attributes(arrays, placed):
-        values = arrays[f"{placed.prefix}.{name}"]
-        rows = arrays[f"{placed.prefix}.{name}.corners"][corners]
-        # Equal values get one index, because exporters repeat values for every corner.
-        _, number = np.unique(values + 0.0, axis=0, return_inverse=True)
-        keys.append(number.reshape(-1)[rows])
+    keys = [vertices[corners].astype(np.intp), *(numbers[corners] for numbers in attributes)]
     _, first, inverse = np.unique(np.stack(keys), axis=1, return_index=True, return_inverse=True)
     return corners[first], inverse.reshape(-1).astype(np.int32)
 

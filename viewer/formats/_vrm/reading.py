@@ -178,7 +178,7 @@ def _has_target(file: NodeFile, node: int, index: Any) -> bool:
 def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the properties of the model for ``viewer info``, each a heading and a text."""
     meta = told.get("meta")
-    facts = [("VRM", str(told.get("specVersion") or "0.x")[:_LONGEST])]
+    facts = [("VRM", _shortened(str(told.get("specVersion") or "0.x")))]
     for heading, keys in _META.items():
         value = next((part(meta or {}, key) for key in keys if part(meta or {}, key)), None)
         if value is None and any(part(meta or {}, key) is False for key in keys):
@@ -186,7 +186,7 @@ def _facts(told: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
         if isinstance(value, bool):
             facts.append((heading, "allowed" if value else "not allowed"))
         elif isinstance(value, list):
-            facts.append((heading, ", ".join(map(str, value))[:_LONGEST]))
+            facts.append((heading, _shortened(", ".join(map(str, value)))))
         elif value:
-            facts.append((heading, str(value)[:_LONGEST]))
+            facts.append((heading, _shortened(str(value))))
     return tuple(facts)

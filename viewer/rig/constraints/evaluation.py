@@ -19,7 +19,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
-from viewer.rig.geometry.quaternion import multiply, slerp
+from viewer.rig.geometry.quaternion import conjugate, multiply, slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton
 
@@ -75,12 +75,12 @@ def constrained(
         if each.kind == "aim":
             target = _aimed(skeleton, each, own, (result, translations, scales))
         else:
-            back = _inverse(rest[each.source])
+            back = conjugate(rest[each.source])
             if each.kind == "rotation":
                 turn = multiply(back, result[each.source])
             else:
                 moved = multiply(result[each.source], back)
-                turn = _twist(multiply(multiply(_inverse(own), moved), own), np.array(each.axis))
+                turn = _twist(multiply(multiply(conjugate(own), moved), own), np.array(each.axis))
             target = multiply(own, turn)
         result[each.joint] = slerp(np.broadcast_to(own, target.shape), target, each.weight)
     return result
@@ -97,7 +97,7 @@ def _aimed(
     direction, length = _unit(there - place)
     start = quaternion_to_matrix(multiply(parent, own)) @ np.array(each.axis)
     arc = np.where(length > _SHORT, _arc(start, direction), _NONE)
-    return multiply(multiply(multiply(_inverse(parent), arc), parent), own)
+    return multiply(multiply(multiply(conjugate(parent), arc), parent), own)
 
 
 def _world(
@@ -141,7 +141,3 @@ def _unit(vectors: Floats) -> tuple[Floats, Floats]:
     """Return unit vectors, and lengths with a last axis of size 1."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.maximum(length, _SHORT), length
-
-
-def _inverse(rotation: Floats) -> Floats:
-    return rotation * [-1.0, -1.0, -1.0, 1.0]

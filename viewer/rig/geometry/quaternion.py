@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["multiply", "rotation_vector_to_quaternion", "slerp"]
+__all__ = ["conjugate", "multiply", "rotation_vector_to_quaternion", "slerp"]
 
 _PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u to the last digit
 
@@ -31,6 +31,22 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
     half = 0.5 * np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
     # sinc is defined at 0: np.sinc(x) = sin(pi x) / (pi x).
     return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
+
+
+def conjugate(quaternions: Floats) -> Floats:
+    """Return the inverses of unit quaternions.
+
+    Parameters
+    ----------
+    quaternions : (..., 4)
+        Unit quaternions (x, y, z, w).
+
+    Returns
+    -------
+    (..., 4)
+        (-x, -y, -z, w).
+    """
+    return quaternions * [-1.0, -1.0, -1.0, 1.0]
 
 
 def multiply(first: Floats, second: Floats) -> Floats:

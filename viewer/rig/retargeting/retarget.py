@@ -22,7 +22,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.quaternion import conjugate, multiply
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -193,7 +193,7 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
         after = source.rotations[partner].T @ job.to_target.T @ corrections[joint]
         rest = matrix_to_quaternion(after @ target.rotations[joint])
         found[:, joint] = multiply(multiply(rotation, worlds[:, partner]), rest)
-        local[:, joint] = multiply(_conjugate(above), found[:, joint])
+        local[:, joint] = multiply(conjugate(above), found[:, joint])
     signs = np.einsum("nja,nja->nj", local[1:], local[:-1]) < 0.0
     local[1:][np.logical_xor.accumulate(signs, axis=0)] *= -1.0
     return local
@@ -363,7 +363,3 @@ def _path(parents: Ints, joint: int) -> list[int]:
 
 def _unit(quaternions: Floats) -> Floats:
     return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
-
-
-def _conjugate(quaternions: Floats) -> Floats:
-    return quaternions * [-1.0, -1.0, -1.0, 1.0]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.quaternion import conjugate, multiply
 from viewer.rig.motion.clip import Channel
 from viewer.rig.motion.clip_edit import move_keys, set_key
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
@@ -216,6 +216,6 @@ def _with_value(
         return replace(channel, values=values)
     # The spline rotates with its key: q' = d q, so its tangents become d t.
     tangents = channel.tangents.copy()
-    turn = multiply(new, old * [-1.0, -1.0, -1.0, 1.0]) / (old @ old)
+    turn = multiply(new, conjugate(old)) / (old @ old)
     tangents[key] = multiply(turn, tangents[key])
     return replace(channel, values=values, tangents=tangents)

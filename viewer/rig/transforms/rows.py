@@ -1,8 +1,8 @@
 """Curves of keyed transforms: the components of their channels, with rotations as Euler angles.
 
-A rotation is shown as the Euler angles x, y, z of the joint relative to its rest rotation, R =
-R_rest Rz Ry Rx,
-which are also the DOFs of a ball joint. Other channels are shown as they are stored.
+A rotation is shown as the Euler angles x, y, z of the joint relative to its rest rotation,
+R = R_rest Rz Ry Rx, which are also the DOFs of a ball joint. Other channels are shown as they are
+stored.
 """
 
 from __future__ import annotations

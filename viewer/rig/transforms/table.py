@@ -24,8 +24,8 @@ class Timelines:
     ----------
     times : (K,)
         Seconds of all keys, one timeline after the other.
-    first, last : (U,)
-        Index of each timeline's first and last key.
+    first : (U,)
+        Index of each timeline's first key.
     durations : (K,)
         Seconds until the next key of the timeline, inf after its last key.
     union : (M,)
@@ -39,7 +39,6 @@ class Timelines:
 
     times: Floats
     first: Ints
-    last: Ints
     durations: Floats
     union: Floats
     ends: NDArray[np.int64]
@@ -163,8 +162,8 @@ def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
     union = np.unique(times)
     ends = np.arange(len(parts), dtype=np.int64) * (len(union) + 1)
     ranks = np.repeat(ends, counts) + np.searchsorted(union, times, side="right")
-    as_ints = first.astype(np.int32), last.astype(np.int32)
-    return Timelines(times, *as_ints, durations, union, ends, ranks), of_channel
+    timelines = Timelines(times, first.astype(np.int32), durations, union, ends, ranks)
+    return timelines, of_channel
 
 
 def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
