@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from broken_text import OBJ, PLY
 from faults import Fault
-from skin_text import BINDINGS
-from skin_text import GOOD as SKIN
+from formats.broken_text import OBJ, PLY
+from formats.skin_text import BINDINGS
+from formats.skin_text import GOOD as SKIN
 
 from viewer.diagnostics import Phrase
 from viewer.formats import obj, ply, skin

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from broken_text import ANIM
-from bvh_text import GOOD as BVH
 from faults import Fault
-from skel_text import GOOD as SKEL
+from formats.broken_text import ANIM
+from formats.bvh_text import GOOD as BVH
+from formats.skel_text import GOOD as SKEL
 
 from viewer.diagnostics import Phrase
 from viewer.formats import anim, bvh, skel

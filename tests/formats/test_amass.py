@@ -4,8 +4,8 @@ import pickle
 
 import numpy as np
 import pytest
-from capture_files import waves
 from faults import NAN, fault_of, warnings_of
+from formats.capture_files import waves
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.diagnostics import Phrase

@@ -1,9 +1,9 @@
 """Wrong counts are refused at the line of the count, with both values."""
 
 import pytest
-from bvh_text import GOOD as BVH
 from faults import refusal_of
-from skin_text import GOOD as SKIN
+from formats.bvh_text import GOOD as BVH
+from formats.skin_text import GOOD as SKIN
 
 from viewer.formats import Source, read
 

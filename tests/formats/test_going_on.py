@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from broken_text import ANIM, OBJ, PLY, gone_on
-from bvh_text import GOOD as BVH
 from faults import warnings_of
-from skin_text import GOOD as SKIN
-from synthetic_smpl import model
+from formats.broken_text import ANIM, OBJ, PLY, gone_on
+from formats.bvh_text import GOOD as BVH
+from formats.skin_text import GOOD as SKIN
+from formats.synthetic_smpl import model
 from test_mutations import FILES, mutate
 
 from viewer.diagnostics import Collector, Phrase

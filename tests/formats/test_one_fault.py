@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from broken_text import ANIM, OBJ, PLY, gone_on
-from bvh_text import GOOD as BVH
+from formats.broken_text import ANIM, OBJ, PLY, gone_on
+from formats.bvh_text import GOOD as BVH
 from formats.mesh_faults import MESH_FAULTS
 from formats.motion_faults import MOTION_FAULTS
-from skel_text import GOOD as SKEL
-from skin_text import GOOD as SKIN
+from formats.skel_text import GOOD as SKEL
+from formats.skin_text import GOOD as SKIN
 
 from viewer.errors import ViewerError
 from viewer.formats import Source, anim, bvh, obj, ply, skel, skin

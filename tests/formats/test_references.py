@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 from faults import fault_of
-from pig_text import write as write_pig
+from formats.pig_text import write as write_pig
+from formats.skin_text import BINDINGS, NORMALS, POSITIONS, TRIANGLES, WEIGHTS
 from PIL import Image
-from skin_text import BINDINGS, NORMALS, POSITIONS, TRIANGLES, WEIGHTS
 
 import viewer
 from viewer.diagnostics import Phrase

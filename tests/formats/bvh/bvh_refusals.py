@@ -1,0 +1,10 @@
+"""Refusals of BVH files given as text."""
+
+from __future__ import annotations
+
+from faults import Fault, refusal_of
+from formats.bvh_text import read
+
+
+def refusal(text: str) -> Fault:
+    return refusal_of(lambda: read(text))

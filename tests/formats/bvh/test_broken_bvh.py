@@ -1,0 +1,384 @@
+"""Broken ``.bvh`` files with their messages, and thousands of mutations."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from faults import Fault
+from formats.bvh.bvh_refusals import refusal
+from formats.bvh_text import GOOD, one_joint, read
+
+from viewer.diagnostics import Phrase
+
+FRAMES = GOOD.partition("0.0333333\n")[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", ("F002.bvh-start", 1, {"found": None, "looks": "an empty file"})),
+        (" \n", ("F002.bvh-start", 1, {"found": None, "looks": "only white space"})),
+        ("\nROOT a", ("F002.bvh-start", 2, {"found": b"ROOT", "looks": None})),
+        ("HIERARCHY", ("F002.bvh-no-root", 1, {"found": None})),
+        ("HIERARCHY MOTION", ("F002.bvh-no-root", 1, {"found": b"MOTION"})),
+        ("HIERARCHY\nJOINT a {", ("F002.bvh-root", 2, {"found": b"JOINT"})),
+        (
+            "HIERARCHY\nROOT a\n",
+            ("F002.opening", 2, {"item": Phrase("joint", name="a"), "found": None}),
+        ),
+        (
+            GOOD.replace("LeftUpLeg\n\t{", "LeftUpLeg\n\t"),
+            ("F002.opening", 8, {"item": Phrase("joint", name="LeftUpLeg"), "found": b"OFFSET"}),
+        ),
+        (
+            GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 up 0.0"),
+            (
+                "F002.number",
+                8,
+                {
+                    "item": Phrase("of", item="OFFSET", owner=Phrase("joint", name="LeftUpLeg")),
+                    "found": b"up",
+                },
+            ),
+        ),
+        (
+            GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 nan 0.0"),
+            (
+                "F003.number",
+                8,
+                {
+                    "item": Phrase("of", item="OFFSET", owner=Phrase("joint", name="LeftUpLeg")),
+                    "found": b"nan",
+                },
+            ),
+        ),
+        (
+            GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0,1 0 0"),
+            (
+                "F002.number",
+                8,
+                {
+                    "item": Phrase("of", item="OFFSET", owner=Phrase("joint", name="LeftUpLeg")),
+                    "found": b"0,1",
+                },
+            ),
+        ),
+        (
+            GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 0.0"),
+            (
+                "F002.width",
+                8,
+                {
+                    "item": Phrase("of", item="OFFSET", owner=Phrase("joint", name="LeftUpLeg")),
+                    "expected": 3,
+                    "found": 2,
+                },
+            ),
+        ),
+        (
+            GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 0.0 0.0 5"),
+            (
+                "F002.more",
+                8,
+                {
+                    "item": Phrase("of", item="OFFSET", owner=Phrase("joint", name="LeftUpLeg")),
+                    "expected": 3,
+                    "found": b"5",
+                },
+            ),
+        ),
+        (
+            GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 1 2 3\nOFFSET 4 5 6"),
+            (
+                "F002.bvh-offset-again",
+                9,
+                {"found": b"OFFSET", "joint": Phrase("joint", name="LeftUpLeg")},
+            ),
+        ),
+        (
+            GOOD.replace("OFFSET 0.0 0.2 0.0", "OFFSET 0.0 1e999 0.0"),
+            (
+                "F003.too-large",
+                26,
+                {
+                    "item": Phrase(
+                        "of",
+                        item="OFFSET",
+                        owner=Phrase("end-site", joint=Phrase("joint", name="Head")),
+                    ),
+                    "found": b"1e999",
+                },
+            ),
+        ),
+        (
+            GOOD.replace("CHANNELS 6", "CHANNELS 5"),
+            (
+                "F002.bvh-channel-count",
+                5,
+                {
+                    "item": Phrase("of", item="CHANNELS", owner=Phrase("joint", name="Hips")),
+                    "expected": 5,
+                    "found": 6,
+                },
+            ),
+        ),
+        (
+            GOOD.replace("CHANNELS 6", "CHANNELS 99999999999"),
+            (
+                "F002.bvh-channel-count",
+                5,
+                {
+                    "item": Phrase("of", item="CHANNELS", owner=Phrase("joint", name="Hips")),
+                    "expected": 99999999999,
+                    "found": 6,
+                },
+            ),
+        ),
+        (
+            GOOD.replace("CHANNELS 6", "CHANNELS -6"),
+            (
+                "F002.count",
+                5,
+                {
+                    "found": b"-6",
+                    "item": Phrase("of", item="CHANNELS", owner=Phrase("joint", name="Hips")),
+                },
+            ),
+        ),
+        (
+            GOOD.replace("CHANNELS 6", "CHANNELS 2.5"),
+            (
+                "F002.count",
+                5,
+                {
+                    "found": b"2.5",
+                    "item": Phrase("of", item="CHANNELS", owner=Phrase("joint", name="Hips")),
+                },
+            ),
+        ),
+        (
+            GOOD.replace("Zposition", "Wposition"),
+            (
+                "F002.bvh-channel",
+                5,
+                {
+                    "found": b"Wposition",
+                    "item": Phrase("of", item="CHANNELS", owner=Phrase("joint", name="Hips")),
+                },
+            ),
+        ),
+        (
+            GOOD.replace("Zposition", "xposition"),
+            (
+                "F002.bvh-position-again",
+                5,
+                {
+                    "found": b"xposition",
+                    "item": Phrase("of", item="CHANNELS", owner=Phrase("joint", name="Hips")),
+                },
+            ),
+        ),
+        (
+            GOOD.replace("\tCHANNELS 6", "\tCHANNELS 1 Xrotation\n\tCHANNELS 6"),
+            (
+                "F002.bvh-channels-again",
+                6,
+                {"found": b"CHANNELS", "joint": Phrase("joint", name="Hips")},
+            ),
+        ),
+        (
+            GOOD.replace("\tOFFSET 0.1", "\tCENTER 0.1"),
+            ("F002.bvh-item", 8, {"found": b"CENTER", "joint": Phrase("joint", name="LeftUpLeg")}),
+        ),
+        (
+            GOOD.replace("OFFSET 0.0 0.2 0.0", "JOINT x { }"),
+            (
+                "F002.bvh-end-item",
+                26,
+                {
+                    "found": b"JOINT",
+                    "joint": Phrase("end-site", joint=Phrase("joint", name="Head")),
+                },
+            ),
+        ),
+        (
+            GOOD.replace("}\nMOTION", "MOTION"),
+            (
+                "F002.joint-open",
+                29,
+                {"found": b"MOTION", "joint": Phrase("joint", name="Hips"), "line": 2},
+            ),
+        ),
+        (
+            GOOD.partition("\t\tJOINT LeftFoot")[0],
+            (
+                "F002.joint-open",
+                9,
+                {"found": None, "joint": Phrase("joint", name="LeftUpLeg"), "line": 6},
+            ),
+        ),
+        (
+            GOOD.replace("Frames: 2", "Frames: two"),
+            ("F002.count", 31, {"item": "Frames", "found": b"two"}),
+        ),
+        (
+            GOOD.replace("Frames: 2", "Frames: -1"),
+            ("F002.count", 31, {"item": "Frames", "found": b"-1"}),
+        ),
+        (
+            GOOD.partition(" 2\nFrame Time")[0],
+            ("F002.count", 31, {"item": "Frames", "found": None}),
+        ),
+        (
+            GOOD.replace("0.0333333", "nan"),
+            ("F002.bvh-seconds", 32, {"found": b"nan"}),
+        ),
+        (
+            GOOD.replace("0.0333333", "-0.1"),
+            ("F002.bvh-seconds", 32, {"found": b"-0.1"}),
+        ),
+        (
+            GOOD.replace("10 20 30", "10 inf 30"),
+            ("F003.number", 34, {"item": Phrase("bvh-frame", frame=1), "found": b"inf"}),
+        ),
+        (
+            GOOD.replace("0.0 1.0 0.0 0", "0.0 1.0 0.0 0;"),
+            ("F002.number", 33, {"item": Phrase("bvh-frame", frame=0), "found": b"0;"}),
+        ),
+        (
+            GOOD.replace("0.0 1.0 0.0 0 0 0", "0.0 1.0 0.0 0 0"),
+            ("F002.bvh-row", 33, {"frame": 0, "expected": 15, "found": 14}),
+        ),
+        (
+            GOOD.replace("10 20 30", "10 20 30 40"),
+            ("F002.bvh-row", 34, {"frame": 1, "expected": 15, "found": 16}),
+        ),
+        (
+            re.sub(r" 0\n", "\n", GOOD).replace(" 90\n", "\n"),
+            ("F002.bvh-row", 33, {"frame": 0, "expected": 15, "found": 14}),
+        ),
+        (
+            GOOD.replace("Frames: 2", "Frames: 30").replace(FRAMES, ""),
+            ("F002.bvh-no-frame", 32, {"expected": Phrase("bvh-frames", n=30), "rest": None}),
+        ),
+        (
+            GOOD.replace("Frames: 2", "Frames: 30").replace(FRAMES, "1 2 3\n"),
+            (
+                "F002.bvh-no-frame",
+                33,
+                {"expected": Phrase("bvh-frames", n=30), "rest": Phrase("bvh-part", n=3, width=15)},
+            ),
+        ),
+    ],
+)
+def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) -> None:
+    assert refusal(text) == fault
+
+
+@pytest.mark.parametrize(
+    ("text", "count", "warnings"),
+    [
+        (
+            GOOD.replace("Frames: 2", "Frames: 1"),
+            2,
+            [
+                (
+                    "F007.bvh-frames",
+                    34,
+                    {"expected": Phrase("bvh-frames", n=1), "found": 2, "rest": None},
+                )
+            ],
+        ),
+        (
+            GOOD.replace("Frames: 2", "Frames: 99999999999"),
+            2,
+            [
+                (
+                    "F007.bvh-frames",
+                    34,
+                    {"expected": Phrase("bvh-frames", n=99999999999), "found": 2, "rest": None},
+                )
+            ],
+        ),
+        (
+            GOOD.rstrip()[:-8],
+            1,
+            [
+                (
+                    "F007.bvh-frames",
+                    34,
+                    {
+                        "expected": Phrase("bvh-frames", n=2),
+                        "found": 1,
+                        "rest": Phrase("bvh-part", n=11, width=15),
+                    },
+                )
+            ],
+        ),
+        (
+            " ".join(GOOD.split()[:-4]),
+            1,
+            [
+                (
+                    "F007.bvh-frames",
+                    1,
+                    {
+                        "expected": Phrase("bvh-frames", n=2),
+                        "found": 1,
+                        "rest": Phrase("bvh-part", n=11, width=15),
+                    },
+                )
+            ],
+        ),
+        (GOOD.replace("Frames: 2\n", ""), 2, [("F007.bvh-no-count", 31, {})]),
+        (
+            GOOD.replace("Frame Time: 0.0333333\n", ""),
+            2,
+            [("F007.bvh-no-time", None, {"rate": 30.0})],
+        ),
+        (
+            GOOD.replace("0.0333333", "0"),
+            2,
+            [
+                (
+                    "F007.bvh-time",
+                    None,
+                    {"seconds": 0.0, "low": 1e-06, "high": 1000000.0, "rate": 30.0},
+                )
+            ],
+        ),
+        (
+            GOOD.replace("Frames: 2", "Frames: 0").replace(FRAMES, ""),
+            1,
+            [("F007.bvh-empty", 32, {})],
+        ),
+        (GOOD.partition("MOTION")[0], 1, [("F007.bvh-no-motion", 29, {})]),
+        (GOOD + "the end\n", 2, [("F006.bvh-after", 35, {"found": b"the"})]),
+        (GOOD.replace("}\nMOTION", "}\n}\nMOTION"), 2, [("F006.extra-braces", None, {"n": 1})]),
+        (
+            GOOD.replace("\t\tOFFSET 0.1 0.0 0.0\n", ""),
+            2,
+            [("F007.bvh-no-offset", 6, {"joint": Phrase("joint", name="LeftUpLeg")})],
+        ),
+        (
+            re.sub(r"\n\t+CHANNELS.*", "", GOOD),
+            1,
+            [("F007.bvh-no-channels", 28, {})],
+        ),
+    ],
+)
+def test_oddities_load_with_a_warning(text: str, count: int, warnings: list[Fault]) -> None:
+    motion, found = read(text)
+    assert motion.clip.n_rows == count
+    assert found == warnings
+
+
+def test_channels_of_an_end_site_are_counted_and_ignored() -> None:
+    text = one_joint("Xrotation", "30 40").replace("0 1.7 0 }", "0 1.7 0 CHANNELS 1 Yrotation }")
+    motion, warnings = read(text)
+    joint = Phrase("end-site", joint=Phrase("joint", name="a"))
+    assert warnings == [("F006.bvh-end-channels", 1, {"joint": joint})]
+    half = np.radians(15)
+    np.testing.assert_allclose(motion.clip.rotations, [[[np.sin(half), 0, 0, np.cos(half)]]])

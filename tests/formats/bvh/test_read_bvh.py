@@ -1,0 +1,297 @@
+"""The BVH reader: all rotation orders, positions on any joint, quirks, and estimates."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from formats.bvh_text import GOOD, one_joint, read
+from hypothesis import given
+from hypothesis import strategies as st
+
+from viewer.diagnostics import Phrase
+from viewer.formats import Source, detect
+from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+
+
+def about(axis: int, degrees: float) -> np.ndarray:
+    """Rotation about one axis, from the textbook."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array(
+        [
+            [[1, 0, 0], [0, c, -s], [0, s, c]],
+            [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        ][axis]
+    )
+
+
+def worlds(motion: SkeletonMotion) -> np.ndarray:
+    clip = motion.clip
+    times = np.arange(clip.n_rows) / clip.timing.frame_rate
+    return world_frames(motion.figure, frames_of(motion.figure, clip, times))
+
+
+def test_reads_every_part() -> None:
+    motion, warnings = read(GOOD)
+    skeleton = motion.figure.skeleton
+    assert warnings == []
+    assert (motion.figure.name, motion.figure.unit, motion.figure.up) == ("a", "m", "y")
+    assert skeleton.names == ("Hips", "LeftUpLeg", "LeftFoot", "Head")
+    np.testing.assert_array_equal(skeleton.parents, [-1, 0, 1, 0])
+    offsets = [[0, 0, 0], [0.1, 0, 0], [0, -0.9, 0], [0, 0.6, 0]]
+    np.testing.assert_array_equal(skeleton.rest_translations, offsets)
+    assert motion.clip.timing.frame_rate == 30.0
+    assert motion.clip.timing.rows.tolist() == [0, 1]
+    assert ("frames", "2 at 30 fps") in motion.figure.facts
+
+
+def test_joints_are_where_the_channels_put_them() -> None:
+    motion, _ = read(GOOD)
+    places = worlds(motion)[..., :3, 3]
+    # Frame 0: the thigh rotates by 90 degrees about z, so the foot, 0.9 below, is 0.9 to the right.
+    np.testing.assert_allclose(
+        places[0], [[0, 1, 0], [0.1, 1, 0], [1, 1, 0], [0, 1.6, 0]], atol=1e-15
+    )
+    turn = about(2, 10) @ about(0, 20) @ about(1, 30)
+    root = np.array([1.0, 2.0, 3.0])
+    leg = root + turn @ [0.1, 0, 0]
+    expected = [root, leg, leg + turn @ [0, -0.9, 0], root + turn @ [0, 0.6, 0]]
+    np.testing.assert_allclose(places[1], expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("order", [*itertools.permutations("XYZ"), "ZXZ", "XY", "Y", "XYZX", ""])
+def test_rotation_channels_multiply_from_left_to_right(order: str) -> None:
+    angles = [10.0, -130.0, 75.0, 33.0][: len(order)]
+    channels = " ".join(f"{axis}rotation" for axis in order) or "Xposition"
+    motion, _ = read(one_joint(channels, " ".join(map(str, angles)) or "0"))
+    expected = np.eye(3)
+    for axis, angle in zip(order, angles, strict=True):
+        expected = expected @ about("XYZ".index(axis), angle)
+    np.testing.assert_allclose(worlds(motion)[0, 0, :3, :3], expected, atol=1e-14)
+
+
+@given(st.permutations(["Xposition", "Zposition", "Yposition", "Zrotation", "Xrotation"]))
+def test_channels_come_in_any_order(channels: list[str]) -> None:
+    values = {"Xposition": 1.0, "Yposition": 2.0, "Zposition": 3.0, "Zrotation": 50, "Xrotation": 7}
+    motion, _ = read(one_joint(" ".join(channels), " ".join(str(values[c]) for c in channels)))
+    turn = np.eye(3)
+    for channel in channels:
+        if channel.endswith("rotation"):
+            turn = turn @ about("XYZ".index(channel[0]), values[channel])
+    world = worlds(motion)[0, 0]
+    np.testing.assert_allclose(world[:3, 3], [1, 2, 3], atol=1e-15)
+    np.testing.assert_allclose(world[:3, :3], turn, atol=1e-14)
+
+
+def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() -> None:
+    text = GOOD.replace(
+        "OFFSET 0.0 0.6 0.0\n\t\tCHANNELS 3", "OFFSET 0.0 0.6 0.0\n\t\tCHANNELS 4 Yposition"
+    )
+    text = text.replace("90 0 0 0 90 0 0 0 90", "90 0 0 0 90 0 0.75 0 0 90").replace(
+        "0 0 0 0 0 0 0 0 0\n", "0 0 0 0 0 0 0.5 0 0 0\n"
+    )
+    motion, warnings = read(text)
+    assert warnings == []
+    np.testing.assert_allclose(motion.clip.translations[:, 3], [[0, 0.15, 0], [0, -0.1, 0]])
+    np.testing.assert_allclose(worlds(motion)[0, 3, :3, 3], [0, 1.75, 0])
+
+
+def test_zero_positions_below_the_root_keep_the_offset() -> None:
+    six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+    text = GOOD.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
+    body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + "0 " * 24
+    motion, warnings = read(body)
+    assert warnings == [("F007.bvh-positions", None, {})]
+    np.testing.assert_allclose(worlds(motion)[0, 2, :3, 3], [0.1, -0.9, 0])
+
+
+def test_root_offset_is_replaced_too() -> None:
+    motion, _ = read(GOOD.replace("OFFSET 0.0 0.0 0.0", "OFFSET 5 6 7", 1))
+    np.testing.assert_allclose(worlds(motion)[:, 0, :3, 3], [[0, 1, 0], [1, 2, 3]], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\r"),
+        GOOD.replace("\n", "\r\r\n"),
+        " ".join(GOOD.split()),
+        GOOD.replace("\t", "    ").replace(" ", "  \t "),
+        GOOD.upper(),
+        GOOD.lower(),
+        GOOD.replace(" {", "{").replace("\n{", "{"),
+        "\ufeff" + GOOD + "\x1a",
+        GOOD.rstrip(),
+        "\n\n" + GOOD.replace("\n", "\n\n"),
+        GOOD.replace("Frames: ", "Frames:").replace("Time: ", "Time:"),
+        GOOD.replace("Frames: 2\nFrame Time: 0.0333333", "Frame Time: 0.0333333\nFrames: 2"),
+        GOOD.replace("End Site", "End Site tip").replace("\t\tOFFSET 0.0 0.6", "OFFSET 0 0.6"),
+    ],
+    ids=["crlf", "cr", "cr cr lf", "one line", "blanks", "capitals", "small", "glued", "bom",
+         "no end", "empty lines", "glued numbers", "time first", "named end"],
+)  # fmt: skip
+def test_quirks_load_without_warnings(text: str) -> None:
+    motion, warnings = read(text)
+    assert warnings == []
+    expected = worlds(read(GOOD)[0])
+    np.testing.assert_array_equal(worlds(motion), expected)
+
+
+def test_names_may_repeat_be_missing_or_contain_blanks() -> None:
+    text = GOOD.replace("LeftUpLeg", "arm").replace("LeftFoot", "arm").replace("Head", "")
+    motion, warnings = read(text.replace("Hips", "my  hips é"))
+    assert motion.figure.skeleton.names == ("my hips é", "arm", "arm", "")
+    assert warnings == []
+
+
+def test_several_roots() -> None:
+    head, tail = GOOD.split("MOTION")
+    second = "ROOT prop { OFFSET 1 0 0 CHANNELS 1 Xrotation }\n"
+    lines = tail.strip().split("\n")
+    rows = [f"{row} 45" for row in lines[2:]]
+    motion, _ = read(head + second + "MOTION\n" + "\n".join([*lines[:2], *rows]))
+    assert motion.figure.skeleton.parents.tolist() == [-1, 0, 1, 0, -1]
+    np.testing.assert_allclose(worlds(motion)[0, 4, :3, 3], [1, 0, 0])
+    np.testing.assert_allclose(worlds(motion)[1, 4, :3, :3], about(0, 45), atol=1e-15)
+
+
+def test_joints_without_channels_stay_at_rest() -> None:
+    three = "CHANNELS 3 Zrotation Xrotation Yrotation"
+    leg, foot, head = (f"{offset}\n{tabs}{three}" for offset, tabs in (
+        ("OFFSET 0.1 0.0 0.0", "\t\t"),
+        ("OFFSET 0.0 -0.9 0.0", "\t\t\t"),
+        ("OFFSET 0.0 0.6 0.0", "\t\t"),
+    ))  # fmt: skip
+    text = GOOD.replace(foot, "OFFSET 0.0 -0.9 0.0 CHANNELS 0").replace(head, "OFFSET 0 0.6 0")
+    text = text.replace(leg, leg.replace("Zrotation", "Xrotation", 1))
+    text = text.partition("0.0333333\n")[0] + "0.0333333\n" + "0 1 0 0 0 0 10 20 30\n" * 2
+    motion, warnings = read(text)
+    assert warnings == []
+    np.testing.assert_array_equal(motion.clip.rotations[:, 2:], [[[0, 0, 0, 1]] * 2] * 2)
+    np.testing.assert_allclose(
+        worlds(motion)[1, 2, :3, :3], about(0, 10) @ about(0, 20) @ about(1, 30), atol=1e-15
+    )
+
+
+def test_end_sites_are_the_far_ends_of_boxes() -> None:
+    boxes = read(GOOD)[0].figure.skeleton.boxes
+    # With a single child, twice the centre of a box is the child's offset.
+    np.testing.assert_allclose(boxes[3].sum(axis=0), [0, 0.2, 0], atol=1e-15)
+    np.testing.assert_allclose(boxes[2].sum(axis=0), [0, 0, 0.2], atol=1e-15)
+    np.testing.assert_allclose(boxes[1].sum(axis=0), [0, -0.9, 0], atol=1e-15)
+    assert boxes[0, 0, 1] < 0.0 and boxes[0, 1, 1] == 0.6 and boxes[0, 1, 0] == 0.1
+    assert (boxes[:, 1] > boxes[:, 0]).all()
+
+
+def test_quaternions_keep_their_sign_from_frame_to_frame() -> None:
+    angles = np.arange(0, 1500, 50)
+    motion, _ = read(
+        one_joint("Yrotation", "\n".join(str(a if a < 700 else a - 720) for a in angles))
+    )
+    rotations = motion.clip.rotations[:, 0]
+    half = np.radians(angles) / 2
+    expected = np.stack([0 * half, np.sin(half), 0 * half, np.cos(half)], axis=1)
+    np.testing.assert_allclose(rotations, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("written", "rate"),
+    [
+        ("0.0333333", 30.0),
+        ("0.033333", 30.0),
+        ("0.0333", 30.0),
+        ("0.033", 30.0),
+        ("0.03336667", 30000 / 1001),
+        ("0.0333667", 30000 / 1001),
+        ("0.0417083", 24000 / 1001),
+        ("0.041667", 24.0),
+        ("0.0083333", 120.0),
+        ("0.00833333333333", 120.0),
+        ("8.3333333e-3", 120.0),
+        ("0.0166667", 60.0),
+        ("0.05", 20.0),
+        ("0.1", 10.0),
+        ("1", 1.0),
+        ("2", 0.5),
+        ("0.027027", 37.0),
+        ("0.034567", 1 / 0.034567),
+    ],
+)
+def test_frame_rate_snaps_to_the_common_one_matching_the_frame_time(
+    written: str, rate: float
+) -> None:
+    motion, warnings = read(GOOD.replace("0.0333333", written))
+    assert warnings == []
+    assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-15)
+
+
+def near(number: float) -> float:
+    return pytest.approx(number, rel=1e-9)
+
+
+def of_size(unit: str, size: float, metres: float = 0.0) -> Phrase:
+    return Phrase("unit-from-size", unit=unit, size=near(size), metres=near(metres))
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit", "warnings"),
+    [
+        (1, "m", []),
+        (100, "cm", [of_size("centimetres", 170)]),
+        (1000, "mm", [of_size("millimetres", 1700)]),
+        (
+            40,
+            "cm",
+            [of_size("centimetres", 68, 1.7272)],
+        ),
+        (10, "", [Phrase("unit-unknown", size=near(17), metres=0.0)]),
+        (1e5, "", [Phrase("unit-unknown", size=near(1.7e5), metres=0.0)]),
+    ],
+)
+def test_unit_is_guessed_from_the_height(factor: float, unit: str, warnings: list[Phrase]) -> None:
+    text = one_joint("Xrotation", "0").replace("0 1.7 0", f"0 {1.7 * factor:g} 0")
+    motion, found = read(text)
+    assert (motion.figure.unit, found) == (unit, warnings)
+    assert motion.figure.facts[0][0] == "unit"
+
+
+def test_z_is_up_if_the_head_is_above_the_feet_along_z() -> None:
+    text = GOOD.replace("0.0 -0.9 0.0", "0 0 -0.9").replace("0.0 0.6 0.0", "0.0 0.0 0.6")
+    motion, warnings = read(text.replace("0.0 1.0 0.0 0 0 0", "0 0 1 0 0 0"))
+    assert motion.figure.up == "z"
+    assert warnings == [Phrase("up-of-head", up="z")]
+
+
+def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
+    motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
+    assert motion.figure.up == "z"
+    assert warnings == [Phrase("up-of-longest", up="z")]
+
+
+def test_frames_upright_along_another_axis_are_reported() -> None:
+    # A rest pose along y, turned by 90 degrees about x in every frame: a z-up world.
+    rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
+    motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
+    assert motion.figure.up == "y"
+    assert warnings == [Phrase("up-against-frames", up="y", axis="+z")]
+
+
+def test_content_determines_the_format() -> None:
+    assert detect(Source("x.bvh", GOOD.encode())) == "bvh"
+    assert detect(Source("x.txt", b"  hierarchy\nroot a{}")) == "bvh"
+
+
+def test_deep_chain_loads_without_recursion() -> None:
+    depth = 5000
+    text = "HIERARCHY " + "".join(
+        f"{'JOINT' if j else 'ROOT'} j{j} {{ OFFSET 0 0.001 0 CHANNELS 1 Xrotation "
+        for j in range(depth)
+    )
+    text += "}" * depth + " MOTION Frames: 1 Frame Time: 0.1 " + "0 " * depth
+    motion, _ = read(text)
+    assert motion.figure.skeleton.n_joints == depth
+    np.testing.assert_allclose(worlds(motion)[0, -1, :3, 3], [0, 5.0, 0], atol=1e-9)

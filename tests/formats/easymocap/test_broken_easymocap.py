@@ -1,0 +1,341 @@
+"""Broken frame files: each is reported and becomes a gap, and the others are read."""
+
+import json
+import os
+import random
+
+import numpy as np
+import pytest
+from faults import INF, NAN, fault_of
+from formats.capture_files import body, noticed, opened, points, rows_of, write_frames
+from formats.easymocap.capture_faults import gap
+
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
+from viewer.formats import Source, easymocap
+
+
+def refusal(path, **options):
+    with pytest.raises(FormatError) as caught:
+        easymocap.open_capture(Source.open(path, **options))
+    assert str(caught.value).isprintable()
+    return fault_of(caught.value.diagnostic)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", ("F007.record", 1, {"problem": ("F002.json", None, {"reason": "Expecting value"})})),
+        ("[\n{\n", ("F007.record", 3, {"problem": ("F002.json", None,
+         {"reason": "Expecting property name enclosed in double quotes"})})),
+        ("[1, 2", ("F007.record", 1, {"problem": ("F002.json", None,
+         {"reason": "Expecting ',' delimiter"})})),
+        ("null", ("F007.record", 1, {"problem": ("F002.capture-list", None,
+         {"found": Phrase("found-nothing")})})),
+        ("17", ("F007.record", 1, {"problem": ("F002.capture-list", None,
+         {"found": Phrase("found-value", value="17")})})),
+        ('{"id": 0}', ("F007.record", 1, {"problem": ("F002.capture-list", None,
+         {"found": Phrase("found-named", n=1)})})),
+        ('{"annots":\n 3}', ("F007.record", 1, {"problem": ("F002.capture-list", None,
+         {"found": Phrase("found-value", value="3")})})),
+        ("\n[" * 100_000, ("F007.record", 100001, {"problem": ("F002.json-nesting", None, {})})),
+        (f"[\n1{'0' * 5000}]", ("F007.record", 2, {"problem": ("F002.capture-digits", None,
+         {"most": 4300})})),
+        ('[{"id": 0, "poses": [1],\n"poses": [2]}]', ("F007.record", 2,
+         {"problem": ("F002.json-twice", None, {"found": "poses"})})),
+    ],
+)  # fmt: skip
+def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
+    warnings, parts = gap(tmp_path, content)
+    assert warnings == [message]
+    assert rows_of(parts, 0) == [0, 2]
+
+
+def test_binary_file_is_a_gap(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
+    (folder / "000001.json").write_bytes(b"[\n\xff\xfe]")
+    (folder / "000002.json").write_bytes(b"\xef\xbb\xbf[]")  # a byte order mark is accepted
+    _, parts, _ = opened(tmp_path)
+    problem = ("F002.capture-text", None, {})
+    found = noticed(parts, folder / "000001.json")
+    assert found == [("F007.record", 2, {"problem": problem})]
+
+
+def test_large_file_is_a_gap(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0)], 1: " " * 9000 + "[]"})
+    parts = list(easymocap.read(Source.open(tmp_path, max_size=5000)).parts())
+    problem = ("F001.too-large", None, {"most": 5000, "size": 9002})
+    found = noticed(parts[1:2], folder / "000001.json")
+    assert found == [("F007.record", None, {"problem": problem})]
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root reads everything")
+def test_unreadable_file_is_a_gap(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0)], 1: []})
+    (folder / "000001.json").chmod(0)
+    _, parts, _ = opened(tmp_path)
+    problem = ("F001.unreadable", None, {"reason": "Permission denied", "near": ""})
+    found = noticed(parts[1:2], folder / "000001.json")
+    assert found == [("F007.record", None, {"problem": problem})]
+
+
+def test_file_that_vanishes_is_a_gap(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0)], 1: [body(0)]})
+    capture = easymocap.read(Source.open(tmp_path))
+    (folder / "000001.json").unlink()
+    problem = ("F001.unreadable", None, {"reason": "No such file or directory", "near": ""})
+    found = noticed(list(capture.parts()), folder / "000001.json")
+    assert found == [("F007.record", None, {"problem": problem})]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_pipe_among_the_frames_is_ignored(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
+    os.mkfifo(folder / "000001.json")
+    capture, _, warnings = opened(tmp_path)
+    assert capture.n_frames == 1
+    assert warnings == [("F007.capture-no-files", None, {"names": ["000001.json"]})]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"poses": [[0.0] * 71]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-count", expected=72, found=71)})})),
+        ({"poses": [[0.0] * 165]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-count", expected=72,
+         found=165)})})),
+        ({"poses": [[0.0] * 71 + ["1"]]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
+         found=Phrase("found-value", value="'1'"))})})),
+        ({"poses": [[0.0] * 71 + [None]]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
+         found=Phrase("found-nothing"))})})),
+        ({"poses": [[0.0] * 71 + [[1.0]]]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
+         found=Phrase("found-list", n=1))})})),
+        ({"poses": [[0.0] * 71 + [10**400]]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-odd", expected=72,
+         found=Phrase("found-value", value="100000000000000000000000000000000000000…"))})})),
+        ({"poses": [[0.0] * 72] * 2}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-count", expected=72, found=2)})})),
+        ({"poses": "0" * 72}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: poses", "problem": Phrase("record-numbers",
+         found=Phrase("found-value", value="'00000000000000000000000000000000000000…"))})})),
+        ({"poses": None, "pose": 1}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0", "problem": Phrase("record-lacks", expected=("poses", "keypoints3d"),
+         keys=["id", "Rh", "Th", "shapes", "pose"])})})),
+        ({"poses": [[float("nan")] * 72]}, ("F007.record", 1, {"problem": ("F003.record", None,
+         {"item": "person 0: poses", "problem": Phrase("not-finite", found=NAN)})})),
+        ({"Th": [[0.0, 1e300, 0.0]]}, ("F007.record", 1, {"problem": ("F003.record", None,
+         {"item": "person 0: Th", "problem": Phrase("beyond-limit", limit=1000000000.0,
+         found=1e300)})})),
+        ({"Rh": [[0.0, float("-inf"), 0.0]]}, ("F007.record", 1, {"problem": ("F003.record", None,
+         {"item": "person 0: Rh", "problem": Phrase("not-finite", found=-INF)})})),
+        ({"Rh": None}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: Rh", "problem": Phrase("record-numbers",
+         found=Phrase("found-no-key"))})})),
+        ({"Th": 3}, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "person 0: Th",
+         "problem": Phrase("record-numbers", found=Phrase("found-value", value="3"))})})),
+        ({"Th": {"x": 1, "y": 2, "z": 3}}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: Th", "problem": Phrase("record-numbers", found=Phrase("found-named",
+         n=3))})})),
+        ({"shapes": [[1.0] * 9]}, ("F007.record", 1, {"problem": ("F002.record", None,
+         {"item": "person 0: shapes", "problem": Phrase("record-count", expected=10, found=9)})})),
+    ],
+)  # fmt: skip
+def test_broken_record_is_a_gap_for_one_person(tmp_path, changes, message):
+    folder = write_frames(
+        tmp_path / "smpl",
+        {0: [body(0), body(1)], 1: [body(0, **changes), body(1)], 2: [body(0), body(1)]},
+    )
+    _, parts, _ = opened(tmp_path)
+    assert (rows_of(parts, 0), rows_of(parts, 1)) == ([0, 2], [0, 1, 2])
+    assert noticed(parts, folder / "000001.json") == [message]
+    assert parts[1].bodies[0].n_rows == 1
+    assert np.isfinite(parts[1].bodies[0].vectors).all()
+
+
+@pytest.mark.parametrize(
+    ("person", "message"),
+    [
+        (1.5, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
+         "problem": Phrase("record-id", found=Phrase("found-value", value="1.5"))})})),
+        ("me", ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
+         "problem": Phrase("record-id", found=Phrase("found-value", value="'me'"))})})),
+        (True, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
+         "problem": Phrase("record-id", found=Phrase("found-value", value="True"))})})),
+        ([1], ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
+         "problem": Phrase("record-id", found=Phrase("found-list", n=1))})})),
+        (1 << 40, ("F007.record", 1, {"problem": ("F002.record", None, {"item": "id",
+         "problem": Phrase("record-id-limit", limit=2147483648, found=Phrase("found-value",
+         value="1099511627776"))})})),
+    ],
+)  # fmt: skip
+def test_person_without_a_number_is_left_out(tmp_path, person, message):
+    warnings, _ = gap(tmp_path, [body(0, id=person)])
+    assert warnings == [message]
+
+
+def test_whole_numbers_may_be_written_as_fractions(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [body(2.0)]})
+    assert list(opened(tmp_path)[1][0].bodies) == [2]
+
+
+def test_non_record_is_left_out(tmp_path):
+    warnings, parts = gap(tmp_path, [None, 3, body(0)])
+    assert warnings == [
+        (
+            "F007.record",
+            1,
+            {
+                "problem": (
+                    "F002.record",
+                    None,
+                    {"item": "", "problem": Phrase("record-person", found=Phrase("found-nothing"))},
+                )
+            },
+        ),
+        (
+            "F007.record",
+            1,
+            {
+                "problem": (
+                    "F002.record",
+                    None,
+                    {
+                        "item": "",
+                        "problem": Phrase("record-person", found=Phrase("found-value", value="3")),
+                    },
+                )
+            },
+        ),
+    ]
+    assert rows_of(parts, 0) == [0, 1, 2]
+
+
+def test_first_of_two_records_with_one_id_is_used(tmp_path):
+    warnings, parts = gap(tmp_path, [body(0, seed=1.0), body(0, seed=2.0)])
+    assert warnings == [
+        ("F007.record", 1, {"problem": ("F002.record-twice", None, {"item": "person 0"})})
+    ]
+    assert parts[1].bodies[0].translations[0, 0] == body(0, seed=1.0)["Th"][0][0]
+
+
+def test_untracked_people_are_named_in_messages(tmp_path):
+    warnings, _ = gap(tmp_path, [body(-1), body(-1, Th=[[float("nan"), 0.0, 0.0]])])
+    assert warnings == [
+        ("F007.record-untracked", None, {}),
+        (
+            "F007.record",
+            1,
+            {
+                "problem": (
+                    "F003.record",
+                    None,
+                    {"item": "untracked 2: Th", "problem": Phrase("not-finite", found=NAN)},
+                )
+            },
+        ),
+    ]
+
+
+def test_two_ids_for_one_person_are_reported(tmp_path):
+    warnings, parts = gap(tmp_path, [body(0, personID=4), body(1, personID=1)])
+    assert warnings == [("F007.record-ids", None, {})]
+    assert rows_of(parts, 1) == [1]
+
+
+def test_many_errors_are_counted(tmp_path):
+    broken = dict.fromkeys(range(1, 31), "[")
+    write_frames(tmp_path / "smpl", {0: [body(0)], **broken, 31: [body(0)]})
+    _, parts, _ = opened(tmp_path)
+    warnings = noticed(parts)
+    assert len(warnings) == 21
+    assert warnings[-1] == ("F007.records", None, {"name": tmp_path.name, "n": 10})
+
+
+# Nothing to read
+
+
+def test_only_broken_files_are_refused(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: "[", 1: "3"})
+    with pytest.raises(FormatError) as caught:
+        easymocap.read(Source.open(tmp_path))
+    key, _, values = fault_of(caught.value.diagnostic)
+    assert (caught.value.path, key, values["n"]) == (tmp_path, "F002.capture-people-fault", 2)
+    assert values["problem"][:2] == ("F002.json", 1)
+    assert f"{folder}/000000.json:1: expected JSON, found" in str(caught.value)
+
+
+def test_vposer_latent_code_is_refused(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [body(0, 32)]})
+    problem = Phrase("record-vposer", found=32)
+    fault = ("F002.record", 1, {"item": "person 0: poses", "problem": problem})
+    assert refusal(tmp_path / "smpl" / "000000.json") == fault
+
+
+def test_unknown_length_is_refused_with_the_known_ones(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [body(0, 90)]})
+    lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
+    problem = Phrase("record-lengths", expected=lengths, found=90)
+    fault = ("F002.record", 1, {"item": "person 0: poses", "problem": problem})
+    assert refusal(tmp_path / "smpl" / "000000.json") == fault
+
+
+def test_capture_without_people_is_refused(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [], 1: []})
+    assert refusal(tmp_path) == ("F002.capture-people", None, {"n": 2})
+
+
+def test_folder_without_frames_is_refused(tmp_path):
+    (tmp_path / "smpl").mkdir()
+    assert refusal(tmp_path) == (("F002.capture-frames", None, {}))
+
+
+def test_two_dimensional_points_are_refused(tmp_path):
+    write_frames(tmp_path / "annots", {0: {"annots": [{"personID": 0, "keypoints": [[1, 2, 1]]}]}})
+    found = refusal(tmp_path / "annots")[2]["problem"]
+    wanted, keys = ("poses", "keypoints3d"), ["personID", "keypoints"]
+    problem = Phrase("record-lacks", expected=wanted, keys=keys)
+    assert found == ("F002.record", 1, {"item": "person 0", "problem": problem})
+
+
+def test_mutations_are_read_or_refused_in_one_line(tmp_path):
+    record = body(0, 78) | points(0, 17) | {"expression": [[0.5] * 10]}
+    good = json.dumps([record, body(-1, 78)])
+    pieces = [
+        "[",
+        "]",
+        "{",
+        "}",
+        '"',
+        ",",
+        ":",
+        "null",
+        "NaN",
+        "1e999",
+        "-1",
+        '"id"',
+        "[[]]",
+        "true",
+    ]
+    folder, path = write_frames(tmp_path / "smpl", {0: good}), tmp_path / "smpl" / "000001.json"
+    rng = random.Random(4)
+    for _ in range(400):
+        text = list(good)
+        for _ in range(rng.choice((1, 1, 2, 5))):
+            start = rng.randrange(len(text))
+            text[start : start + rng.choice((0, 1, 3, 40, 400))] = rng.choice(pieces)
+        path.write_text("".join(text))
+        _, parts, _ = opened(tmp_path)
+        assert 0 in parts[0].bodies
+        for part in parts:
+            lines = [*map(str, part.warnings)]
+            assert all(line.isprintable() and str(folder) in line for line in lines)
+            assert all(np.isfinite(motion.vectors).all() for motion in part.bodies.values())
+            assert all(np.isfinite(clip.points).all() for _, clip in part.points.values())
+        try:
+            list(easymocap.read(Source.open(path)).parts())
+        except FormatError as problem:
+            assert str(problem).isprintable()

@@ -1,0 +1,116 @@
+"""An invalid first record: it becomes a gap, and does not define the layout of the others."""
+
+import json
+
+import pytest
+from faults import INF
+from formats.capture_files import body, noticed, opened, points, rows_of, write_frames
+
+from viewer.diagnostics import Phrase
+
+INFINITE = json.loads("1e400")
+
+
+def fault_in(parts, path):
+    """Return the line and the text of the only error."""
+    ((key, line, values),) = noticed(parts, path)
+    assert key == "F007.record"
+    return line, values["problem"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"shapes": [[], []]}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-odd", expected=2, found=Phrase("found-empty-list"))})),
+        ({"shapes": [[None]]}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-odd", expected=1, found=Phrase("found-nothing"))})),
+        ({"shapes": [[INFINITE]]}, ("F003.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("not-finite", found=INF)})),
+        ({"shapes": "x"}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-numbers", found=Phrase("found-value", value="'x'"))})),
+        ({"shapes": {}}, ("F002.record", None, {"item": "person 0: shapes",
+         "problem": Phrase("record-numbers", found=Phrase("found-no-named"))})),
+        ({"expression": [["a"]]}, ("F002.record", None, {"item": "person 0: expression",
+         "problem": Phrase("record-odd", expected=1, found=Phrase("found-value", value="'a'"))})),
+        ({"expression": [[INFINITE] * 3]}, ("F003.record", None, {"item": "person 0: expression",
+         "problem": Phrase("not-finite", found=INF)})),
+        ({"poses": [[None] * 69]}, ("F002.record", None, {"item": "person 0: poses",
+         "problem": Phrase("record-odd", expected=69, found=Phrase("found-nothing"))})),
+        ({"poses": [[INFINITE] * 165]}, ("F003.record", None, {"item": "person 0: poses",
+         "problem": Phrase("not-finite", found=INF)})),
+        ({"Th": [[1.0]], "shapes": [[1.0]]}, ("F002.record", None, {"item": "person 0: Th",
+         "problem": Phrase("record-count", expected=3, found=1)})),
+    ],
+)  # fmt: skip
+def test_width_comes_from_usable_records(tmp_path, changes, message):
+    others = {"expression": [[0.5] * 10]} if "expression" in changes else {}
+    good = [body(0, **others), body(1, **others)]
+    first = json.dumps([{**good[0], **changes}, good[1]], indent=1)
+    (key, *_) = changes
+    rows = [number for number, row in enumerate(first.splitlines(), 1) if f'"{key}":' in row]
+    folder = write_frames(tmp_path / "smpl", {0: first, 1: good, 2: good})
+    _, parts, _ = opened(tmp_path)
+    assert (rows_of(parts, 0), rows_of(parts, 1)) == ([1, 2], [0, 1, 2])
+    assert fault_in(parts, folder / "000000.json") == (rows[0], message)
+
+
+@pytest.mark.parametrize("key", ["handl", "handr"])
+def test_width_of_hands_comes_from_usable_records(tmp_path, key):
+    good = body(0, 63, handl=[[0.5] * 6], handr=[[0.5] * 6])
+    folder = write_frames(tmp_path / "smpl", {0: [{**good, key: [[None]]}], 1: [good]})
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 0) == [1]
+    line, (_, _, values) = fault_in(parts, folder / "000000.json")
+    problem = Phrase("record-odd", expected=1, found=Phrase("found-nothing"))
+    assert (line, values) == (1, {"item": f"person 0: {key}", "problem": problem})
+
+
+def test_late_invalid_coefficients_do_not_set_the_width_either(tmp_path):
+    bare, bad, good = body(0, shapes=None), body(0, shapes=[[None]]), body(0)
+    folder = write_frames(tmp_path / "smpl", {0: [bare], 1: [bad], 2: [good], 3: [good]})
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 0) == [0, 2, 3]
+    first = next(found for part in parts for found in part.warnings)
+    assert (first.path, first.line) == (folder / "000001.json", 1)
+    assert first.values["problem"].values["item"] == "person 0: shapes"
+
+
+@pytest.mark.parametrize(
+    "rows", [[[]], [[None] * 4], [[INFINITE, 0.0, 0.0, 1.0]], [[1.0, 2.0]], [["a", 1, 2]], [[[]]]]
+)
+def test_number_of_keypoints_comes_from_usable_records(tmp_path, rows):
+    good, bad = [points(0), points(1)], points(0) | {"keypoints3d": rows}
+    folder = write_frames(tmp_path / "keypoints3d", {0: [bad, good[1]], 1: good})
+    _, parts, _ = opened(tmp_path)
+    seen = [sorted(person for part in parts if person in part.points) for person in (0, 1)]
+    assert seen == [[0] * len(seen[0]), [1] * len(parts)]
+    counts = [part.points[0][1].points.shape[:2] for part in parts if 0 in part.points]
+    assert sum(rows for rows, _ in counts) == 1 and {count for _, count in counts} == {25}
+    line, (_, _, values) = fault_in(parts, folder / "000000.json")
+    assert (line, values["item"]) == (1, "person 0: keypoints3d")
+    assert values["problem"].key in ("record-rows", "record-other-rows", "record-no-rows")
+
+
+def test_unseen_keypoints_determine_the_count(tmp_path):
+    unseen = {"keypoints3d": [[0.0] * 4] * 25}
+    write_frames(tmp_path / "keypoints3d", {0: [points(0) | unseen], 1: [points(0)]})
+    _, parts, _ = opened(tmp_path)
+    assert sum(len(part.points[0][1].points) for part in parts) == 2
+
+
+def test_accepted_pose_lengths_are_listed(tmp_path):
+    folder = write_frames(tmp_path / "smpl", {0: [body(0, poses=[[0.0] * 7])], 1: [body(0)]})
+    _, parts, _ = opened(tmp_path)
+    _, (_, _, values) = fault_in(parts, folder / "000000.json")
+    lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
+    problem = Phrase("record-lengths", expected=lengths, found=7)
+    assert values == {"item": "person 0: poses", "problem": problem}
+
+
+def test_empty_record_has_no_keys(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [{}], 1: [body(0)]})
+    _, parts, _ = opened(tmp_path)
+    problem = Phrase("record-no-keys", expected=("poses", "keypoints3d"))
+    faults = [values.get("problem") for _, _, values in noticed(parts)]
+    assert ("F002.record", None, {"item": "person 0", "problem": problem}) in faults

@@ -1,0 +1,375 @@
+"""Pickles with false sizes, repeated or circular values, or random damage."""
+
+from __future__ import annotations
+
+import pickle
+import struct
+import time
+import tracemalloc
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from faults import Fault, fault_of
+from formats.pickle.pickle_costs import self_contained
+from formats.pickle_bytes import (
+    array,
+    array_of,
+    created,
+    element_type,
+    finished,
+    mapping,
+    matrix,
+    named,
+    opened,
+    payload,
+    refusal,
+    saved,
+    several,
+    shape,
+    text,
+    unicode,
+    whole,
+)
+
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
+from viewer.formats._archive.values import Opaque
+
+pytestmark = pytest.mark.slow
+BOUND = 64 << 20  # bytes of memory that a refusal may need
+PATIENCE = 5.0  # seconds; far more than needed, even on a busy machine
+
+
+def is_too_long(fault: Fault) -> bool:
+    """Return whether a pickle was refused for its number of opcodes."""
+    return fault[2]["problem"] == Phrase("pickle-steps", most=1_000_000)
+
+
+ENDLESS = Opaque(Phrase("unread-endless"))
+
+
+def cost(action: Callable[[], Any]) -> int:
+    """Return the peak memory of an action in bytes."""
+    started = time.process_time()
+    tracemalloc.start()
+    try:
+        action()
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert time.process_time() - started < PATIENCE * 4  # tracing is slow
+    return most
+
+
+@pytest.mark.parametrize(
+    ("body", "line"),
+    [
+        (array_of((1 << 40,), b"12345678"), ("F002.pickle", None,
+         {"problem": Phrase("array-bytes", shape=(1099511627776,), dtype="float64", found=8)})),
+        (array_of((1 << 20,) * 4, bytes(8)), ("F002.pickle", None,
+         {"problem": Phrase("array-bytes", shape=(1048576, 1048576, 1048576, 1048576),
+         dtype="float64", found=8)})),
+        (array_of((0, 1 << 61), b""), ("F002.pickle", None, {"problem": Phrase("array-bytes",
+         shape=(0, 2305843009213693952), dtype="float64", found=0)})),
+        (array_of((2,), b"12345678"), ("F002.pickle", None, {"problem": Phrase("array-bytes",
+         shape=(2,), dtype="float64", found=8)})),
+        (array_of((1,), b"123456789"), ("F002.pickle", None, {"problem": Phrase("array-bytes",
+         shape=(1,), dtype="float64", found=9)})),
+        (array_of((), b""), ("F002.pickle", None, {"problem": Phrase("array-bytes", shape=(),
+         dtype="float64", found=0)})),
+        (array_of((1, 0), b"12345678"), ("F002.pickle", None, {"problem": Phrase("array-bytes",
+         shape=(1, 0), dtype="float64", found=8)})),
+        (array_of((1,), b"12345678", "i4", ">"), ("F002.pickle", None,
+         {"problem": Phrase("array-bytes", shape=(1,), dtype="int32", found=8)})),
+        (array_of((1 << 40,), b"abcd", "S4", "|"), ("F002.pickle", None,
+         {"problem": Phrase("array-bytes", shape=(1099511627776,), dtype="bytes32", found=4)})),
+    ],
+)  # fmt: skip
+def test_shapes_that_do_not_match_their_bytes(body: bytes, line: Fault) -> None:
+    data = saved(v=body)
+    assert refusal(data) == line
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+@pytest.mark.parametrize("code", ["S0", "U0", "S1048577", "f16", "c16", "V8", "O8", "q", "(8)f8"])
+def test_element_types_without_numbers_are_not_evaluated(code: str) -> None:
+    made = named("numpy", "dtype") + several(text(code), whole(0), whole(1)) + b"R"
+    body = array_of((1 << 40,), b"").replace(element_type(), made)
+    found = opened(saved(v=body)).get("v")
+    assert isinstance(found, Opaque)
+
+
+@pytest.mark.parametrize("sides", [(1,) * 33, (1,) * 100_000, (1 << 62,), (1 << 2000,)])
+def test_shapes_beyond_numpy_limits(sides: tuple[int, ...]) -> None:
+    line = refusal(saved(v=array_of(sides, b"12345678")))
+    assert line == (
+        "F002.pickle",
+        None,
+        {"problem": Phrase("pickle-array-state", found=Phrase("noun-other", kind="tuple"))},
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"sides": (1 << 31, 3)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-size", most=134217728, shape=(2147483648, 3))})),
+        ({"sides": (2, 1 << 27)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-starts", expected=134217729, shape=(2, 134217728), found=4)})),
+        ({"sides": (2, 1 << 61)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-size", most=134217728, shape=(2, 2305843009213693952))})),
+        ({"indices": (0, 2, 0)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-range", last=1, low=0, high=2)})),
+        ({"indices": (0, -1, 0)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-range", last=1, low=-1, high=0)})),
+        ({"indices": (0, 1)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-count", expected=3, found=2)})),
+        ({"indptr": (0, 2, 1, 3)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-order", count=3)})),
+        ({"indptr": (0, 1, 1, 4)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-order", count=3)})),
+        ({"indptr": (1, 1, 1, 3)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-order", count=3)})),
+        ({"indptr": (0, 1, 3)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-starts", expected=4, shape=(2, 3), found=3)})),
+        ({"indptr": (), "sides": (2, 0)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-starts", expected=1, shape=(2, 0), found=0)})),
+        ({"data": ((1.0, 2.0, 3.0),)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-shapes")})),
+        ({"shape_key": "form"}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-no-shape")})),
+        ({"sides": (1, 2, 3)}, ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("sparse-no-shape")})),
+    ],
+)  # fmt: skip
+def test_sparse_matrices_that_contradict_themselves(changes: Any, line: Fault) -> None:
+    data = saved(v=matrix(**changes))
+    assert refusal(data) == line
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+def test_sparse_shape_is_checked_before_densifying() -> None:
+    archive = opened(saved(v=matrix(sides=(1 << 27, 3))))
+    with pytest.raises(FormatError) as caught:
+        archive.sparse("v", (24, 3))
+    assert fault_of(caught.value.diagnostic) == (
+        "F002.value",
+        None,
+        {
+            "item": "v",
+            "expected": Phrase("wanted-numbers", shape=(24, 3)),
+            "found": Phrase("found-sparse", shape=(134217728, 3)),
+        },
+    )
+
+
+def test_sparse_matrix_without_parts() -> None:
+    state = mapping(_shape=shape(2, 3), data=whole(1))
+    body = created("scipy.sparse.csc", "csc_matrix", state)
+    assert refusal(saved(v=body)) == (
+        "F002.archive-value",
+        None,
+        {"item": "v", "problem": Phrase("sparse-no-part", part="data")},
+    )
+
+
+def selection(indices: list[int], *sides: int) -> bytes:
+    state = mapping(
+        a=array(np.arange(6.0)), idxs=array(np.array(indices)), preferred_shape=shape(*sides)
+    )
+    return saved(v=created("chumpy.reordering", "Select", state))
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (selection([0, 6], 2), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("pickle-selection-range", last=5, low=0, high=6)})),
+        (selection([-1, 0], 2), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("pickle-selection-range", last=5, low=-1, high=0)})),
+        (selection([0, 1], 1 << 40), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("pickle-selection", expected="1099511627776",
+         name="chumpy.reordering.Select", found=2)})),
+        (selection([0, 1], *[1 << 61] * 32), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("pickle-selection",
+         expected="407897962615157369808412540087403635887…", name="chumpy.reordering.Select",
+         found=2)})),
+        (selection([0, 1], 3, 1), ("F002.archive-value", None, {"item": "v",
+         "problem": Phrase("pickle-selection", expected="3", name="chumpy.reordering.Select",
+         found=2)})),
+    ],
+)  # fmt: skip
+def test_selections_out_of_range(data: bytes, line: Fault) -> None:
+    assert refusal(data) == line
+
+
+def test_selection_of_long_strings_is_not_evaluated() -> None:
+    long = array_of((1,), b"x" * 100_000, "S100000", "|")
+    state = mapping(a=long, idxs=array(np.zeros(100_000, np.uint8)), preferred_shape=shape(100_000))
+    archive = opened(saved(v=created("chumpy.reordering", "Select", state)))
+    assert archive.get("v") == Opaque(Phrase("unread-indices", name="chumpy.reordering.Select"))
+
+
+@pytest.mark.parametrize("name", ["Ch", "ChHandle"])
+def test_expression_that_contains_itself(name: str) -> None:
+    body = named("chumpy.ch", name) + b")\x81q\x01}" + text("x") + b"h\x01sb"
+    found = opened(saved(v=body)).get("v")
+    assert found == Opaque(Phrase("unread-expression-endless", name=f"chumpy.ch.{name}"))
+
+
+def test_containers_that_contain_themselves() -> None:
+    data = saved(
+        a=b"]q\x01h\x01a",
+        b=b"}q\x02" + text("x") + b"h\x02s",
+        c=b"]q\x03h\x03\x85q\x04ah\x04",
+        good=array(np.ones(1)),
+    )
+    archive = opened(data.replace(b"h\x04" + text("good"), text("good")))
+    assert [archive.get(key) for key in "abc"] == [ENDLESS] * 3
+    assert archive.array("good").shape == (1,)
+
+
+WRAPPERS = {
+    "list": (b"]", b"a"),
+    "tuple": (b"", b"\x85"),
+    "dict": (b"}" + text("k"), b"s"),
+    "chumpy": (named("chumpy.ch", "Ch") + b")\x81}" + text("x"), b"sb"),
+}
+
+
+@pytest.mark.parametrize("kind", WRAPPERS)
+def test_nesting_100_000_deep(kind: str) -> None:
+    before, after = WRAPPERS[kind]
+    found = opened(saved(v=before * 100_000 + b"N" + after * 100_000)).get("v")
+    assert found == ENDLESS or found == Opaque(
+        Phrase("unread-expression-endless", name="chumpy.ch.Ch")
+    )
+
+
+def doubled(first: bytes, step: Callable[[bytes], bytes], count: int) -> bytes:
+    body = first + b"q\x00"
+    for number in range(count):
+        body += b"0" + step(b"h" + bytes([number])) + b"q" + bytes([number + 1])
+    return body
+
+
+@pytest.mark.parametrize("count", [20, 100])
+def test_lists_of_the_same_list_twice(count: int) -> None:
+    """The billion laughs: 2^100 items in 800 bytes."""
+    for step in (lambda inner: b"](" + inner * 2 + b"e", lambda inner: inner * 2 + b"\x86"):
+        data = saved(v=doubled(b"]", step, count))
+        assert opened(data).get("v") == ENDLESS
+        assert cost(lambda data=data: opened(data).get("v")) < BOUND
+
+
+def test_sets_of_the_same_list_repeatedly() -> None:
+    items = b"](" + b"N" * 100_000 + b"eq\x01"
+    again = named("__builtin__", "set") + b"(h\x01tR"
+    data = saved(v=b"](" + items + again * 1000 + b"e")
+    assert is_too_long(refusal(data))
+
+
+def test_dicts_with_the_same_key_repeatedly() -> None:
+    items = b"](" + (text("k") + b"N\x86") * 100_000 + b"eq\x01"
+    again = named("collections", "OrderedDict") + b"(h\x01tR"
+    data = saved(v=b"](" + items + again * 1000 + b"e")
+    assert is_too_long(refusal(data))
+
+
+def test_long_string_used_repeatedly() -> None:
+    long = payload(b"x" * 1_000_000) + b"q\x01"
+    encoded = unicode("x" * 1_000_000) + b"q\x02" + unicode("latin1") + b"q\x03"
+    encode = named("_codecs", "encode") + b"(h\x02h\x03tR"
+    scalar = named("numpy.core.multiarray", "scalar") + b"("
+    scalar += element_type("S1000000", "|", 1_000_000) + b"h\x01tR"
+    plain = saved(v=b"](" + long + b"h\x01" * 10_000 + b"e")
+    found = opened(plain).get("v")
+    assert isinstance(found, list) and len(found) == 10_001
+    packed = saved(v=b"](" + encoded + encode * 1000 + b"e")
+    assert opened(packed).get("v") == ENDLESS
+    repeated = saved(v=b"](" + long + scalar * 1000 + b"e")
+    assert is_too_long(refusal(repeated))
+    for data in (plain, packed, repeated):
+        assert cost(lambda data=data: self_contained(data)) < BOUND
+
+
+def test_strings_are_not_an_array() -> None:
+    """Numpy would make every element as long as the longest."""
+    data = saved(v=b"](" + payload(b"x" * 1_000_000) + b"e" + b"(" + b"K\x01" * 10_000 + b"e")
+    assert cost(lambda: self_contained(data)) < BOUND
+
+
+def test_huge_memo_index_allocates_nothing() -> None:
+    data = saved(v=b"Nr\xff\xff\xff\x7fj\xff\xff\xff\x7f" + b"0")
+    assert opened(data).get("v") is None
+    assert cost(lambda: opened(data)) < 1 << 20
+
+
+@pytest.mark.parametrize("step", [b"N", b"(", b"]", b"}", b"2", b")"])
+def test_endless_opcodes_terminate(step: bytes) -> None:
+    data = b"\x80\x02]" + step * 3_000_000
+    assert refusal(data) == (
+        "F002.pickle-step",
+        None,
+        {"problem": Phrase("pickle-steps", most=1000000), "at": 1000001},
+    )
+
+
+def test_huge_declared_lengths_allocate_nothing() -> None:
+    for step in (b"B\xff\xff\xff\x7f", b"\x8e" + b"\xff" * 5 + b"\0" * 3, b"\x96" + b"\xff" * 8):
+        assert cost(lambda step=step: refusal(saved(v=step))) < 1 << 20
+
+
+@pytest.mark.parametrize(
+    ("key", "found"),
+    [
+        (b"N", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-nothing"))})),
+        (b"G" + struct.pack(">d", 0.5), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-number"))})),
+        (whole(1 << 60), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-number"))})),
+        (b")", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-other", kind="tuple"))})),
+        (b"]", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-other", kind="list"))})),
+        (b"\x88", ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-number"))})),
+        (array(np.ones(1)), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-array"))})),
+        (named("chumpy.ch", "Ch") + b")\x81", ("F002.pickle", None,
+         {"problem": Phrase("pickle-as-key", found=Phrase("noun-object", name="chumpy.ch.Ch"))})),
+        (payload(b"x" * 70_000), ("F002.pickle", None, {"problem": Phrase("pickle-as-key",
+         found=Phrase("noun-text"))})),
+    ],
+)  # fmt: skip
+def test_keys_that_are_not_strings(key: bytes, found: Fault) -> None:
+    assert refusal(saved(v=b"}" + key + b"Ns")) == found
+    assert refusal(saved(v=b"(" + key + b"Nd")) == found
+
+
+@pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        (b"]", ("F002.pickle-named", None, {"found": Phrase("noun-other", kind="list")})),
+        (b")", ("F002.pickle-named", None, {"found": Phrase("noun-other", kind="tuple")})),
+        (b"N", ("F002.pickle-named", None, {"found": Phrase("noun-nothing")})),
+        (whole(3), ("F002.pickle-named", None, {"found": Phrase("noun-number")})),
+        (text("x"), ("F002.pickle-named", None, {"found": Phrase("noun-text")})),
+        (b"C\x01x", ("F002.pickle-named", None, {"found": Phrase("noun-bytes")})),
+        (array(np.ones(1)), ("F002.pickle-named", None, {"found": Phrase("noun-array")})),
+        (matrix(), ("F002.pickle-named", None, {"found": Phrase("noun-object",
+         name="scipy.sparse.csc.csc_matrix")})),
+        (named("numpy", "ndarray"), ("F002.pickle-named", None, {"found": Phrase("noun",
+         name="numpy.ndarray")})),
+        (b"}K\x05Ns", ("F002.pickle-key", None, {"found": 5})),
+    ],
+)  # fmt: skip
+def test_top_level_object_must_be_a_dict(body: bytes, found: Fault) -> None:
+    assert refusal(finished(body)) == found
+
+
+def test_same_name_as_str_and_bytes() -> None:
+    assert refusal(pickle.dumps({b"v": 1, "v": 2})) == ("F002.pickle-twice", None, {"item": "v"})

@@ -1,0 +1,322 @@
+"""PIG models from a folder of tables or an archive: all files, and all spellings."""
+
+import pickle
+
+import numpy as np
+import pytest
+from faults import told
+from formats.pickle_bytes import array, fake_class, matrix, named, saved, several, text
+from formats.pig_text import (
+    CORE,
+    GOOD,
+    WEIGHTS,
+    arrays,
+    assert_core,
+    assert_good,
+    influences,
+    read,
+    silent,
+    write,
+)
+from numpy.testing import assert_allclose, assert_array_equal
+
+import viewer
+from viewer.diagnostics.phrase import Phrase
+from viewer.formats import save_image
+from viewer.rig.mesh import split_seams
+from viewer.rig.pose import rest_pose
+from viewer.rig.posing.pose_record import PoseRecord, apply_record
+from viewer.rig.skinning import deform, joint_matrices
+
+EXACT = 1e-15  # metres; a rounding error or two of values near 1
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "pig"
+
+
+def facts(figure):
+    return dict(figure.facts)
+
+
+# The folder
+
+
+def test_folder_with_every_file_is_read(folder):
+    assert_good(silent(write(folder)))
+
+
+def test_core_files_alone_are_read(folder):
+    figure = silent(write(folder, CORE))
+    assert_core(figure)
+    assert (figure.body_parts, figure.symmetry, figure.reduced) == (None, None, None)
+
+
+def test_folder_is_recognised_and_named_after_itself(folder):
+    scene = viewer.load(write(folder))
+    assert scene.warnings == ()
+    assert [actor.figure.name for actor in scene.actors] == ["pig"]
+    assert scene.up == "z"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda data: data.replace(b"\n", b"\r\n"),
+        lambda data: data.replace(b"\n", b"\r"),
+        lambda data: data.replace(b"\n", b"\r\r\n"),
+        lambda data: b"\xef\xbb\xbf" + data,
+        lambda data: data.replace(b" ", b"\t"),
+        lambda data: b" \t " + data.replace(b"\n", b"\n \t").replace(b" ", b"   "),
+        lambda data: data.rstrip(b"\n"),
+        lambda data: data + b"\n\n \n",
+        lambda data: b"\n" + data.replace(b"\n", b"\n\n"),
+        lambda data: data + b"\x1a",
+    ],
+    ids="crlf cr crcrlf bom tabs blank-led cut-newline newlines gaps ctrl-z".split(),  # noqa: SIM905
+)
+def test_table_format_variants_load_silently(folder, change):
+    assert_good(silent(write(folder, {name: change(text.encode()) for name, text in GOOD.items()})))
+
+
+def test_numbers_may_be_written_in_any_way(folder):
+    changed = "-0 +0 .0\n1.000000000 0e5 -1.08033e-07\n0 10e-1 0\n1 1. 0\n2 2 -1"
+    figure, warnings = read(write(folder, vertices=changed))
+    assert warnings == []
+    assert figure.mesh.positions[1].tolist() == [1, 0, -1.08033e-07]
+    assert_array_equal(figure.mesh.positions[[0, 2, 3]], [[0, 0, 0], [0, 1, 0], [1, 1, 0]])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_weights_may_come_in_any_order(folder, seed):
+    rows = GOOD["skinning_weights.txt"].splitlines()
+    np.random.default_rng(seed).shuffle(rows)
+    assert influences(silent(write(folder, skinning_weights="\n".join(rows)))) == WEIGHTS
+
+
+def test_weights_are_kept_as_stored(folder):
+    rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.24800000\n2 3 1\n2 4 0.5\n1 4 0.5\n"
+    figure = silent(write(folder, skinning_weights=rows))  # up to 0.01 is the authors' rounding
+    assert influences(figure)[:3] == [[(0, 0.998)], [(1, 1.002)], [(0, 0.75), (1, 0.248)]]
+    # Raw weights scale a vertex about the origin, even at rest.
+    rest = [[0, 0, 0], [1.002, 0, 0], [0, 0.998, 0], [1, 1, 0], [2, 2, -1]]
+    assert_allclose(deform(figure)[0], rest, rtol=0, atol=EXACT)
+
+
+def test_fact_reports_the_effect_of_normalising(folder):
+    rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.25\n2 3 0.999\n2 4 0.5\n1 4 0.503\n"
+    told = facts(silent(write(folder, skinning_weights=rows)))
+    # The last vertex is 3 m from the origin, its weights sum to 1.003: 9 mm, the largest error.
+    assert told["normalising"] == "would move rest vertices by up to 9.00 mm"
+    assert told["weights"] == "raw; their sums are 0.998 to 1.003"
+
+
+def test_fact_reports_the_distance_of_regressed_joints(folder):
+    # Joint 2 is regressed to the middle of (1, 1, 0) and (2, 2, -1), sqrt(1.5) m from where it is.
+    assert facts(silent(write(folder)))["joint regressor"] == (
+        "408.25 mm from the file's joints on average, 1224.74 mm at most; "
+        "used when the rest mesh changes"
+    )
+
+
+def test_unused_files_are_named(folder):
+    write(folder, {**GOOD, "PIG.obj": "v 0 0 0", "SOURCE.md": "x", ".hidden": "x"})
+    assert facts(silent(folder))["not needed"] == "PIG.obj, SOURCE.md"
+
+
+def test_body_part_names_may_have_blanks_or_be_missing(folder):
+    figure = silent(write(folder, body_part_defs="NOT BODY\r\nMAIN BODY\r\nHEAD\r\n"))
+    assert figure.body_parts.names == ("NOT BODY", "MAIN BODY", "HEAD")
+    figure = silent(write(folder, body_part_defs=None))
+    assert figure.body_parts.names == ("part 0", "part 1", "part 2")
+
+
+# Posing
+
+
+def test_root_uses_euler_angles_and_others_rotation_vectors(folder):
+    figure = silent(write(folder))
+    pose = rest_pose(figure.skeleton)
+    # 90 degrees about z, the root's first value; 90 degrees about x for joint 1.
+    numbers = [0, 0, 0, np.pi / 2, 0, 0, np.pi / 2, 0, 0, 0, 0, 0, 1]
+    assert apply_record(PoseRecord(vector=np.array(numbers)), figure, pose) == []
+    # Joint 2 is at (0, 1, 0.5) from joint 1: about x (0, -0.5, 1), plus (1, 0, 0), about z.
+    joints = joint_matrices(figure, pose)[:, :3, 3]
+    assert_allclose(joints, [[0, 0, 0], [0, 1, 0], [0.5, 1, 1]], rtol=0, atol=EXACT)
+    # Vertex 2 is 3/4 (-1, 0, 0) by the root and 1/4 by joint 1, from where it is at (-1, 1, 0).
+    # About x that is (-1, 0, 1), with joint 1 (0, 0, 1), about z (0, 0, 1).
+    expected = [-0.75, 0, 0.25]
+    assert_allclose(deform(figure, pose)[0][2], expected, rtol=0, atol=EXACT)
+
+
+def test_root_applies_its_third_angle_first(folder):
+    figure = silent(write(folder))
+    pose = rest_pose(figure.skeleton)
+    numbers = [0, 0, 0, np.pi / 2, 0, np.pi / 2, *[0] * 6, 1]
+    apply_record(PoseRecord(vector=np.array(numbers)), figure, pose)
+    # Rz Rx: y goes to z by x and stays there; x goes to y by z.
+    turn = joint_matrices(figure, pose)[0, :3, :3]
+    assert_allclose(turn, [[0, 0, 1], [1, 0, 0], [0, 1, 0]], rtol=0, atol=EXACT)
+
+
+def test_scale_comes_before_translation_and_about_the_origin(folder):
+    figure = silent(write(folder))
+    pose = rest_pose(figure.skeleton)
+    apply_record(PoseRecord(vector=np.array([10.0, 20, 30, *[0] * 9, 2])), figure, pose)
+    assert_array_equal(deform(figure, pose)[0][3], [12, 22, 30])
+    assert_array_equal(joint_matrices(figure, pose)[2, :3, 3], [12, 22, 31])
+
+
+def test_scale_of_0_or_less_is_noted(folder):
+    figure = silent(write(folder))
+    pose = rest_pose(figure.skeleton)
+    notes = apply_record(PoseRecord(vector=np.array([0.0] * 12 + [-2])), figure, pose)
+    fault = Phrase("scale-not-positive", found=-2.0)
+    assert told(notes) == [("F007.scale-kept", {"fault": fault, "scale": 1.0})]
+
+
+# Seams
+
+
+def test_vertex_on_a_seam_is_split_by_texture_coordinate(folder):
+    sources, uv_indices, triangles = split_seams(silent(write(folder)).mesh)
+    # Vertices 1 and 2 twice; vertex 4, of no triangle, once.
+    assert sorted(sources.tolist()) == [0, 1, 1, 2, 2, 3, 4]
+    assert sources[triangles].tolist() == [[0, 1, 2], [1, 3, 2]]
+    assert uv_indices[triangles].tolist() == [[0, 1, 2], [3, 4, 5]]
+
+
+@pytest.mark.parametrize("gone", ["textures", "faces_tex"])
+def test_without_texture_coordinates_the_figure_is_untextured(folder, gone):
+    figure, warnings = read(write(folder, **{gone: None}))
+    assert_core(figure)
+    assert (figure.mesh.uvs, figure.mesh.uv_triangles) == (None, None)
+    assert warnings == [("F007.pig-texture", None, {})]
+
+
+# Images in the folder
+
+RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
+
+
+def test_image_in_the_folder_becomes_the_texture(folder):
+    write(folder)
+    save_image(folder / "skin.png", RED)
+    scene = viewer.load(folder)
+    assert scene.warnings == ()
+    (material,) = scene.actors[0].figure.mesh.materials
+    assert (material.name, material.texture) == ("skin", "skin.png")
+    assert_array_equal(material.image, RED)
+    assert scene.actors[0].figure.mesh.material_indices.tolist() == [0, 0]
+
+
+def test_two_images_are_not_chosen_from(folder):
+    write(folder)
+    for name in ("a.png", "b.jpg"):
+        save_image(folder / name, RED)
+    scene = viewer.load(folder)
+    assert scene.warnings == (f"{folder}: 2 images in the folder: specify the texture to show",)
+    assert scene.actors[0].figure.mesh.materials == ()
+
+
+def test_invalid_image_in_the_folder_leaves_the_figure_untextured(folder):
+    write(folder)
+    (folder / "skin.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
+    scene = viewer.load(folder)
+    assert scene.actors[0].figure.mesh.materials == ()
+    (warning,) = scene.warnings
+    assert warning.startswith(f"{folder}: texture {folder / 'skin.png'}: ")
+    assert warning.endswith("; drawn untextured")
+
+
+def test_image_named_together_with_the_folder_becomes_the_texture(folder, tmp_path):
+    save_image(tmp_path / "red.png", RED)
+    figure = viewer.load(tmp_path / "red.png", write(folder)).actors[0].figure
+    assert figure.mesh.materials[0].texture == "red.png"
+
+
+# Archives
+
+
+def test_npz_equals_the_folder(tmp_path):
+    np.savez(tmp_path / "pig.npz", **arrays())
+    assert_good(silent(tmp_path / "pig.npz"))
+
+
+def test_npz_with_rows_of_entries_equals_the_folder(tmp_path):
+    np.savez_compressed(tmp_path / "pig.npz", **arrays(dense=False))
+    assert_good(silent(tmp_path / "pig.npz"))
+
+
+def test_vertex_major_matrices_are_recognised_by_shape(tmp_path):
+    given = arrays()
+    given["skinning_weights"] = np.asfortranarray(given["skinning_weights"].T)
+    given["J_regressor"] = given["J_regressor"].T.astype(np.float32)
+    np.savez(tmp_path / "pig.npz", **given)
+    assert_good(silent(tmp_path / "pig.npz"))
+
+
+def test_columns_may_be_two_dimensional_and_of_other_types(tmp_path):
+    given = arrays()
+    for name in ("parents", "body_parts", "sym", "reduced_ids"):
+        given[name] = given[name][:, None].astype(">i2")
+    given["vertices"] = given["vertices"].astype(np.float32)
+    given["faces_vert"] = given["faces_vert"].astype(np.float64)
+    np.savez(tmp_path / "pig.npz", **given)
+    assert_good(silent(tmp_path / "pig.npz"))
+
+
+def sparse(dense):
+    """A matrix in compressed columns, as Python 2 pickled it."""
+    rows = [np.flatnonzero(column) for column in dense.T]
+    return matrix(
+        sides=dense.shape,
+        data=np.concatenate([dense[row, number] for number, row in enumerate(rows)]),
+        indices=np.concatenate(rows),
+        indptr=np.cumsum([0, *map(len, rows)]),
+    )
+
+
+def test_pickle_equals_the_folder(tmp_path):
+    given = {
+        name: sparse(values) if name in ("skinning_weights", "J_regressor") else array(values)
+        for name, values in arrays().items()
+        if name != "body_part_defs"
+    }
+    names = several(*map(text, ("NOT_BODY", "MAIN_BODY", "HEAD")))
+    (tmp_path / "PIG.pkl").write_bytes(saved(**given, body_part_defs=names))
+    figure = silent(tmp_path / "PIG.pkl")
+    assert_good(figure)
+    assert figure.name == "PIG"
+
+
+@pytest.mark.parametrize("protocol", range(2, 6))
+def test_pickle_of_any_protocol_equals_the_folder(tmp_path, monkeypatch, protocol):
+    made = fake_class(monkeypatch, "scipy.sparse._csr", "csr_matrix")
+    given = arrays()
+    for name in ("skinning_weights", "J_regressor"):
+        dense, given[name] = given[name], made()
+        rows, columns = np.nonzero(dense)
+        given[name].__dict__.update(
+            data=dense[rows, columns],
+            indices=columns.astype(np.int32),
+            indptr=np.searchsorted(rows, np.arange(4)).astype(np.int32),
+            _shape=(3, 5),
+        )
+    given["body_part_defs"] = given["body_part_defs"].tolist()
+    (tmp_path / "PIG.pkl").write_bytes(pickle.dumps(given, protocol))
+    assert_good(silent(tmp_path / "PIG.pkl"))
+
+
+def test_archive_reports_unused_keys(tmp_path):
+    np.savez(tmp_path / "pig.npz", **arrays(), author=np.array("me"))
+    assert facts(silent(tmp_path / "pig.npz"))["not needed"] == "author"
+
+
+def test_pickle_that_calls_anything_else_is_refused(tmp_path):
+    (tmp_path / "PIG.pkl").write_bytes(
+        saved(vertices=named("os", "system") + several(text("touch gone")) + b"R")
+    )
+    with pytest.raises(viewer.ViewerError, match=r"PIG\.pkl: .*os\.system"):
+        viewer.load(tmp_path / "PIG.pkl")

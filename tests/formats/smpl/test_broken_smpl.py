@@ -1,0 +1,257 @@
+"""Broken body models with their exact messages."""
+
+import numpy as np
+import pytest
+from faults import INF, NAN, fault_of
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.diagnostics import Phrase
+from viewer.errors import FormatError
+
+SMPL = model("smpl", 32)
+SMPLX = model("smplx", 32)
+
+
+@pytest.fixture
+def refusal(tmp_path):
+    """Write a model and return its refusal."""
+
+    def refused(arrays=SMPL, **changes):
+        given = {**arrays, **changes}
+        path = tmp_path / "body.npz"
+        np.savez(path, **{key: array for key, array in given.items() if array is not None})
+        return refusal_of(path)
+
+    return refused
+
+
+def refusal_of(path):
+    with pytest.raises(FormatError) as caught:
+        viewer.load(path)
+    assert caught.value.exit_code == 2
+    assert str(caught.value).isprintable()
+    assert caught.value.path == path
+    return fault_of(caught.value.diagnostic)
+
+
+def changed(key, index, value, dtype=np.float64):
+    """Return one array of the model with a single value changed."""
+    array = SMPL[key].astype(dtype)
+    array[index] = value
+    return {key: array}
+
+
+def table(*parents):
+    """Return a hierarchy that begins with these parents."""
+    row = SMPL["kintree_table"].astype(np.int64)
+    row[0, 0] = -1
+    row[0, : len(parents)] = parents
+    return {"kintree_table": row}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        # Keys
+        ({"weights": None}, ("F002.smpl-keys", None, {"missing": ["weights"],
+         "found": ["v_template", "f", "J_regressor", "J", "shapedirs", "posedirs",
+         "kintree_table", "bs_style", "bs_type"]})),
+        ({"f": None, "J_regressor": None, "kintree_table": None, "bs_style": None},
+         ("F002.smpl-keys", None, {"missing": ["f", "J_regressor", "kintree_table"],
+         "found": ["v_template", "weights", "J", "shapedirs", "posedirs", "bs_type"]})),
+        # Shapes
+        ({"v_template": np.zeros((32, 4))}, ("F002.value", None, {"item": "v_template",
+         "expected": Phrase("wanted-numbers", shape=("V", 3)), "found": Phrase("found-array",
+         shape=(32, 4), dtype="float64")})),
+        ({"v_template": np.zeros((0, 3))}, ("F002.smpl-no-vertex", None, {"item": "v_template"})),
+        ({"v_template": np.array("x")}, ("F002.value", None, {"item": "v_template",
+         "expected": Phrase("wanted-numbers", shape=("V", 3)), "found": Phrase("found-text")})),
+        ({"f": np.zeros((60, 4), int)}, ("F002.value", None, {"item": "f",
+         "expected": Phrase("wanted-numbers", shape=(None, 3)), "found": Phrase("found-array",
+         shape=(60, 4), dtype="int64")})),
+        ({"weights": np.ones((31, 24)) / 24}, ("F002.value", None, {"item": "weights",
+         "expected": Phrase("wanted-numbers", shape=(32, 24)), "found": Phrase("found-array",
+         shape=(31, 24), dtype="float64")})),
+        ({"weights": np.ones((32, 25)) / 25}, ("F002.value", None, {"item": "weights",
+         "expected": Phrase("wanted-numbers", shape=(32, 24)), "found": Phrase("found-array",
+         shape=(32, 25), dtype="float64")})),
+        ({"J_regressor": np.ones((24, 33)) / 33}, ("F002.value", None, {"item": "J_regressor",
+         "expected": Phrase("wanted-numbers", shape=(24, 32)), "found": Phrase("found-array",
+         shape=(24, 33), dtype="float64")})),
+        ({"J_regressor": SMPL["J_regressor"].T}, ("F002.value", None, {"item": "J_regressor",
+         "expected": Phrase("wanted-numbers", shape=(24, 32)), "found": Phrase("found-array",
+         shape=(32, 24), dtype="float64")})),
+        ({"shapedirs": np.zeros((32, 2, 10))}, ("F002.value", None, {"item": "shapedirs",
+         "expected": Phrase("wanted-numbers", shape=(32, 3, "S")), "found": Phrase("found-array",
+         shape=(32, 2, 10), dtype="float64")})),
+        ({"shapedirs": np.zeros((31, 3, 10))}, ("F002.value", None, {"item": "shapedirs",
+         "expected": Phrase("wanted-numbers", shape=(32, 3, "S")), "found": Phrase("found-array",
+         shape=(31, 3, 10), dtype="float64")})),
+        ({"posedirs": np.zeros((32, 3, 206))}, ("F002.value", None, {"item": "posedirs",
+         "expected": Phrase("wanted-numbers", shape=(32, 3, 207)), "found": Phrase("found-array",
+         shape=(32, 3, 206), dtype="float64")})),
+        ({"posedirs": np.zeros((207, 95))}, ("F002.value", None, {"item": "posedirs",
+         "expected": Phrase("wanted-numbers", shape=(32, 3, 207)), "found": Phrase("found-array",
+         shape=(207, 95), dtype="float64")})),
+        ({"kintree_table": np.zeros((3, 24))}, ("F002.value", None, {"item": "kintree_table",
+         "expected": Phrase("wanted-numbers", shape=(2, "J")), "found": Phrase("found-array",
+         shape=(3, 24), dtype="float64")})),
+        ({"kintree_table": np.array(-1)}, ("F002.value", None, {"item": "kintree_table",
+         "expected": Phrase("wanted-numbers", shape=(2, "J")), "found": Phrase("found-array",
+         shape=(), dtype="int64")})),
+        ({"kintree_table": np.zeros(0)}, ("F002.value", None, {"item": "kintree_table",
+         "expected": Phrase("wanted-numbers", shape=(2, "J")), "found": Phrase("found-array",
+         shape=(0,), dtype="float64")})),
+        # Invalid values
+        (changed("v_template", (3, 1), np.nan), ("F003.finite", None, {"item": "v_template",
+         "found": NAN, "at": Phrase("row-vertex", index=3)})),
+        (changed("v_template", slice(4), np.inf), ("F003.finite", None, {"item": "v_template",
+         "found": INF, "at": Phrase("row-vertex", index=0)})),
+        (changed("v_template", (3, 1), 1e300), ("F003.limit", None, {"item": "v_template",
+         "found": 1e300, "at": Phrase("row-vertex", index=3), "limit": 3.4028234663852886e38})),
+        (changed("weights", (3, 1), np.nan), ("W003.finite", None, {"item": "weights",
+         "found": NAN, "at": Phrase("row-vertex", index=3)})),
+        (changed("J_regressor", (3, 1), -np.inf), ("F003.finite", None, {"item": "J_regressor",
+         "found": -INF, "at": Phrase("row-joint", index=3)})),
+        # Faces
+        (changed("f", (5, 1), 32, np.int64), ("F002.vertex-range", None, {"item": "f", "last": 31,
+         "found": 32})),
+        (changed("f", (5, 1), -1, np.int64), ("F002.vertex-range", None, {"item": "f", "last": 31,
+         "found": -1})),
+        (changed("f", (5, 1), 1.5), ("F002.vertex-range", None, {"item": "f", "last": 31,
+         "found": 1.5})),
+        (changed("f", (5, 1), np.nan), ("F002.vertex-range", None, {"item": "f", "last": 31,
+         "found": NAN})),
+        # The hierarchy
+        (table(-1, 0, 5), ("S002.parent", None, {"item": "kintree_table", "joint": 2,
+         "found": 5.0})),
+        (table(-1, 0, 2), ("S002.parent", None, {"item": "kintree_table", "joint": 2,
+         "found": 2.0})),
+        (table(-1, 2, 1), ("S002.parent", None, {"item": "kintree_table", "joint": 1,
+         "found": 2.0})),
+        (table(-1, 0, 99), ("S001.parent", None, {"item": "kintree_table", "joint": 2,
+         "found": 99.0})),
+        (table(-1, 0, -7), ("S001.parent", None, {"item": "kintree_table", "joint": 2,
+         "found": -7.0})),
+        (table(-1, 0, -1), ("F002.roots", None, {"item": "kintree_table", "joint": 2})),
+        (table(-1, 0, 4294967295), ("F002.roots", None, {"item": "kintree_table", "joint": 2})),
+        (table(3), ("S002.root", None, {"item": "kintree_table", "found": 3.0})),
+        (changed("kintree_table", (0, 4), 0.5), ("S001.parent", None, {"item": "kintree_table",
+         "joint": 4, "found": 0.5})),
+        (changed("kintree_table", (0, 4), np.nan), ("S001.parent", None, {"item": "kintree_table",
+         "joint": 4, "found": NAN})),
+        ({"kintree_table": SMPL["kintree_table"][:, ::-1]}, ("F002.smpl-joints", None,
+         {"item": "kintree_table"})),
+        # Weights and regressor
+        ({"weights": SMPL["weights"] * np.where(np.arange(32) == 7, 1.002, 1.0)[:, None]},
+         ("W001.vertex", None, {"item": "weights", "vertex": 7, "found": 1.002})),
+        ({"weights": SMPL["weights"] * np.where(np.arange(32) == 7, 0.998, 1.0)[:, None]},
+         ("W001.vertex", None, {"item": "weights", "vertex": 7, "found": 0.998})),
+        ({"weights": SMPL["weights"] * (np.arange(32) != 7)[:, None]}, ("W001.vertex", None,
+         {"item": "weights", "vertex": 7, "found": 0.0})),
+        ({"J_regressor": SMPL["J_regressor"] * 1.1}, ("F002.smpl-regressor", None,
+         {"item": "J_regressor", "joint": 0, "found": 1.1})),
+        ({"J_regressor": SMPL["J_regressor"] * (np.arange(24) != 9)[:, None]},
+         ("F002.smpl-regressor", None, {"item": "J_regressor", "joint": 9, "found": 0.0})),
+        # Objects that would have to be unpickled
+        ({"J_regressor": np.array({}, dtype=object)}, ("F002.archive-value", None,
+         {"item": "J_regressor", "problem": Phrase("matrix-objects", shape=(24, 32),
+         what=Phrase("unread-objects"))})),
+    ],
+)  # fmt: skip
+def test_broken_model_is_refused_with_its_key(refusal, change, message):
+    assert refusal(**change) == message
+
+
+def test_negative_weight_is_refused_with_its_vertex(refusal):
+    weights = SMPL["weights"].copy()
+    joint = int(weights[11].argmax())
+    weights[11, joint] += 0.25
+    weights[11, (joint + 1) % 24] = -0.25
+    assert refusal(weights=weights) == (
+        ("W002.vertex", None, {"item": "weights", "vertex": 11, "found": -0.25})
+    )
+
+
+def test_weight_sums_off_by_half_a_thousandth_are_normalised(tmp_path):
+    factors = np.where(np.arange(32) % 2, 1.0005, 0.9995)[:, None]
+    np.savez(tmp_path / "a.npz", **{**SMPL, "weights": SMPL["weights"] * factors})
+    scene = viewer.load(tmp_path / "a.npz")
+    assert scene.warnings == ()
+    skin = scene.actors[0].figure.skin
+    sums = np.add.reduceat(skin.weights, skin.starts[:-1])
+    assert_allclose(sums, 1.0, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"hands_meanl": np.zeros(44)}, ("F002.value", None, {"item": "hands_meanl",
+         "expected": Phrase("wanted-numbers", shape=(45,)), "found": Phrase("found-array",
+         shape=(44,), dtype="float64")})),
+        ({"hands_componentsr": np.zeros((6, 44))}, ("F002.value", None,
+         {"item": "hands_componentsr", "expected": Phrase("wanted-numbers", shape=(None, 45)),
+         "found": Phrase("found-array", shape=(6, 44), dtype="float64")})),
+        ({"hands_componentsr": np.full((6, 45), np.nan)}, ("F003.finite", None,
+         {"item": "hands_componentsr", "found": NAN, "at": Phrase("element", indices=[0, 0])})),
+        ({"ft": np.zeros((59, 3), int)}, ("F002.value", None, {"item": "ft",
+         "expected": Phrase("wanted-numbers", shape=(60, 3)), "found": Phrase("found-array",
+         shape=(59, 3), dtype="int64")})),
+        ({"vt": np.zeros((59, 3))}, ("F002.value", None, {"item": "vt",
+         "expected": Phrase("wanted-numbers", shape=("U", 2)), "found": Phrase("found-array",
+         shape=(59, 3), dtype="float64")})),
+        ({"vt": np.full((59, 2), np.inf)}, ("F003.finite", None, {"item": "vt", "found": INF,
+         "at": Phrase("element", indices=[0, 0])})),
+        ({"lmk_bary_coords": np.zeros((50, 3))}, ("F002.value", None, {"item": "lmk_bary_coords",
+         "expected": Phrase("wanted-numbers", shape=(51, 3)), "found": Phrase("found-array",
+         shape=(50, 3), dtype="float64")})),
+        ({"lmk_bary_coords": np.full((51, 3), np.nan)}, ("F003.finite", None,
+         {"item": "lmk_bary_coords", "found": NAN, "at": Phrase("element", indices=[0, 0])})),
+        ({"vert_sym_idxs": np.zeros((4, 4))}, ("F002.value", None, {"item": "vert_sym_idxs",
+         "expected": Phrase("wanted-numbers", shape=(32,)), "found": Phrase("found-array",
+         shape=(4, 4), dtype="float64")})),
+        ({"shape_names": np.array(["a", "b"])}, ("F002.value", None, {"item": "shape_names",
+         "expected": Phrase("wanted-texts", shape=(10,)), "found": Phrase("found-texts", shape=(2,
+         ))})),
+    ],
+)  # fmt: skip
+def test_broken_extra_is_refused_with_its_key(refusal, change, message):
+    assert refusal(SMPLX, **change) == message
+
+
+@pytest.mark.parametrize("name", ["SMPL_NEUTRAL.pkl", "model.npz"])
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        (b"<!DOCTYPE html><html>Sign in</html>", ("F002.archive",
+         {"found": "HTML or XML (a failed download?)"})),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 39001280\n",
+         ("F002.archive-pointer", {})),
+        (b"Please sign the licence first.\n", ("F002.archive", {"found": "an unknown format"})),
+        (b"", ("F002.archive", {"found": "an empty file"})),
+        (b"\x1f\x8b\x08\0\0\0\0\0", ("F002.archive", {"found": "gzip data"})),
+        (b"\0" * 5000, ("F002.archive", {"found": "zeros"})),
+    ],
+)  # fmt: skip
+def test_non_model_file_is_described(tmp_path, name, data, found):
+    (tmp_path / name).write_bytes(data)
+    key, values = found
+    assert refusal_of(tmp_path / name) == (key, None, values)
+
+
+def test_truncated_model_is_refused(tmp_path):
+    path = tmp_path / "body.npz"
+    np.savez(path, **SMPL)
+    path.write_bytes(path.read_bytes()[:-3000])
+    assert refusal_of(path)[0] == "F002.npz"
+
+
+def test_other_archive_is_described_by_its_content(tmp_path):
+    np.savez(tmp_path / "a.npz", vertices=np.zeros((3, 3)), colour=np.zeros(3))
+    with pytest.raises(FormatError) as caught:
+        viewer.load(tmp_path / "a.npz")
+    message = caught.value.diagnostic.message
+    assert message.startswith("expected a model or pose (SMPL family: v_template, ")
+    assert message.endswith("), found keys vertices, colour")

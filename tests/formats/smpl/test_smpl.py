@@ -1,0 +1,381 @@
+"""Body models of the SMPL family, in all variants found in real files."""
+
+import numpy as np
+import pytest
+from faults import NAN, fault_of, warnings_of
+from formats.synthetic_smpl import KINDS, model
+from numpy.testing import assert_allclose, assert_array_equal
+
+import viewer
+from viewer.errors import FormatError
+from viewer.formats import Source, smpl
+from viewer.rig.annotations import keypoint_positions
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.mesh import split_seams
+from viewer.rig.pose import rest_pose
+from viewer.rig.skinning import deform
+
+SMPL = model("smpl", 32)
+VERTICES, JOINTS = 32, 24
+
+
+def read(path):
+    source = Source.open(path)
+    return smpl.read(source), warnings_of(source.diagnostics)
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Write arrays as an ``.npz`` and return the figure; a value of None leaves a key out."""
+
+    def loaded(arrays, **changes):
+        given = {**arrays, **changes}
+        path = tmp_path / "body.npz"
+        np.savez(path, **{key: array for key, array in given.items() if array is not None})
+        figure, loaded.warnings = read(path)
+        return figure
+
+    loaded.path = tmp_path / "body.npz"
+    return loaded
+
+
+def assert_smpl(figure):
+    """Check all parts of ``SMPL``, regardless of how it was written."""
+    assert_array_equal(figure.mesh.positions, SMPL["v_template"])
+    assert_array_equal(figure.mesh.triangles, SMPL["f"])
+    assert figure.skeleton.parents.tolist() == [
+        *[-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21]
+    ]
+    bones = SMPL["J"][1:] - SMPL["J"][figure.skeleton.parents[1:]]
+    assert_allclose(figure.skeleton.rest_translations[1:], bones, rtol=0, atol=1e-14)
+    dense = np.zeros((VERTICES, JOINTS))
+    owners = np.repeat(np.arange(VERTICES), np.diff(figure.skin.starts))
+    dense[owners, figure.skin.joints] = figure.skin.weights
+    assert_allclose(dense, SMPL["weights"], rtol=0, atol=1e-15)
+    assert (figure.skin.weights > 0).all()
+    assert_array_equal(np.moveaxis(figure.blend_shapes.offsets.values(), 0, 2), SMPL["shapedirs"])
+    assert_array_equal(np.moveaxis(figure.correctives.values(), 0, 2), SMPL["posedirs"])
+    assert (figure.up, figure.unit) == ("y", "m")
+
+
+def test_plain_model_is_read(load):
+    assert_smpl(load(SMPL))
+    assert load.warnings == []
+
+
+def test_rest_pose_returns_the_template(load):
+    assert_allclose(deform(load(SMPL))[0], SMPL["v_template"], rtol=0, atol=1e-14)
+
+
+# The hierarchy
+
+
+@pytest.mark.parametrize("root", [-1, 0, 4294967295, 4294967296])
+@pytest.mark.parametrize("dtype", [np.int64, np.float32, np.float64, ">i8"])
+def test_root_parent_is_accepted_in_several_notations(load, root, dtype):
+    table = SMPL["kintree_table"].astype(np.int64)
+    table[0, 0] = root
+    assert_smpl(load(SMPL, kintree_table=table.astype(dtype)))
+    assert_smpl(load(SMPL, kintree_table=table[0].astype(dtype)))
+    assert load.warnings == []
+
+
+def test_hierarchy_may_use_small_integers(load):
+    table = SMPL["kintree_table"].astype(np.int64)
+    table[0, 0] = -1
+    assert_smpl(load(SMPL, kintree_table=table.astype(np.int8)))
+
+
+FINGERS = [
+    *["index1", "index2", "index3", "middle1", "middle2", "middle3", "pinky1", "pinky2", "pinky3"],
+    *["ring1", "ring2", "ring3", "thumb1", "thumb2", "thumb3"],
+]
+BODY = [
+    *["pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2"],
+    *["left_ankle", "right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar"],
+    *["right_collar", "head", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow"],
+    *["left_wrist", "right_wrist"],
+]
+LEFT, RIGHT = ([f"{side}_{name}" for name in FINGERS] for side in ("left", "right"))
+NAMES = {
+    "smpl": [*BODY, "left_hand", "right_hand"],
+    "smplh": [*BODY, *LEFT, *RIGHT],
+    "smplx": [*BODY, "jaw", "left_eye", "right_eye", *LEFT, *RIGHT],
+    "mano": ["wrist", *FINGERS],
+    "flame": ["global", "neck", "jaw", "left_eye", "right_eye"],
+}
+TITLES = {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X", "mano": "MANO", "flame": "FLAME"}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_family_member_is_recognised_by_its_hierarchy(load, kind):
+    figure = load(model(kind, 32))
+    assert list(figure.skeleton.names) == NAMES[kind]
+    assert dict(figure.facts)["model"] == TITLES[kind]
+    assert load.warnings == []
+
+
+def test_model_of_another_hierarchy_has_no_names(load):
+    table = SMPL["kintree_table"].copy()
+    table[0, 23] = 20  # 24 joints, but not those of SMPL
+    figure = load(SMPL, kintree_table=table)
+    assert figure.skeleton.names[:2] == ("joint_0", "joint_1")
+    assert dict(figure.facts)["model"] == "a model in SMPL's layout"
+
+
+def animal(n_joints=35):
+    """A model with a chain of joints, unlike any member of the family."""
+    regressor = np.zeros((n_joints, VERTICES))
+    regressor[np.arange(n_joints), np.arange(n_joints) % VERTICES] = 1.0
+    weights = np.zeros((VERTICES, n_joints))
+    weights[np.arange(VERTICES), np.arange(VERTICES) % n_joints] = 1.0
+    return {
+        **SMPL,
+        "kintree_table": np.stack([np.arange(n_joints) - 1, np.arange(n_joints)]),
+        "J_regressor": regressor,
+        "weights": weights,
+        "shapedirs": np.zeros((VERTICES, 3, 41)),
+        "posedirs": np.zeros((VERTICES, 3, 9 * (n_joints - 1))),
+    }
+
+
+def test_animal_model_is_read_with_generic_names(load):
+    figure = load(animal())
+    assert figure.skeleton.names == tuple(f"joint_{number}" for number in range(35))
+    assert figure.correctives.offsets.shape == (306, VERTICES, 3)
+    assert figure.blend_shapes.groups == ("shape",) * 41
+    assert figure.pose_layout.n_numbers == 105
+
+
+def test_model_of_one_joint_has_no_correctives(load):
+    figure = load(animal(1))
+    assert figure.correctives is None
+    assert_array_equal(deform(figure)[0], SMPL["v_template"])
+
+
+# Ways to write arrays
+
+
+@pytest.mark.parametrize("dtype", [np.float32, ">f8", ">f4"])
+def test_floats_of_any_type(load, dtype):
+    floats = ["v_template", "weights", "J_regressor", "shapedirs", "posedirs"]
+    changed = {key: SMPL[key].astype(dtype) for key in floats}
+    figure = load(SMPL, **changed)
+    assert_array_equal(figure.mesh.positions, SMPL["v_template"])
+    assert figure.mesh.positions.dtype == np.float64
+    vertices = deform(figure)[0]
+    assert_allclose(vertices, SMPL["v_template"], rtol=0, atol=1e-7)
+
+
+def test_fortran_order(load):
+    assert_smpl(load({key: np.asfortranarray(array) for key, array in SMPL.items()}))
+
+
+def test_flattened_pose_directions(load):
+    rows = np.moveaxis(SMPL["posedirs"], 2, 0).reshape(207, 3 * VERTICES)
+    assert_smpl(load(SMPL, posedirs=rows))
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint16, np.float32])
+def test_faces_of_any_type(load, dtype):
+    assert_smpl(load(SMPL, f=SMPL["f"].astype(dtype)))
+
+
+def test_weight_sums_off_by_rounding_are_normalised(load):
+    figure = load(SMPL, weights=SMPL["weights"] * (1.0 + 5e-4))
+    assert load.warnings == []
+    assert_smpl(figure)
+
+
+def test_model_without_shapes_or_correctives_warns(load):
+    figure = load(SMPL, shapedirs=None, posedirs=None)
+    assert load.warnings == [
+        ("F007.smpl-shapedirs", None, {}),
+        ("F007.smpl-posedirs", None, {}),
+    ]
+    assert (figure.blend_shapes, figure.correctives) == (None, None)
+
+
+def test_zero_shape_columns_give_no_shapes(load):
+    assert load(SMPL, shapedirs=np.zeros((VERTICES, 3, 0))).blend_shapes is None
+
+
+# Groups of coefficients
+
+
+@pytest.mark.parametrize(
+    ("kind", "columns", "shapes", "expressions"),
+    [
+        ("smplx", 20, 10, 10),
+        ("smplx", 400, 300, 100),
+        ("smplx", 16, 10, 6),
+        ("smplx", 7, 7, 0),
+        ("flame", 400, 300, 100),
+        ("flame", 150, 10, 140),
+        ("smpl", 300, 300, 0),
+        ("smplh", 16, 16, 0),
+        ("mano", 10, 10, 0),
+    ],
+)
+def test_columns_are_shapes_then_expressions(load, kind, columns, shapes, expressions):
+    arrays = model(kind, 32)
+    directions = np.arange(columns) * np.ones((VERTICES, 3, 1))
+    figure = load(arrays, shapedirs=directions)
+    found = figure.blend_shapes
+    assert found.groups == ("shape",) * shapes + ("expression",) * expressions
+    assert found.names == (
+        *(f"shape {number}" for number in range(shapes)),
+        *(f"expression {number}" for number in range(expressions)),
+    )
+    assert found.offsets.values()[:, 0, 0].tolist() == list(range(columns))
+    facts = dict(figure.facts)
+    assert facts["coefficients"] == f"{shapes} shape, {expressions} expression"
+
+
+def test_shapes_may_be_named(load):
+    names = np.array([f"width {number}" for number in range(10)])
+    figure = load(SMPL, shape_names=names)
+    assert figure.blend_shapes.names == tuple(names.tolist())
+
+
+# Optional parts
+
+
+def test_texture_coordinates_split_seams(load):
+    arrays = model("smplx", 32)
+    mesh = load(arrays).mesh
+    assert_array_equal(mesh.uvs, arrays["vt"])
+    assert_array_equal(mesh.uv_triangles, arrays["ft"])
+    sources, uv_indices, triangles = split_seams(mesh)
+    assert_array_equal(sources[triangles], arrays["f"])
+    assert_array_equal(uv_indices[triangles], arrays["ft"])
+
+
+def test_landmarks_are_keypoints_on_triangles(load):
+    arrays = model("smplx", 32)
+    points = load(arrays).keypoints
+    assert (len(points.names), points.names[50]) == (51, "landmark 50")
+    found = keypoint_positions(points, arrays["v_template"], np.zeros((55, 3)))
+    # Landmark 1 is on triangle (7 + 3), at barycentric coordinates of 2, 13 and 1 sixteenths.
+    corners = arrays["v_template"][arrays["f"][10]]
+    assert_allclose(found[1], (2 * corners[0] + 13 * corners[1] + corners[2]) / 16, atol=1e-15)
+
+
+def test_symmetry_map_is_kept(load):
+    partners = np.arange(VERTICES) ^ 1
+    assert_array_equal(load(SMPL, vert_sym_idxs=partners).symmetry, partners)
+
+
+@pytest.mark.parametrize("kind", ["smplh", "smplx", "mano"])
+def test_hands_have_their_components(load, kind):
+    arrays = model(kind, 32)
+    hands = load(arrays).hands
+    firsts = {"smplh": [22, 37], "smplx": [25, 40], "mano": [1]}[kind]
+    sides = ["left", "right"] if len(firsts) == 2 else [""]
+    assert [hand.side for hand in hands] == sides
+    for hand, first in zip(hands, firsts, strict=True):
+        assert hand.joints.tolist() == list(range(first, first + 15))
+        assert_array_equal(hand.components, arrays[f"hands_components{hand.side[:1]}"])
+        assert_array_equal(hand.mean, arrays[f"hands_mean{hand.side[:1]}"])
+
+
+def test_amass_model_has_no_hand_components(load):
+    arrays = {key: a for key, a in model("smplh", 32).items() if not key.startswith("hands")}
+    assert load(arrays).hands == ()
+    assert load.warnings == []
+
+
+def test_invalid_extras_are_ignored_with_a_warning(load):
+    arrays = model("smplx", 32)
+    figure = load(
+        arrays,
+        ft=arrays["ft"] + 1000,
+        lmk_faces_idx=arrays["lmk_faces_idx"] + 1000,
+        vert_sym_idxs=(np.arange(VERTICES) + 1) % VERTICES,
+    )
+    assert (figure.mesh.uvs, figure.keypoints, figure.symmetry) == (None, None, None)
+    assert load.warnings == [
+        ("F007.smpl-uvs", None, {}),
+        ("F007.smpl-landmarks", None, {}),
+        ("F007.smpl-symmetry", None, {}),
+    ]
+    load(SMPL, vert_sym_idxs=np.full(VERTICES, np.nan))
+    assert load.warnings == [("F007.smpl-symmetry-range", None, {})]
+
+
+def test_facts_list_keys_used_ignored_and_unknown(load):
+    objects = np.array({"L_Hip": 1}, dtype=object)
+    figure = load(SMPL, joint2num=objects, gender=np.array("neutral"), author=np.array("me"))
+    facts = dict(figure.facts)
+    assert facts["model"] == "SMPL"
+    assert facts["coefficients"] == "10 shape, 0 expression"
+    assert facts["correctives"] == "207 columns"
+    assert facts["keys used"] == (
+        "v_template, f, kintree_table, J_regressor, shapedirs, posedirs, weights"
+    )
+    assert facts["keys not needed"] == "J, bs_style, bs_type, joint2num, gender"
+    assert facts["keys unknown"] == "author"
+    assert load.warnings == []
+
+
+# Laziness
+
+
+@pytest.fixture
+def damaged(tmp_path):
+    """Write a model whose big arrays are damaged in the middle; their headers stay intact."""
+
+    def write(*keys):
+        path = tmp_path / "body.npz"
+        np.savez(path, **SMPL)
+        data = bytearray(path.read_bytes())
+        for key in keys:
+            start = data.index(SMPL[key].tobytes())
+            data[start + 1000] ^= 1
+        path.write_bytes(data)
+        return path
+
+    return write
+
+
+def test_shapes_and_correctives_are_read_lazily(damaged):
+    path = damaged("shapedirs", "posedirs")
+    figure = viewer.load(path).actors[0].figure
+    pose = rest_pose(figure.skeleton)
+    rest = deform(figure, pose)[0]
+    assert_allclose(rest, SMPL["v_template"], rtol=0, atol=1e-14)
+
+    pose.dofs[0] = 0.5  # the root drives no corrective
+    turned = rest - SMPL["J"][0]
+    turned = turned @ rotation_vector_to_matrix(np.array([0.5, 0, 0])).T + SMPL["J"][0]
+    assert_allclose(deform(figure, pose)[0], turned, rtol=0, atol=1e-14)
+
+    pose.dofs[3] = 0.5
+    with pytest.raises(FormatError, match=rf"^{path}: posedirs: expected a valid array, found a"):
+        deform(figure, pose)
+    pose = rest_pose(figure.skeleton)
+    pose.shape_weights = np.ones(1)
+    with pytest.raises(FormatError, match=rf"^{path}: shapedirs: expected a valid array, found a"):
+        deform(figure, pose)
+
+
+def test_invalid_values_in_lazy_arrays_are_refused_on_reading(load):
+    for key in ("shapedirs", "posedirs"):
+        bad = SMPL[key].copy()
+        bad[1, 2, 3] = np.nan
+        figure = load(SMPL, **{key: bad})
+        late = figure.blend_shapes.offsets if key == "shapedirs" else figure.correctives
+        with pytest.raises(FormatError) as caught:
+            late.values()
+        assert caught.value.path == load.path
+        key_, _, values = fault_of(caught.value.diagnostic)
+        assert (key_, values["item"], values["found"]) == ("F003.finite", key, NAN)
+
+
+@pytest.mark.parametrize("dtype", ["f2", ">f2", "f4", ">f8"])
+def test_numbers_of_any_width_make_a_model(load, dtype):
+    """Weights rounded to half precision sum to 1 within 2^-11 of each; one per vertex is exact."""
+    weights = np.eye(24)[SMPL["weights"].argmax(axis=1)]
+    figure = load(SMPL, **{"weights": weights.astype(dtype), "f": SMPL["f"].astype(dtype)})
+    assert figure.skin.weights.tolist() == [1.0] * len(weights)
+    assert figure.mesh.triangles.tolist() == SMPL["f"].tolist()
