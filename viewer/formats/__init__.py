@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._file_bytes import unreadable
+from viewer.formats._mesh.texture import read_picture
 from viewer.formats._references import referenced_path
 from viewer.formats._source import MAX_SIZE, Source
-from viewer.formats._texture import read_picture
 from viewer.media.file_names import file_stem, folder_name, opened_text
 from viewer.media.image import is_picture, save_image
 from viewer.media.saving import (

@@ -19,13 +19,13 @@ import re
 
 import numpy as np
 
+from viewer.formats._mesh.polygons import triangulate
+from viewer.formats._mesh.surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._neutral import neutral_positions
 from viewer.formats._obj.lines import Places
 from viewer.formats._obj.mtl import read_libraries
 from viewer.formats._obj.parts import ObjParts, read_parts
-from viewer.formats._polygons import triangulate
 from viewer.formats._source import Source
-from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material

@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
+from viewer.formats._mesh.polygons import first_known, triangles_of, triangulate
+from viewer.formats._mesh.surface import filled_normals, polygon_text, stated_unit, stated_up
+from viewer.formats._mesh.texture import load_image
 from viewer.formats._neutral import neutral_positions
 from viewer.formats._ply.header import CORNERS, Header, read_header
 from viewer.formats._ply.rows import Table, read_tables
-from viewer.formats._polygons import first_known, triangles_of, triangulate
 from viewer.formats._source import Source
-from viewer.formats._surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._text.numbers import LARGEST
-from viewer.formats._texture import load_image
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure

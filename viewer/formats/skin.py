@@ -25,6 +25,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import OutputError, UnsupportedFormatError
+from viewer.formats._mesh.texture import load_image
 from viewer.formats._neutral import neutral_positions
 from viewer.formats._skin.blocks import KEYWORDS
 from viewer.formats._skin.checks import (
@@ -39,7 +40,6 @@ from viewer.formats._skin.checks import (
 from viewer.formats._skin.sections import Sections, read_sections
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
-from viewer.formats._texture import load_image
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_text
 from viewer.phrases import printable

@@ -7,7 +7,7 @@ from formats.capture_files import body, noticed, opened, points, write_frames
 from formats.easymocap.capture_faults import gap
 
 from viewer.diagnostics import Phrase
-from viewer.formats._json_places import line_at, nearest_place
+from viewer.formats._text.json_places import line_at, nearest_place
 
 
 def test_non_finite_keypoints_are_unseen(tmp_path):

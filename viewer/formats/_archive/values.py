@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
-from viewer.formats._floats import in_double, widened
+from viewer.formats._archive.half_floats import in_double, widened
 from viewer.formats._misfit import MisfitError
 from viewer.formats._source import Source
 from viewer.phrases import printable

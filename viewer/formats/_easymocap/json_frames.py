@@ -13,7 +13,9 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
 from viewer.formats._file_bytes import unreadable
-from viewer.formats._json_places import (
+from viewer.formats._misfit import MisfitError
+from viewer.formats._reach import FARTHEST, within_text
+from viewer.formats._text.json_places import (
     MOST_DIGITS,
     Keys,
     deepest_place,
@@ -22,8 +24,6 @@ from viewer.formats._json_places import (
     nearest_place,
     repeated_key,
 )
-from viewer.formats._misfit import MisfitError
-from viewer.formats._reach import FARTHEST, within_text
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 

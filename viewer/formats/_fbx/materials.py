@@ -9,9 +9,9 @@ import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._fbx.message import Arrays
+from viewer.formats._mesh.texture import load_image
 from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
-from viewer.formats._texture import load_image
 from viewer.media.image import decode_picture
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._fbx.message import Arrays
+from viewer.formats._mesh.polygons import triangulate
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, Primitive
-from viewer.formats._polygons import triangulate
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 

@@ -7,8 +7,8 @@ from collections import Counter
 from typing import Any
 
 from viewer.formats._archive.values import describe
-from viewer.formats._json_places import MOST_DIGITS
 from viewer.formats._source import Source
+from viewer.formats._text.json_places import MOST_DIGITS
 from viewer.phrases import printable
 
 __all__ = ["parsed"]

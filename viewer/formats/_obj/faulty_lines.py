@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.diagnostics import Part, Phrase
+from viewer.formats._mesh.polygons import first_known, triangles_of
 from viewer.formats._obj.faces import CORNER_KINDS, FEWEST, CornerFault, FaceRows, fits_corner
 from viewer.formats._obj.lines import Lines, NumberRows, Places, Rows, rows_of
-from viewer.formats._polygons import first_known, triangles_of
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_words, to_number, word_begins
 from viewer.formats._text.words import Words, refuse_words

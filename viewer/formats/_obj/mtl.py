@@ -26,13 +26,13 @@ from typing import Any
 import numpy as np
 
 from viewer.errors import FormatError
+from viewer.formats._mesh.texture import load_image
 from viewer.formats._obj.image_kinds import is_cut_out, is_normal_map
 from viewer.formats._obj.map_options import MapOptions, map_options
 from viewer.formats._obj.names_here import name_here
 from viewer.formats._references import referenced_path, refused_text
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
-from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
+from viewer.formats._mesh.polygons import triangles_of
 from viewer.formats._ply.header import CORNERS, Element, Header, Property
-from viewer.formats._polygons import triangles_of
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, parse_words
 from viewer.formats._text.words import Words, number_key

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import describe
-from viewer.formats._json_places import (
+from viewer.formats._source import Source
+from viewer.formats._text.json_places import (
     constant_place,
     nesting_place,
     repeated_key,
     value_place,
 )
-from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 
+from viewer.formats._mesh.texture import load_image
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_number
-from viewer.formats._texture import load_image
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from viewer.formats._json_places import (
+from viewer.formats._text.json_places import (
     constant_place,
     nesting_place,
     repeated_key,

@@ -1,0 +1,1 @@
+"""Meshes as several formats have them: polygons, surfaces and textures."""
