@@ -1,12 +1,47 @@
-"""Calibrated cameras that recorded a motion."""
+"""Calibrated cameras that recorded a motion, fixed or moving."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from viewer.rig.arrays import Floats, frozen
+from viewer.rig.geometry.quaternion import slerp
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.motion.timing import Timing
 
-__all__ = ["CameraView"]
+__all__ = ["CameraMotion", "CameraView", "view_at"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraMotion:
+    """Placement of a moving camera in each frame.
+
+    Attributes
+    ----------
+    timing : Timing
+        Frame rate, and the row of each frame.
+    rotations : (N, 3, 3)
+        R of each row, scene to camera.
+    translations : (N, 3)
+        T of each row, scene units.
+    intrinsics : (N, 3, 3) or None
+        K of each row, pixels, if it changes.
+    """
+
+    timing: Timing
+    rotations: Floats
+    translations: Floats
+    intrinsics: Floats | None = None
+
+    def __post_init__(self) -> None:
+        count = len(self.rotations)
+        for name, shape in {"rotations": (count, 3, 3), "translations": (count, 3)}.items():
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        if self.intrinsics is not None:
+            intrinsics = frozen("intrinsics", self.intrinsics, (count, 3, 3))
+            object.__setattr__(self, "intrinsics", intrinsics)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +64,8 @@ class CameraView:
         Width and height of its images, if the files give them.
     distortion : (N,)
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
+    motion : CameraMotion or None
+        Its placement over time if it moves; the fields above are then those of the first frame.
     """
 
     name: str
@@ -37,9 +74,45 @@ class CameraView:
     translation: Floats
     size: tuple[int, int] | None = None
     distortion: Floats = ()  # type: ignore[assignment]  # converted to an array below
+    motion: CameraMotion | None = None
 
     def __post_init__(self) -> None:
         shapes = {"intrinsic": (3, 3), "rotation": (3, 3), "translation": (3,)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         object.__setattr__(self, "distortion", frozen("distortion", self.distortion, (None,)))
+
+
+def view_at(view: CameraView, seconds: float) -> CameraView:
+    """Return a camera as it stands at a time; itself if it does not move.
+
+    Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Across gaps
+    it is interpolated too, and outside its motion the end frames hold.
+
+    Parameters
+    ----------
+    view : CameraView
+        Fixed or moving camera.
+    seconds : float
+        Time of the scene.
+    """
+    motion = view.motion
+    if motion is None:
+        return view
+    before, after, fractions = motion.timing.locate(np.array([seconds]), interpolate=True)
+    first, second, fraction = int(before[0]), int(after[0]), fractions[0]
+    if first < 0:
+        return view
+    ends = motion.rotations[[first, second]]
+    centers = -np.einsum("nba,nb->na", ends, motion.translations[[first, second]])
+    quaternions = matrix_to_quaternion(ends)
+    rotation = quaternion_to_matrix(slerp(quaternions[0], quaternions[1], fraction))
+    rotation = ends[0] if fraction == 0.0 else rotation
+    center = (1.0 - fraction) * centers[0] + fraction * centers[1]
+    intrinsic = view.intrinsic
+    if motion.intrinsics is not None:
+        low, high = motion.intrinsics[[first, second]]
+        intrinsic = (1.0 - fraction) * low + fraction * high
+    return replace(
+        view, intrinsic=intrinsic, rotation=rotation, translation=-rotation @ center, motion=None
+    )

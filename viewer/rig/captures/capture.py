@@ -57,6 +57,10 @@ class Capture:
         Calibrated cameras.
     images : CameraImages or None
         Images of the cameras, if available.
+    space : "world", "camera" or ""
+        The space of its bodies, of those that the file contains; empty if it has only one.
+    in_space : callable or None
+        Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
     model : str
         The member of the SMPL family that its bodies use, e.g. ``"SMPL+H"``; empty for none.
     warnings : tuple of Diagnostic
@@ -72,3 +76,5 @@ class Capture:
     model: str = ""
     warnings: tuple[Diagnostic, ...] = ()
     images: CameraImages | None = None
+    space: str = ""
+    in_space: Callable[[str], Capture] | None = None
