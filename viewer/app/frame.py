@@ -51,6 +51,7 @@ from viewer.loading import Contents, MotionSettings, add_to_actor, bundled_body,
 from viewer.loading.capturing import Builder
 from viewer.phrases import printable
 from viewer.rendering.gpu.context import is_software
+from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.sampling import n_passes
@@ -72,8 +73,8 @@ class Frame:
     ----------
     state : AppState
         State that is shown and changed.
-    context : moderngl.Context
-        Context that is current in this thread.
+    programs : Programs
+        Programs of the context that is current in this thread.
     wake : callable
         Called from other threads when a frame must be drawn.
     keeps_recent : bool
@@ -83,15 +84,16 @@ class Frame:
     def __init__(
         self,
         state: AppState,
-        context: moderngl.Context,
+        programs: Programs,
         wake: Callable[[], None] = lambda: None,
         keeps_recent: bool = False,
     ) -> None:
+        context = programs.context
         self.state, self.context, self.wake = state, context, wake
         self.keeps_recent = keeps_recent
-        self.renderer = Renderer(context)
+        self.renderer = Renderer(programs)
         self.target: Target | None = None
-        self._preview = Preview(context)
+        self._preview = Preview(programs)
         self.outlines = OutlineLayer(context)
         self._drawn: object = None
         self._keys = PictureKeys()
@@ -367,8 +369,8 @@ class Frame:
             return
         from viewer.app.recording.recording_steps import recording_steps
 
-        ghost = self.renderer.ghost
-        steps = recording_steps(state, self.context, replace(settings), path, ghost)
+        renderer = self.renderer
+        steps = recording_steps(state, renderer.programs, replace(settings), path, renderer.ghost)
         state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
         state.clock.playing, recording.settings = False, None
 

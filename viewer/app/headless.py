@@ -11,7 +11,7 @@ from viewer.app.files.state import Files
 from viewer.app.frame import Frame
 from viewer.app.preferences.state import Appearance
 from viewer.app.theme import apply_theme
-from viewer.rendering.gpu.context import headless_context
+from viewer.rendering.gpu.graphics import Graphics
 from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes
 
@@ -29,24 +29,28 @@ class HeadlessApp:
         State that is shown and changed.
     size : (int, int)
         Size of the virtual window, in window coordinates.
-    device : int, optional
-        Index of the EGL device.
     scale : float
         Scale of the interface.
     pixels_per_point : float
         Framebuffer pixels per window coordinate, as on a HiDPI screen.
+    graphics : Graphics, optional
+        An existing context to draw in, which ``release`` does not free.
     """
 
     def __init__(
         self,
         state: AppState,
         size: tuple[int, int],
-        device: int | None = None,
         scale: float = 1.0,
         pixels_per_point: float = 1.0,
+        graphics: Graphics | None = None,
     ) -> None:
         self.state, self.size, self.pixels_per_point = state, size, pixels_per_point
-        self.context = headless_context(device)
+        self._graphics = graphics or Graphics()
+        self._is_owner = graphics is None
+        self.context = self._graphics.context
+        self._make_current()
+        self._graphics.rest()
         pixels = (round(size[0] * pixels_per_point), round(size[1] * pixels_per_point))
         self.screen = Target(self.context, pixels, 1)
         self._imgui = imgui.create_context()
@@ -60,7 +64,7 @@ class HeadlessApp:
         appearance = state.of(Appearance)
         appearance.scale = appearance.screen_scale = scale
         imgui.backends.opengl3_init("#version 330")
-        self.frame = Frame(state, self.context)
+        self.frame = Frame(state, self._graphics.programs)
 
     def step(self, frames: int = 1) -> None:
         """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io.
@@ -106,14 +110,16 @@ class HeadlessApp:
         return pixels
 
     def release(self) -> None:
-        """Release everything, including the context."""
+        """Release everything, including the context unless it was given."""
         self._make_current()
+        self._graphics.rest()
         imgui.backends.opengl3_shutdown()
         implot.destroy_context(self._implot)
         imgui.destroy_context(self._imgui)
         self.frame.release()
         self.screen.release()
-        self.context.release()
+        if self._is_owner:
+            self._graphics.release()
 
     def __enter__(self) -> HeadlessApp:
         return self

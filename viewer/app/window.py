@@ -48,6 +48,7 @@ from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.phrases import printable  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
 from viewer.rendering.gpu.context import explain  # noqa: E402
+from viewer.rendering.gpu.program import Programs  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
 from viewer.rig.inspection.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
@@ -168,7 +169,7 @@ class _Window:
         self._imgui: Any = imgui.create_context()
         self._implot: Any = implot.create_context()
         self._set_up_imgui(scale)
-        self.frame = Frame(state, self.context, glfw.post_empty_event, keeps_recent=True)
+        self.frame = Frame(state, Programs(self.context), glfw.post_empty_event, keeps_recent=True)
 
     def _set_callbacks(self) -> None:
         """Set callbacks that only record events for the loop, so that none of them can raise."""

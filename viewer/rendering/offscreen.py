@@ -10,7 +10,8 @@ from functools import partial
 
 from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera, facing_camera, fit
-from viewer.rendering.gpu.context import headless_context, is_software, unreadable_devices
+from viewer.rendering.gpu.context import is_software, unreadable_devices
+from viewer.rendering.gpu.graphics import Graphics
 from viewer.rendering.gpu.target import Target, check_size
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer
@@ -34,6 +35,8 @@ class Offscreen:
     ----------
     device : int, optional
         Index of the EGL device; if omitted, each one is tried in turn.
+    graphics : Graphics, optional
+        An existing context to draw in, which ``release`` does not free.
 
     Raises
     ------
@@ -41,11 +44,13 @@ class Offscreen:
         If there is no usable OpenGL, with the cause and a remedy.
     """
 
-    def __init__(self, device: int | None = None) -> None:
-        self.context = headless_context(device)
+    def __init__(self, device: int | None = None, graphics: Graphics | None = None) -> None:
+        self._graphics = graphics or Graphics(device)
+        self._is_owner = graphics is None
+        self.context = self._graphics.context
         with self.context:
-            self.renderer = Renderer(self.context)
-            self.context.info  # noqa: B018 - cached, so that it is available without a current context
+            self._graphics.rest()
+            self.renderer = Renderer(self._graphics.programs)
         if is_software(self.context):
             self.renderer.notes += [
                 f"rendering in software: {node} exists but you have no permission to open it "
@@ -96,12 +101,14 @@ class Offscreen:
             return target.read()
 
     def release(self) -> None:
-        """Free everything, including the context."""
+        """Free everything, including the context unless it was given."""
         with self.context:
+            self._graphics.rest()
             if self._target is not None:
                 self._target.release()
             self.renderer.release()
-        self.context.release()
+        if self._is_owner:
+            self._graphics.release()
 
     def __enter__(self) -> Offscreen:
         return self

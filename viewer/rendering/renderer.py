@@ -65,8 +65,8 @@ class Renderer:
 
     Parameters
     ----------
-    context : moderngl.Context
-        OpenGL 3.3 or newer.
+    programs : Programs
+        Programs of the context to draw in, which their owner releases.
 
     Attributes
     ----------
@@ -87,25 +87,23 @@ class Renderer:
         the image.
     """
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self.context = context
+    def __init__(self, programs: Programs) -> None:
+        self.programs, self.context = programs, programs.context
+        context = self.context
         self.notes: list[str] = []
         self.scalars = ScalarQuantities()
-        self.programs = Programs(context)
-        self.mesh_pass = MeshPass(context, self.programs)
-        self.joint_pass = JointPass(context, self.programs)
-        self.ground_pass = GroundPass(context, self.programs)
+        self.mesh_pass = MeshPass(context, programs)
+        self.joint_pass = JointPass(context, programs)
+        self.ground_pass = GroundPass(context, programs)
         self.buffers = ActorBuffers(
-            context, self.programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
+            context, programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
         )
         self.marks: Marks | None = None
         self.annotations: Sequence[Annotation] = ()
         self.ghost: Ghost | None = None
         self.names_left_out = 0, 0
-        self.lighting = Lighting(context, self.programs)
-        self.late = LatePasses(
-            context, self.programs, self.mesh_pass, self.joint_pass, self.buffers
-        )
+        self.lighting = Lighting(context, programs)
+        self.late = LatePasses(context, programs, self.mesh_pass, self.joint_pass, self.buffers)
 
     @property
     def scalar_range(self) -> tuple[float, float]:
@@ -391,8 +389,8 @@ class Renderer:
             self.notes.append(note)
 
     def release(self) -> None:
-        """Free everything."""
+        """Free everything except the programs."""
         self.buffers.keep_only([])
         passes = self.mesh_pass, self.joint_pass, self.ground_pass, self.late, self.lighting
-        for item in (*passes, self.programs):
+        for item in passes:
             item.release()

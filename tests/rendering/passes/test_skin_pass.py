@@ -234,7 +234,7 @@ class Drawing:
         self.scene = Scene([Actor(figure) for figure in figures])
         self.box = scene_box(self.scene)
         self.camera, self.options = Camera(distance=8.0), DisplayOptions()
-        self.renderer, self.target = Renderer(ctx), Target(ctx, (32, 32), 1)
+        self.renderer, self.target = Renderer(Programs(ctx)), Target(ctx, (32, 32), 1)
         self.draw()
 
     def draw(self) -> int:
@@ -244,6 +244,7 @@ class Drawing:
 
     def release(self) -> None:
         self.renderer.release()
+        self.renderer.programs.release()
         self.target.release()
 
 

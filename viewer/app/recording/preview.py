@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import moderngl
-
 from viewer.app.core.state import AppState
 from viewer.app.recording.recorded_options import recorded_options
 from viewer.app.recording.state import Recording, RecordSettings
+from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
 
@@ -20,12 +19,12 @@ class Preview:
 
     Parameters
     ----------
-    context : moderngl.Context
-        Context that is current in every call.
+    programs : Programs
+        Programs of the context that is current in every call.
     """
 
-    def __init__(self, context: moderngl.Context) -> None:
-        self.context = context
+    def __init__(self, programs: Programs) -> None:
+        self._programs, self.context = programs, programs.context
         self.target: Target | None = None
         self._renderer: Renderer | None = None
         self._drawn: object = None
@@ -66,7 +65,7 @@ class Preview:
         camera = state.camera.copy()
         selected = (state.chosen_actor, state.selected_joint)
         # The view's renderer may still be averaging its own image.
-        renderer = self._renderer = self._renderer or Renderer(self.context)
+        renderer = self._renderer = self._renderer or Renderer(self._programs)
         renderer.draw(state.scene, camera, options, target, state.box, selected)
         target.resolve()
         return int(target.texture.glo)

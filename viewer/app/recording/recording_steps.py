@@ -8,7 +8,6 @@ from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 
-import moderngl
 import numpy as np
 
 from viewer.app.core.state import AppState
@@ -19,6 +18,7 @@ from viewer.errors import OutputError
 from viewer.formats import check_targets
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
+from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rendering.recorder import Recording, Sink, record
 from viewer.rendering.renderer import Renderer
@@ -31,7 +31,7 @@ _FULL = 360.0  # degrees
 
 def recording_steps(
     state: AppState,
-    context: moderngl.Context,
+    programs: Programs,
     settings: RecordSettings,
     path: Path,
     ghost: Ghost | None = None,
@@ -42,8 +42,8 @@ def recording_steps(
     ----------
     state : AppState
         State with the scene, which is copied: later edits do not affect the recording.
-    context : moderngl.Context
-        Context that is current in every step.
+    programs : Programs
+        Programs of the context that is current in every step.
     settings : RecordSettings
         Settings of the recording.
     path : Path
@@ -76,7 +76,7 @@ def recording_steps(
     check_targets(files, state.inputs, is_asked, hint="choose another name")
     sink, size = _sink(settings, files, size, rate, numbers)
     recording = _recording(state, settings, times, size)
-    renderer = Renderer(context)
+    renderer = Renderer(programs)
     renderer.ghost = ghost
     try:
         # The recording must be closed before its renderer, even if this generator is closed.
