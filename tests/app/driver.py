@@ -13,6 +13,7 @@ from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.headless import HeadlessApp
 from viewer.rendering.camera import facing_camera, fit
+from viewer.rendering.gpu.graphics import thread_graphics
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points
@@ -65,7 +66,11 @@ class Driver:
     ):
         scene = scene or viewer.load(*paths)
         self.state = make_state(scene, paths, samples)
-        self.app = HeadlessApp(self.state, size, scale=scale, pixels_per_point=pixels_per_point)
+        # All apps draw in one context with one set of programs, as far as they need OpenGL.
+        graphics = thread_graphics()
+        self.app = HeadlessApp(
+            self.state, size, scale=scale, pixels_per_point=pixels_per_point, graphics=graphics
+        )
         self.io = imgui.get_io()
         # Clicks of a test follow each other quickly: only double_click means two as one.
         self.io.mouse_double_click_time = 1e-4

@@ -192,10 +192,11 @@ def draw_scene(
 
     The default quality is lowered if drawing it in software would take long.
     """
+    from viewer.rendering.gpu.graphics import thread_graphics
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.quality_limits import limit_passes, time_note
 
-    with deferred(), Offscreen(device) as offscreen:
+    with deferred(), Offscreen(graphics=thread_graphics(device)) as offscreen:
         notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)
         print_warnings(notes)
         pixels = offscreen.render(
@@ -221,11 +222,12 @@ def _draw_panels(
 ) -> Bytes:
     from viewer.app.core.state import AppState
     from viewer.app.headless import HeadlessApp
+    from viewer.rendering.gpu.graphics import thread_graphics
 
     if min(size) < 200:
         raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")
     state = AppState(scene, camera=camera, options=options, box=box)
-    with deferred(), HeadlessApp(state, size, device=device) as app:
+    with deferred(), HeadlessApp(state, size, graphics=thread_graphics(device)) as app:
         return app.picture(fits)
 
 

@@ -197,6 +197,7 @@ def draw_sequence(
     """
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import fit_turntable, frame_motion, seen_aspect
+    from viewer.rendering.gpu.graphics import thread_graphics
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record
@@ -216,7 +217,7 @@ def draw_sequence(
         fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
     title = f"drawing {printable(outputs[0].name)}"
     hold()
-    with Offscreen(arguments.gpu) as offscreen, offscreen.context:
+    with Offscreen(graphics=thread_graphics(arguments.gpu)) as offscreen, offscreen.context:
         if request.kind == "sheet":
             cells = f"cells of a contact sheet of {size[0]} x {size[1]} pixels"
             check_size(offscreen.context, frame_size, cells)
