@@ -93,7 +93,7 @@ class PlainBvh:
             else:
                 above = matrices[parent]
                 matrices.append(product(above, turn))
-                moved = [sum(above[r][c] * offset[c] for c in range(3)) for r in range(3)]
+                moved = [a * offset[0] + b * offset[1] + c * offset[2] for a, b, c in above]
                 places.append([a + b for a, b in zip(places[parent], moved, strict=True)])
         return dict(zip(self.names, zip(matrices, places, strict=True), strict=True))
 
@@ -110,4 +110,4 @@ def about(axis: int, angle: float) -> list[list[float]]:
 
 def product(a: list[list[float]], b: list[list[float]]) -> list[list[float]]:
     """Return the matrix product."""
-    return [[sum(a[r][k] * b[k][c] for k in range(3)) for c in range(3)] for r in range(3)]
+    return [[x * p + y * q + z * r for p, q, r in zip(*b, strict=True)] for x, y, z in a]

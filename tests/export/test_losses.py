@@ -145,9 +145,8 @@ def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
     for frame in range(12):
         pose = pose_of(figure, animation.frames, frame)
         there = viewer.joint_matrices(figure, pose)[:, :3, 3]
-        turned, places = (
-            np.array([file.joints(frame)[name][part] for name in names]) for part in (0, 1)
-        )
+        placed = file.joints(frame)
+        turned, places = (np.array([placed[name][part] for name in names]) for part in (0, 1))
         joints.append(np.linalg.norm(there - places, axis=1))
         carried = np.einsum("jab,vjb->vja", turned, shaped.mesh.positions[:, None] - rest) + places
         driven = np.einsum("vj,vja->va", dense, carried)

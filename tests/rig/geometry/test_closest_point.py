@@ -10,6 +10,12 @@ sparse = pytest.importorskip("scipy.sparse")
 ROUNDING = 1e-12
 
 
+def cross(a, b):
+    """Return the cross product of two vectors, without what numpy's does for many."""
+    (x, y, z), (u, v, w) = a, b
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
 def point_on_triangle(point, a, b, c):
     """Return the closest point by trying the plane, the edges and the corners one by one."""
     candidates = [a, b, c]
@@ -19,11 +25,11 @@ def point_on_triangle(point, a, b, c):
             along = (point - start) @ edge / (edge @ edge)
             if 0 < along < 1:
                 candidates.append(start + along * edge)
-    normal = np.cross(b - a, c - a)
+    normal = cross(b - a, c - a)
     if normal @ normal > 1e-30:
         foot = point - normal * ((point - a) @ normal) / (normal @ normal)
         sides = [
-            np.cross(end - start, foot - start) @ normal for start, end in ((a, b), (b, c), (c, a))
+            cross(end - start, foot - start) @ normal for start, end in ((a, b), (b, c), (c, a))
         ]
         if min(sides) > 0:
             candidates.append(foot)
