@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from formats.bvh.bvh_refusals import refusal
 from formats.bvh_text import GOOD, read
-from test_mutations import mutate
+from formats.test_mutations import mutate
 
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import Source, bvh

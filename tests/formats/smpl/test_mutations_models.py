@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from formats.pig_text import GOOD, arrays, write
 from formats.synthetic_smpl import model
-from test_mutations import mutate
+from formats.test_mutations import mutate
 
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
