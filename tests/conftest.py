@@ -12,11 +12,11 @@ import pytest
 from hypothesis import settings
 from run_time import RunTime
 
-pytest_plugins = ["stored_pictures"]
+pytest_plugins = ["examples", "stored_pictures"]
 
 ROOT = Path(__file__).resolve().parents[1]
 # Folders and files whose tests and examples all draw, or depend on one that draws.
-DRAWING = ("tests/app", "tests/rendering", "viewer/rendering", "viewer/__init__.py")
+DRAWING = ("tests/app/", "tests/rendering/", "viewer/rendering/", "viewer/__init__.py")
 # These tests wait more than they compute. Begun last, one process would end long after the other.
 FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -41,10 +41,9 @@ def pytest_collection_finish() -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if any(item.path.is_relative_to(ROOT / place) for place in DRAWING):
+        if item.nodeid.startswith(DRAWING):
             item.add_marker("slow")
-    first = [ROOT / name for name in FIRST]
-    items.sort(key=lambda item: item.path not in first)
+    items.sort(key=lambda item: not item.nodeid.startswith(FIRST))
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,19 @@
+"""Modules are imported as doctests only if they contain examples: one in fifteen does."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(
+    file_path: Path,
+) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Drop collectors of examples, which pytest makes for every module."""
+    collectors = yield
+    if not collectors or b">>> " in file_path.read_bytes():
+        return collectors
+    return [one for one in collectors if type(one) is pytest.Module]
