@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from viewer.app.window import _Rest
+from viewer.app.window import Rest
 
 pytestmark = pytest.mark.slow
 
 
 def test_awaited_event_is_followed_by_frames_showing_it():
     for at in range(1, 9):  # the frame that shows it, even the last before the window sleeps
-        rest = _Rest()
+        rest = Rest()
         for frame in range(at):
             rest.count(happened=frame % 4 == 0, awaits=True)
         drawn = 0
@@ -23,7 +23,7 @@ def test_awaited_event_is_followed_by_frames_showing_it():
 
 
 def test_waiting_times_out_when_nothing_happens():
-    rest, drawn = _Rest(), 0
+    rest, drawn = Rest(), 0
     for _ in range(20):
         rest.count(happened=False, awaits=False)
         drawn += rest.left >= 0

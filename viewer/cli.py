@@ -18,7 +18,7 @@ from viewer.interrupts import Interrupted, watched
 from viewer.phrases import printable
 from viewer.streams import standard_streams
 
-__all__ = ["run"]
+__all__ = ["protect_numbers", "run"]
 
 _EPILOG = """\
 Without a command, FILES open in a window; without files, the bundled figure does.
@@ -98,7 +98,7 @@ def _dispatch(arguments: list[str]) -> int:
     parser = command_parser(name)
     # Everything after "--" is a file, even if it looks like an option.
     end = arguments.index("--") if "--" in arguments else len(arguments)
-    before_end = _protect_numbers(arguments[:end])
+    before_end = protect_numbers(arguments[:end])
     parser.check_options(before_end)
     parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
@@ -106,7 +106,7 @@ def _dispatch(arguments: list[str]) -> int:
     return import_module(f"viewer.commands.{name}").run(parsed)
 
 
-def _protect_numbers(arguments: list[str]) -> list[str]:
+def protect_numbers(arguments: list[str]) -> list[str]:
     """Join ``--option -1`` to ``--option=-1``: argparse treats ``-1,2`` and ``-z`` as options."""
     joined: list[str] = []
     for argument in arguments:

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from viewer.app.core import reasons
 from viewer.app.shown_panels import ShownPanels
-from viewer.app.window import _awaits_tooltip
+from viewer.app.window import awaits_tooltip
 from viewer.rig.scene import Scene
 
 NOTHING_MOVES = "no motion: open a clip, a capture or a BVH"
@@ -159,9 +159,9 @@ def test_window_keeps_drawing_until_a_tooltip_is_due(drive, rig):
     context = hand.app._imgui
     hand.move(hand.middle)
     hand.step(40)
-    assert not _awaits_tooltip(context)
+    assert not awaits_tooltip(context)
     hand.move("Play")
     hand.step(3)
-    assert _awaits_tooltip(context)
+    assert awaits_tooltip(context)
     hand.step(40)
-    assert not _awaits_tooltip(context)
+    assert not awaits_tooltip(context)

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from viewer.app.features import KEYS, MOUSE
 from viewer.app.keys import Keyboard
-from viewer.app.keys_list import _columns
+from viewer.app.keys_list import column_layout
 
 N_LINES = len(KEYS) + len(MOUSE)
 
@@ -32,7 +32,7 @@ def listed(hand):
     ],
 )
 def test_columns_are_few_and_fit(room, wanted):
-    assert _columns(50, room, (400.0, 20.0)) == wanted
+    assert column_layout(50, room, (400.0, 20.0)) == wanted
 
 
 @pytest.mark.parametrize("size", [(900, 1150), (1200, 700)])

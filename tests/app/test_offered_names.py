@@ -8,7 +8,7 @@ from formats.capture_files import body, write_frames
 from viewer.app.curves.clip_actions import ask_for_clip, new_clip
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
-from viewer.app.recording.record_dialog import _ask_where
+from viewer.app.recording.record_dialog import ask_where
 from viewer.app.recording.state import KINDS, RecordSettings
 
 
@@ -22,7 +22,7 @@ def recorded(drive, tmp_path):
 def test_recordings_are_named_after_the_sequence(recorded):
     offered = {}
     for kind in KINDS:
-        _ask_where(recorded.state, RecordSettings(kind=kind))
+        ask_where(recorded.state, RecordSettings(kind=kind))
         offered[kind] = recorded.state.of(Files).dialog.name
     assert offered.pop("pictures") == "seq_smpl_{frame:05}.png"
     assert offered.pop("sheet") == "seq_smpl_sheet.png"
@@ -58,7 +58,7 @@ def test_figure_and_clip_files_are_named_after_the_figure(hand):
     assert state.actor.clip.name == "tiny"
     ask_for_clip(state)
     assert state.of(Files).dialog.name == "tiny_edited.anim"
-    _ask_where(state, RecordSettings(kind="sheet"))
+    ask_where(state, RecordSettings(kind="sheet"))
     assert state.of(Files).dialog.name == "tiny_sheet.png"
 
 

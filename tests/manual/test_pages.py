@@ -10,7 +10,7 @@ import pytest
 from manual.reference import FOLDER, with_tables
 
 from viewer.app.features import KEYS
-from viewer.cli import _protect_numbers
+from viewer.cli import protect_numbers
 from viewer.commands import COMMANDS
 from viewer.commands._usage import command_parser
 from viewer.diagnostics import CODES, MESSAGES
@@ -61,7 +61,7 @@ def test_options_used_on_pages_exist(page: str, line: str) -> None:
     words = shlex.split(line, comments=True)[1:]
     name = words.pop(0) if words and words[0] in COMMANDS else "view"
     parser = command_parser(name)
-    words = _protect_numbers(words)
+    words = protect_numbers(words)
     parser.check_options(words)
     parser.parse_intermixed_args(words)
 

@@ -14,7 +14,7 @@ from viewer.app.core.widgets import overlay_rect
 from viewer.app.features import KEYS, MOUSE
 from viewer.app.keys import Keyboard
 
-__all__ = ["draw_keys"]
+__all__ = ["column_layout", "draw_keys"]
 
 _COLOR = (1.0, 0.78, 0.45, 1.0)  # colour of the keys
 _OPACITY = 0.97  # text behind the list must not show through
@@ -43,7 +43,7 @@ def draw_keys(state: AppState) -> None:
         viewport.size.x - 4.0 * style.window_padding.x,
         viewport.size.y - 4.0 * style.window_padding.y,
     )
-    columns = _columns(len(lines), room, (column, imgui.get_text_line_height_with_spacing()))
+    columns = column_layout(len(lines), room, (column, imgui.get_text_line_height_with_spacing()))
     center = viewport.get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.always, (0.5, 0.5))
     edges = 2.0 * style.window_padding.x, 2.0 * style.window_padding.y
@@ -66,10 +66,10 @@ def _flags(fits: bool) -> int:
     return flags | imgui.WindowFlags_.horizontal_scrollbar
 
 
-def _columns(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
+def column_layout(count: int, room: tuple[float, float], line: tuple[float, float]) -> _Columns:
     """Return the smallest number of columns that fit into the height, limited by the width.
 
-    >>> _columns(50, (1000, 600), (400, 20)), _columns(50, (1000, 400), (400, 20))
+    >>> column_layout(50, (1000, 600), (400, 20)), column_layout(50, (1000, 400), (400, 20))
     (_Columns(number=2, rows=25, fits=True), _Columns(number=2, rows=25, fits=False))
     """
     wanted = -(-count // max(int(room[1] / line[1]), 1))

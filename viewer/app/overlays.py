@@ -23,7 +23,7 @@ from viewer.app.weights.legend import draw_legend
 from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
 
-__all__ = ["draw_hints", "draw_overlays"]
+__all__ = ["draw_hints", "draw_overlays", "n_newest"]
 
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
 _BAR_WIDTH = 260.0  # points
@@ -137,7 +137,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     heights = [imgui.calc_text_size(text, False, wrap).y + style.item_spacing.y for text in texts]
     top = max((rect[3] + _BETWEEN for rect in above), default=y + _GAP)
     room = y + height - _GAP - top - 2.0 * style.window_padding.y + style.item_spacing.y
-    count = _newest(heights, line, room)
+    count = n_newest(heights, line, room)
     if not count and not above:
         count = 1  # a clipped message is better than none
     if not count and room < line:
@@ -155,10 +155,10 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     imgui.end()
 
 
-def _newest(heights: Sequence[float], line: float, room: float) -> int:
+def n_newest(heights: Sequence[float], line: float, room: float) -> int:
     """Return how many of the latest messages fit, leaving room for a line about hidden ones.
 
-    >>> _newest([10, 10, 10], 10, 30), _newest([10, 10, 10], 10, 29), _newest([10] * 20, 10, 500)
+    >>> n_newest([10, 10, 10], 10, 30), n_newest([10, 10, 10], 10, 29), n_newest([10] * 20, 10, 500)
     (3, 1, 8)
     """
     count, used = 0, 0.0

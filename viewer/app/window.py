@@ -54,7 +54,7 @@ from viewer.rig.inspection.front import guess_front  # noqa: E402
 from viewer.rig.mesh import bounding_box  # noqa: E402
 from viewer.rig.scene import Scene, scene_points  # noqa: E402
 
-__all__ = ["probe", "show"]
+__all__ = ["Rest", "awaits_tooltip", "probe", "show"]
 
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two to settle
@@ -221,7 +221,7 @@ class _Window:
 
     def run(self) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
-        rest = _Rest()
+        rest = Rest()
         while not glfw.window_should_close(self.handle):
             poll()
             happened = self._wait(rest.left > 0)
@@ -263,7 +263,7 @@ class _Window:
         is_read = files.loader is not None or files.stream is not None
         is_read |= not state.framing.is_settled
         is_waiting = state.of(Weights).is_waiting or state.of(Hovered).is_waiting
-        return is_read or is_waiting or _awaits_tooltip(self._imgui)
+        return is_read or is_waiting or awaits_tooltip(self._imgui)
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window currently has no pixels."""
@@ -299,7 +299,7 @@ class _Window:
         stop_watching()
 
 
-class _Rest:
+class Rest:
     """Counts the frames that remain to be drawn until the interface has settled."""
 
     def __init__(self) -> None:
@@ -324,7 +324,7 @@ class _Rest:
         self.left = _SETTLE_FRAMES if happened or is_over else self.left - 1
 
 
-def _awaits_tooltip(context: Any) -> bool:
+def awaits_tooltip(context: Any) -> bool:
     """Return whether the mouse is over an item whose delayed tooltip has not appeared yet."""
     delay = imgui.get_style().hover_delay_normal
     return context.hover_item_delay_id != 0 and context.hover_item_delay_timer < delay

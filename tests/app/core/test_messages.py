@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 import viewer
 from viewer.app.core.messages import Message, MessageLog, message_line
-from viewer.app.overlays import _newest
+from viewer.app.overlays import n_newest
 from viewer.diagnostics import Diagnostic
 
 
@@ -150,7 +150,7 @@ def test_keys_act_while_the_window_is_open(hand):
     ],
 )
 def test_newest_messages_that_fit(heights, room, count):
-    assert _newest(heights, 10, room) == count
+    assert n_newest(heights, 10, room) == count
 
 
 def test_more_than_eight_messages_are_counted(drive, rig, texts):

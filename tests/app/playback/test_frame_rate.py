@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 
 import viewer
 from viewer.app.core.undo_history import History
-from viewer.app.files.stream import _keep_rate
+from viewer.app.files.stream import keep_rate
 from viewer.app.playback.frame_rate import foreign_rate, rate_of, set_rate
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.motion.clip import Channel, Clip
@@ -162,9 +162,9 @@ def test_rate_is_greyed_if_another_actor_defines_the_frames(drive, rig):
 def test_people_appearing_while_loading_get_the_chosen_rate(rig):
     first, second = people(rig, [True] * 4, [True] * 4).actors
     first.clip = with_rate(first.clip, 25.0)
-    _keep_rate([first], [second])
+    keep_rate([first], [second])
     assert second.clip.timing.frame_rate == 25.0
-    _keep_rate([], [first])
+    keep_rate([], [first])
     assert first.clip.timing.frame_rate == 25.0
 
 

@@ -9,7 +9,7 @@ import pytest
 from app.curves.plotted import SIZE, _center, clip_text
 from imgui_bundle import imgui
 
-from viewer.app.posing.move_tool import _shift_text
+from viewer.app.posing.move_tool import shift_text
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_timeline_and_status_show_no_minus_before_a_zero(drive, rig, tmp_path, t
 
 
 def test_joint_translation_shows_no_negative_zero():
-    assert _shift_text("root", np.array([-0.0, 0.25, -1.0])) == "root   +0 +0.25 -1"
+    assert shift_text("root", np.array([-0.0, 0.25, -1.0])) == "root   +0 +0.25 -1"
 
 
 def test_raw_pose_values_have_no_negative_zero(box, texts):

@@ -16,7 +16,7 @@ from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
 
-__all__ = ["Stream"]
+__all__ = ["Stream", "keep_rate"]
 
 _WAITING = 4  # maximum number of parts in the queue: limits memory
 
@@ -97,7 +97,7 @@ class Stream:
             known = builder.actors
             more, said = builder.add(part)
             # The user may have changed the frame rate since the first person appeared.
-            _keep_rate(known[:1], more)
+            keep_rate(known[:1], more)
             new += more
             notes += said
             grew = True
@@ -127,7 +127,7 @@ class Stream:
                 return
 
 
-def _keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
+def keep_rate(known: Sequence[Actor], new: Sequence[Actor]) -> None:
     """Set the frame rate of new people to that of the people in the scene."""
     for first in known:
         for actor in new:

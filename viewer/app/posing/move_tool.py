@@ -29,6 +29,7 @@ __all__ = [
     "arrows",
     "grab_arrow",
     "longest_chain",
+    "shift_text",
     "shifts",
     "translation_dofs",
     "used_chain",
@@ -237,7 +238,7 @@ class MoveHandle:
         pose.dofs[rows] = np.clip(wanted, low, high)
         limited = tuple(rows[(wanted < low) | (wanted > high)].tolist())
         done = columns @ (pose.dofs[rows] - self.start.dofs[rows])
-        return Outcome(pose, _shift_text(joint_label(skeleton, self.joint), done), limited)
+        return Outcome(pose, shift_text(joint_label(skeleton, self.joint), done), limited)
 
     def _shift_figure(self, way: Floats) -> Outcome:
         """Move the whole figure by its translation, which precedes its placement in the scene."""
@@ -245,7 +246,7 @@ class MoveHandle:
         # This is the placement of the actor, without the figure's own scale.
         linear = self.posed.placement[:3, :3] / self.start.figure_scale
         pose.figure_translation = pose.figure_translation + np.linalg.solve(linear, way)
-        return Outcome(pose, _shift_text("figure", way))
+        return Outcome(pose, shift_text("figure", way))
 
 
 def _dragged(center: Floats, first: Place, frame: ViewFrame, place: Place) -> Floats:
@@ -262,5 +263,6 @@ def _nearest_to(center: Floats, axis: Floats, origin: Floats, direction: Floats)
     return float(axis @ away - across * (direction @ away)) / room
 
 
-def _shift_text(name: str, way: Floats) -> str:
+def shift_text(name: str, way: Floats) -> str:
+    """Return the text beside the mouse: what has been moved, and how far along each axis."""
     return f"{name}   {' '.join(number_text(part, '+.3g') for part in way.tolist())}"

@@ -28,7 +28,7 @@ from viewer.formats import file_stem
 from viewer.rendering.options import QUALITIES
 from viewer.rig.number_text import number_text
 
-__all__ = ["draw_record_dialog", "open_record_dialog"]
+__all__ = ["ask_where", "draw_record_dialog", "open_record_dialog"]
 
 _SIZES = {
     "view": "size of the view",
@@ -77,7 +77,7 @@ def draw_record_dialog(state: AppState) -> None:
             _draw_frames(state, settings)
         imgui.end_child()
         if button(state, "Save as…", no_job_room(state)):
-            _ask_where(state, settings)
+            ask_where(state, settings)
         imgui.same_line()
         if button(state, "Close##record"):
             stays = False
@@ -221,7 +221,8 @@ def _span_text(state: AppState, settings: RecordSettings) -> str:
     return f"{number_text(low, '.3f')} to {number_text(high, '.3f')} s"
 
 
-def _ask_where(state: AppState, settings: RecordSettings) -> None:
+def ask_where(state: AppState, settings: RecordSettings) -> None:
+    """Open the dialog for the name of a recording, which offers one after the scene's title."""
     stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")
