@@ -103,7 +103,7 @@ def slider_float(
     """
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, high), text, flags)
-    with _Track(bool(flags & imgui.SliderFlags_.logarithmic)) as track:
+    with _Track(bool(flags and flags & imgui.SliderFlags_.logarithmic)) as track:
         changed, moved = imgui.slider_float(label, value, low, high, text, flags)
         track.draw(moved, low, high)
     return changed, moved

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -106,7 +106,7 @@ class AppState:
     framing: Framing = field(default_factory=Framing)
     clock: Clock = field(default_factory=Clock)
     job: Job | None = None
-    _parts: dict[type[object], object] = field(default_factory=dict)
+    _parts: dict[type[Any], Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._begin()
@@ -120,7 +120,7 @@ class AppState:
             Dataclass of the feature with a default for every field.
         """
         part = self._parts.get(kind)
-        if not isinstance(part, kind):
+        if part is None:
             part = self._parts[kind] = kind()
         return part
 

@@ -38,6 +38,10 @@ __all__ = [
 
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 
+# Plain numbers: Python's own flags take a microsecond per operation, a hundred times in a frame.
+_DISABLED = int(imgui.ItemFlags_.disabled)
+_HOVERED = int(imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled)
+
 Rect = tuple[float, float, float, float]
 """Left, upper, right and lower edge, in window coordinates."""
 
@@ -84,14 +88,11 @@ def explain(text: str, why: str = "") -> None:
     why : str
         Reason why it is disabled; empty if it is enabled.
     """
-    is_disabled = imgui.get_current_context().last_item_data.item_flags & imgui.ItemFlags_.disabled
-    if is_disabled and not why:
+    if not why and imgui.get_current_context().last_item_data.item_flags & _DISABLED:
         # The reason of the enclosing block is shown already.
         return
-    flags = imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled
-    tooltip = "\n".join(filter(None, (text, why)))
-    if tooltip and imgui.is_item_hovered(flags):
-        show_tooltip(tooltip)
+    if (text or why) and imgui.is_item_hovered(_HOVERED):
+        show_tooltip("\n".join(filter(None, (text, why))))
 
 
 def show_tooltip(text: str) -> None:
