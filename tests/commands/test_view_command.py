@@ -33,7 +33,8 @@ def test_without_display_the_figure_is_rendered_to_a_new_file(tmp_path, monkeypa
         assert captured.out == (
             f"no display found (DISPLAY is not set); drew {folder.resolve() / name} instead\n"
         )
-        assert captured.err == ""
+        # A busy machine may take so long that the time is stated.
+        assert [line for line in captured.err.splitlines() if "takes about" not in line] == []
         assert len(list(folder.iterdir())) == number + 1
     picture = np.array(Image.open(folder / "tiny.png").convert("RGBA"))
     options = viewer.DisplayOptions(quality="final")
