@@ -88,19 +88,18 @@ class Frame:
         wake: Callable[[], None] = lambda: None,
         keeps_recent: bool = False,
     ) -> None:
-        context = programs.context
-        self.state, self.context, self.wake = state, context, wake
+        self.state, self.context, self.wake = state, programs.context, wake
         self.keeps_recent = keeps_recent
         self.renderer = Renderer(programs)
         self.target: Target | None = None
         self._preview = Preview(programs)
-        self.outlines = OutlineLayer(context)
+        self.outlines = OutlineLayer(self.context)
         self._drawn: object = None
         self._keys = PictureKeys()
         self.pace = Pace()
-        self._is_software = is_software(context)
-        state.stats.renderer = context.info["GL_RENDERER"]
-        state.stats.version = context.info["GL_VERSION"]
+        self._is_software = is_software(self.context)
+        state.stats.renderer = self.context.info["GL_RENDERER"]
+        state.stats.version = self.context.info["GL_VERSION"]
 
     def draw(self, framebuffer: moderngl.Framebuffer, size: tuple[int, int], scale: float) -> None:
         """Run one frame between ``imgui.new_frame`` and the swap of buffers, and paint it.
@@ -393,8 +392,6 @@ class Frame:
         for work in (self.state.job, self.state.of(Files).stream):
             if work is not None:
                 work.cancel()
-        if self.target is not None:
-            self.target.release()
-        self._preview.release()
-        self.outlines.release()
-        self.renderer.release()
+        for item in (self.target, self._preview, self.outlines, self.renderer):
+            if item is not None:
+                item.release()
