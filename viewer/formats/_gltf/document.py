@@ -93,6 +93,22 @@ def open_document(source: Source) -> Document:
     Raises
     ------
     FormatError
-        If its container or its JSON is invalid.
+        If its container or its JSON is invalid, or it has another version.
     """
-    return Document(source, open_container(source))
+    container = open_container(source)
+    # In glTF 1.0, the tables are objects instead of lists, so the version is checked first.
+    _check_version(Element(source, container.root))
+    return Document(source, container)
+
+
+def _check_version(root: Element) -> None:
+    """Refuse documents that have another major version or require a later minor version."""
+    asset = root.part("asset")
+    if asset is None:
+        root.warn("G001.no-asset")
+        return
+    version = asset.text("version", "2.0")
+    if version.partition(".")[0] != "2":
+        raise asset.fault("F002.gltf-version", "version", found=version)
+    if asset.text("minVersion", "2.0") != "2.0":
+        raise asset.fault("F002.gltf-version", "minVersion", found=asset.text("minVersion"))
