@@ -185,7 +185,8 @@ class Accessors:
     def components(self, index: int) -> Floats | None:
         """Return the components of an accessor as stored, not normalised: (N, C).
 
-        None if the data is elsewhere: compressed with Draco, for instance.
+        None if the data is elsewhere: compressed with Draco, for instance. As the caller does not
+        keep them, they do not count as decoded data, although they must fit within the limit.
 
         Raises
         ------
@@ -194,9 +195,13 @@ class Accessors:
         """
         if not self._table[index].has("bufferView") and not self._table[index].has("sparse"):
             return None
-        layout = self._layout(index, tuple(_TYPES), self._table[index].pointer)
+        pointer = self._table[index].pointer
+        layout = self._layout(index, tuple(_TYPES), pointer)
+        values = self._picked(layout, None, None)
+        size = values.itemsize if not layout.element.has("bufferView") else 0
+        self._spend(-values.size * (8 + size), pointer)
         with np.errstate(invalid="ignore"):  # signalling NaN
-            return self._picked(layout, None, None).astype(np.float64)
+            return values.astype(np.float64)
 
     def matrices(self, index: int, user: str) -> Floats:
         """Return an accessor of MAT4 as matrices with the translation in the last column.

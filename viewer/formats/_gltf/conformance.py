@@ -14,6 +14,8 @@ __all__ = ["check_conformance"]
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
 _UNIT = 1e-3  # deviation of a quaternion's length from 1
+# Normalised integers that stand for 1, by component type.
+_ONES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 
 
 def check_conformance(
@@ -187,11 +189,13 @@ def _check_rotations(document: Document, sampler: Element) -> None:
     accessor = sampler.index("output", len(document.accessors), "accessors")
     if accessor < 0:
         return
-    keys = document.accessors.floats(accessor, ("VEC4",), sampler.at("output"))
-    lengths = np.linalg.norm(keys, axis=1)
+    keys = document.accessors.components(accessor)
+    if keys is None or keys.shape[1] != 4:
+        return
+    one = _ONES.get(document.accessors[accessor].values.get("componentType"), 1.0)
+    lengths = np.linalg.norm(keys, axis=1) / one
     # Integers are rounded: 1 / 127 for each component of a byte.
-    is_float = document.accessors[accessor].values.get("componentType") == 5126
-    odd = np.abs(lengths - 1.0) > (_UNIT if is_float else 0.02)
+    odd = np.abs(lengths - 1.0) > (_UNIT if one == 1.0 else 0.02)
     if odd.any():
         key = int(odd.argmax())
         found = {"index": key, "found": float(lengths[key])}

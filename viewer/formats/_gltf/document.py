@@ -57,18 +57,18 @@ class Document:
         return self._tables[name]
 
     def spend(self, n_bytes: int, pointer: str) -> None:
-        """Count bytes that are about to be decoded.
+        """Count bytes that are about to be decoded; negative numbers are no longer in memory.
 
         Raises
         ------
         FormatError
             If the decoded data are much larger than the file, which may declare huge arrays.
         """
-        self._decoded += n_bytes
+        size = self._decoded + n_bytes
         most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
-        if self._decoded > most:
-            values = {"most": most, "size": self._decoded}
-            raise self.source.fault("F002.gltf-decoded", pointer, **values)
+        if size > most:
+            raise self.source.fault("F002.gltf-decoded", pointer, most=most, size=size)
+        self._decoded = size
 
     def kept(self, read: Callable[[], Content], neutral: Content) -> Content:
         """Return the result of a function; after an error, a neutral value if errors are kept.
