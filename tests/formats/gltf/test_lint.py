@@ -75,3 +75,23 @@ def test_a_file_that_follows_the_specification_has_no_errors(tmp_path: Path) -> 
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
     assert {one.code for one in lint_files([path])[1]} == {"S007", "M005"}
+
+
+@pytest.mark.parametrize(
+    ("path", "end", "code"),
+    [("translation", [1000, 0, 0], "C003"), ("rotation", [1, 0, 0, 0], "C004")],
+)
+def test_steps_between_keys_are_no_jumps(
+    tmp_path: Path, path: str, end: list[float], code: str
+) -> None:
+    rest = [0, 0, 0, 1] if path == "rotation" else [0, 0, 0]
+    for interpolation, expected in (("LINEAR", True), ("STEP", False)):
+        # Half a rotation takes 50 ms if it is interpolated.
+        file = animated(path, [rest, end], input=0, interpolation=interpolation)
+        file.root["animations"][0]["samplers"][0]["input"] = file.times([0.0, 0.05])
+        file.mesh()
+        file.root["nodes"][0]["mesh"] = 0
+        name = tmp_path / f"{interpolation}.gltf"
+        name.write_bytes(file.json())
+        codes = {finding.code for finding in lint_files([name])[1]}
+        assert (code in codes) == expected

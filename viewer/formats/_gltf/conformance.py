@@ -192,7 +192,7 @@ def _check_rotations(document: Document, sampler: Element) -> None:
     keys = document.accessors.components(accessor)
     if keys is None or keys.shape[1] != 4:
         return
-    one = _ONES.get(document.accessors[accessor].values.get("componentType"), 1.0)
+    one = _ONES.get(document.accessors[accessor].whole("componentType"), 1.0)
     lengths = np.linalg.norm(keys, axis=1) / one
     # Integers are rounded: 1 / 127 for each component of a byte.
     odd = np.abs(lengths - 1.0) > (_UNIT if one == 1.0 else 0.02)
