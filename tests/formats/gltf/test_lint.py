@@ -7,7 +7,9 @@ from formats.gltf.files import animated, skinned
 from formats.gltf.planted_gltf import PLANTED
 from formats.gltf.validator_faults import FAULTS
 
-from viewer.lint import lint_files
+from viewer.lint import lint_again, lint_files
+from viewer.loading import MotionSettings, load
+from viewer.rig.motion.animation_choice import play_animation
 
 
 @pytest.mark.parametrize("code", PLANTED)
@@ -95,3 +97,35 @@ def test_steps_between_keys_are_no_jumps(
         name.write_bytes(file.json())
         codes = {finding.code for finding in lint_files([name])[1]}
         assert (code in codes) == expected
+
+
+def with_two_animations(folder: Path) -> Path:
+    """Write a node with a mesh that jumps in its second animation."""
+    file = animated("translation", [[0, 0, 0], [0.1, 0, 0]])
+    file.mesh()
+    file.root["nodes"][0]["mesh"] = 0
+    (first,) = file.root["animations"]
+    sampler = first["samplers"][0] | {"output": file.accessor([[0, 0, 0], [1000, 0, 0]])}
+    file.root["animations"] = [first | {"name": "walk"}, first | {"name": "leap"}]
+    file.root["animations"][1]["samplers"] = [sampler]
+    path = folder / "a.gltf"
+    path.write_bytes(file.json())
+    return path
+
+
+@pytest.mark.parametrize("playing", ["walk", "leap", "none"])
+def test_all_animations_are_checked(tmp_path: Path, playing: str) -> None:
+    path = with_two_animations(tmp_path)
+    settings = MotionSettings(animation=playing)
+    (found,) = [one for one in lint_files([path], None, settings)[1] if one.code == "C003"]
+    assert (found.place(), found.motion, found.animation) == (f"{path}#/animations/1", "leap", 1)
+
+
+def test_animations_of_an_open_scene_have_the_places_of_the_file(tmp_path: Path) -> None:
+    path = with_two_animations(tmp_path)
+    scene = load(path)
+    (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
+    assert found.place() == f"{path}#/animations/1"
+    play_animation(scene.actors[0], 1)
+    (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
+    assert found.place() == f"{path}#/animations/1"
