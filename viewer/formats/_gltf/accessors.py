@@ -144,6 +144,16 @@ class Accessors:
         with np.errstate(invalid="ignore"):  # signalling NaNs
             return values.astype(np.float64)
 
+    def stored(self, index: int, kinds: Sequence[str], user: str) -> NDArray[Any] | None:
+        """Return single-precision numbers as in the file, without copying them: (N, C).
+
+        None for other types, and for accessors that are sparse or without data. Parameters and
+        errors as for ``floats``.
+        """
+        layout = self._layout(index, kinds, user)
+        is_plain = layout.element.has("bufferView") and not layout.element.has("sparse")
+        return self._values(layout) if is_plain and layout.dtype.kind == "f" else None
+
     def fractions(
         self,
         index: int,
