@@ -304,9 +304,7 @@ class Accessors:
         return indices
 
     def _sparse_view(self, items: Element) -> View:
-        place = items.index("bufferView", self._buffers.n_views, "bufferViews")
-        if place < 0:
-            raise items.wrong("bufferView", "the index of a buffer view")
+        place = items.required_index("bufferView", self._buffers.n_views, "bufferViews")
         return self._buffers.view(place)
 
 

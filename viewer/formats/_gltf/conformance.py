@@ -7,6 +7,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, NodeTree
 from viewer.rig.arrays import Floats
 
@@ -114,7 +115,7 @@ def _has_bounds(accessor: Element) -> bool:
 
 def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
     """Check that the joints have a common root, and that ``skeleton`` is one if it is declared."""
-    ancestors = [_ancestors(joint, parents) for joint in read.joints.tolist()]
+    ancestors = [path_to_root(parents, joint) for joint in read.joints.tolist()]
     roots = {chain[-1] for chain in ancestors}
     if len(roots) > 1:
         skin.warn("G004.no-common-root", "joints", nodes=sorted(roots))
@@ -123,14 +124,6 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
         outside = sum(declared not in chain for chain in ancestors)
         if outside:
             skin.warn("G004.not-a-root", "skeleton", node=declared, n=outside)
-
-
-def _ancestors(node: int, parents: list[int]) -> list[int]:
-    """Return a node and its ancestors, ending with the root."""
-    chain = [node]
-    while parents[chain[-1]] >= 0:
-        chain.append(parents[chain[-1]])
-    return chain
 
 
 def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:

@@ -73,6 +73,10 @@ class NodeTree:
         """Number of nodes, N."""
         return len(self.names)
 
+    def with_mesh(self, mesh: int) -> list[int]:
+        """Return the nodes that show a mesh."""
+        return np.flatnonzero(self.meshes == mesh).tolist()
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
