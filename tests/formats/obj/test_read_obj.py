@@ -205,18 +205,6 @@ def test_materials_are_kept_as_runs() -> None:
     assert figure.mesh.material_indices.tolist() == [-1, 0, 0, 1, 0]
 
 
-def test_objects_or_else_groups_are_parts() -> None:
-    text = SQUARE + "f 1 2 3\no box\ng low\nf 1 2 4\ng high\nf 2 3 4\no lid\no ball\nf 1 3 4\n"
-    mesh = silent(text).require_mesh()
-    assert mesh.parts == ("box", "ball")
-    assert mesh.part_indices.tolist() == [-1, 0, 0, 1]
-    mesh = silent(text.replace("o ball", "o box")).require_mesh()
-    assert mesh.parts == ("low", "high")
-    assert mesh.part_indices.tolist() == [-1, 0, 1, 1]
-    mesh = silent(SQUARE + "o box\nf 1 2 3\n").require_mesh()
-    assert mesh.parts == ()
-
-
 def test_groups_become_materials_where_there_are_none() -> None:
     figure = silent(SQUARE + "o body\nf 1 2 3\ng shoe\nf 1 2 3 4\no body\nf 2 3 4")
     assert [material.name for material in figure.mesh.materials] == ["body", "shoe"]
