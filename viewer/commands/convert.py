@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
@@ -42,7 +40,7 @@ from viewer.interrupts import raising
 from viewer.phrases import printable
 from viewer.rig.motion.own_animations import has_own_animations, own_animations
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.motion.upright import upright_actor
+from viewer.rig.motion.upright import upright_actor, upright_placement
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
@@ -172,13 +170,12 @@ def _write_together(
     check_targets(files_written(output), inputs_of(arguments, scene), arguments.force)
     upright = []
     for actor in actors:
-        whole = upright_actor(scene, actor)
-        # The pose of an actor that was rotated is already in the space of the scene.
-        upright.append(whole if whole is actor else replace(whole, placement=np.eye(4)))
+        placement = upright_placement(scene, actor)
+        upright.append(replace(upright_actor(scene, actor), placement=placement))
     with raising():
         clips = [clips_of(actor) for actor in upright]
         optimizes = bool(arguments.optimize)
-        return export_figures(upright, output, skinning, clips, scene.views, optimizes)
+        return export_figures(upright, output, skinning, clips, scene, optimizes)
 
 
 def _write_apart(

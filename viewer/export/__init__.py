@@ -12,7 +12,6 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._exporter import Exporter
 from viewer.export._options import MotionOptions
-from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
@@ -221,7 +220,7 @@ def export_figures(
     path: str | Path,
     skinning: Skinning | None = None,
     clips: Sequence[Sequence[TransformClip] | None] | None = None,
-    views: Sequence[CameraView] = (),
+    scene: Scene | None = None,
     optimizes: bool = False,
 ) -> list[Diagnostic]:
     """Write figures to one file, placed as in their scene; raises as ``export`` does.
@@ -236,8 +235,8 @@ def export_figures(
         Skinning method and options.
     clips : sequence of sequences of TransformClip, optional
         Animations of each figure; None for a figure, or for all, to write the current pose.
-    views : sequence of CameraView
-        Cameras of the scene.
+    scene : Scene, optional
+        Provides the up axis of the placements, by default that of the first figure, and cameras.
     optimizes : bool
         Quantise vertices.
 
@@ -249,7 +248,7 @@ def export_figures(
     module = import_module(f"{__name__}.{exporter_for(path)}")
     own = [None] * len(actors) if clips is None else clips
     how = skinning or Skinning()
-    notes: list[Diagnostic] = module.export_figures(actors, Path(path), how, own, views, optimizes)
+    notes: list[Diagnostic] = module.export_figures(actors, Path(path), how, own, scene, optimizes)
     return notes + _hidden_note(actors)
 
 

@@ -32,13 +32,12 @@ from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
-from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
@@ -69,7 +68,7 @@ def export_figures(
     path: Path,
     skinning: Skinning,
     clips: Sequence[Sequence[TransformClip] | None],
-    views: Sequence[CameraView] = (),
+    scene: Scene | None = None,
     optimizes: bool = False,
 ) -> list[Diagnostic]:
     """Write figures and cameras to one file; see ``viewer.export.export_figures``.
@@ -82,11 +81,12 @@ def export_figures(
         add_figure(document, actor, skinning, own, together, optimizes)
         for actor, own in zip(actors, clips, strict=True)
     ]
-    placing = place_figures(document, actors, added) if len(actors) > 1 else []
-    first = actors[0]
-    to_file = to_metres(first.figure.up, first.figure.unit)
+    first, views = actors[0], () if scene is None else scene.views
+    up = first.figure.up if scene is None or len(actors) == 1 else scene.up
+    to_file = to_metres(up, first.figure.unit)
     if len(actors) == 1:
         to_file = to_file @ np.linalg.inv(first.placement)
+    placing = place_figures(document, actors, added, to_file) if len(actors) > 1 else []
     lenses = add_cameras(document, views, to_file)
     (data,) = _files([(path, document)])
     notes = [_written(path, actors, added, len(views), len(data[path])), *_beside(data, path)]

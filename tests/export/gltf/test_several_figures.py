@@ -17,7 +17,7 @@ from viewer.export import export_clips, export_figures
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
 
 SINGLE = 2e-6  # of lengths up to 5
@@ -40,11 +40,14 @@ def posed(actor: Actor, animation: int, time: float) -> np.ndarray:
     return points @ actor.placement[:3, :3].T + actor.placement[:3, 3]
 
 
-@pytest.mark.parametrize("optimizes", [False, True])
-def test_figures_are_placed_as_in_the_scene(tmp_path: Path, optimizes: bool) -> None:
+@pytest.mark.parametrize(("optimizes", "up"), [(False, "y"), (True, "y"), (False, "z")])
+def test_figures_are_placed_as_in_the_scene(tmp_path: Path, optimizes: bool, up: str) -> None:
     actors, path = [Actor(two_parts()), other()], tmp_path / "both.glb"
     every = [[each.clip() for each in actor.figure.animations] for actor in actors]
-    notes = export_figures(actors, path, None, every, optimizes=optimizes)
+    turned = np.linalg.inv(UP) if up == "z" else np.eye(4)
+    placed = [replace(each, placement=turned @ each.placement) for each in actors]
+    scene = Scene(placed, world_up=up)
+    notes = export_figures(placed, path, None, every, scene, optimizes=optimizes)
     assert [note.key for note in notes if note.code == "X001"] == ["X001.gltf-figures"]
     assert not [note for note in notes if note.values.get("distance", 0.0) > 1e-3]
     plain = Evaluator(path)
@@ -83,7 +86,7 @@ def test_cameras_are_read_back(tmp_path: Path) -> None:
     view = CameraView("front", intrinsic, turn, np.array([0.1, 0.2, 5.0]), (800, 600))
     lens = replace(view, name="lens", distortion=np.array([0.1]))
     path = tmp_path / "seen.glb"
-    notes = export_figures([Actor(two_parts())], path, None, None, (view, lens))
+    notes = export_figures([Actor(two_parts())], path, None, None, Scene([], views=(view, lens)))
     (lost,) = [note for note in notes if note.key == "X003.camera-lenses"]
     assert lost.values["names"] == ["lens"]
     camera = Evaluator(path).root["cameras"][0]["perspective"]

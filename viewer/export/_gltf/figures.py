@@ -17,6 +17,7 @@ from viewer.export._gltf.losses import Written, gltf_losses, not_held
 from viewer.export._gltf.nodes import locals_of, to_metres
 from viewer.export._gltf.reading import GltfFile
 from viewer.export._gltf.shape import shape_of
+from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import still_pose
@@ -84,16 +85,17 @@ def add_figure(
     return Added(figure, pose, body, built, clips, kept)
 
 
-def place_figures(document: Document, actors: Sequence[Actor], added: Sequence[Added]) -> list[int]:
+def place_figures(
+    document: Document, actors: Sequence[Actor], added: Sequence[Added], to_file: Floats
+) -> list[int]:
     """Place several figures as in their scene; return the nodes that move them.
 
-    The scene has the up axis and the unit of its first figure.
+    ``to_file`` (4, 4): scene space to the space of the file.
     """
     roots, placing = document.root["scenes"][0]["nodes"], list[int]()
-    scene = to_metres(actors[0].figure.up, actors[0].figure.unit)
     for actor, each in zip(actors, added, strict=True):
         own = to_metres(actor.figure.up, actor.figure.unit)
-        matrix = scene @ actor.placement @ np.linalg.inv(own)
+        matrix = to_file @ actor.placement @ np.linalg.inv(own)
         if np.allclose(matrix, np.eye(4), rtol=0.0, atol=1e-12):
             continue
         # Nodes of skinned meshes stay roots, because their transforms have no effect.
