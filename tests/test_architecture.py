@@ -71,7 +71,7 @@ ALLOWED_IN_APP = {
     "context": {
         *("core", "features", "actors", "posing", "weights", "view", "palette", "context"),
     },
-    "linting": {"core", "shown_panels", "view", "linting"},
+    "linting": {"core", "shown_panels", "playback", "view", "linting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
 }

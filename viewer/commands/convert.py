@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from viewer.commands._motion_export import (
@@ -32,13 +33,14 @@ from viewer.commands._scene import (
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
-from viewer.export import EXPORTERS, export, export_clips, files_written
+from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
 from viewer.export._motion_paths import motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
 from viewer.phrases import printable
 from viewer.rig.motion.own_animations import has_own_animations, own_animations
-from viewer.rig.motion.upright import upright_actor
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.motion.upright import upright_actor, upright_placement
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
@@ -119,49 +121,75 @@ def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
     """Write the current poses."""
-    optimizes = bool(arguments.optimize)
-    return _write_actors(
-        arguments, scene, output, lambda a, path: export(a, path, skinning, optimizes)
-    )
+    return _write_actors(arguments, scene, output, skinning, lambda _: None)
 
 
 def _write_clips(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
     """Write figures at rest with their animations, or only with the requested one."""
-    is_chosen, optimizes = bool(arguments.animation), bool(arguments.optimize)
+    is_chosen = bool(arguments.animation)
 
-    def write(actor: Actor, path: Path) -> list[Diagnostic]:
-        if not has_own_animations(actor):
-            return export(actor, path, skinning, optimizes)
-        clips = own_animations(actor, is_chosen)
-        return export_clips(actor, path, skinning, clips, optimizes)
+    def clips_of(actor: Actor) -> Sequence[TransformClip] | None:
+        return own_animations(actor, is_chosen) if has_own_animations(actor) else None
 
-    return _write_actors(arguments, scene, output, write)
+    return _write_actors(arguments, scene, output, skinning, clips_of)
 
 
 def _write_actors(
     arguments: argparse.Namespace,
     scene: Scene,
     output: Path,
-    write: Callable[[Actor, Path], list[Diagnostic]],
+    skinning: Skinning,
+    clips_of: Callable[[Actor], Sequence[TransformClip] | None],
 ) -> list[Diagnostic]:
-    """Write one file per actor that is present."""
+    """Write the actors that are present, to one file each unless the format holds several."""
     shown = pose_or_point_actors(scene)
-    places = dict(zip(shown, motion_paths(output, shown), strict=True))
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
         raise RigError("nobody is present at that time: there is nothing to write")
-    files = [file for actor in actors for file in files_written(places[actor])]
-    check_targets(files, inputs_of(arguments, scene), arguments.force)
-    notes: list[Diagnostic] = []
-    with all_or_none(files):
-        for actor in actors:
-            with raising():
-                notes += write(upright_actor(scene, actor), places[actor])
+    if EXPORTERS[exporter_for(output)].writes_several:
+        notes = _write_together(arguments, scene, output, skinning, actors, clips_of)
+    else:
+        places = dict(zip(shown, motion_paths(output, shown), strict=True))
+        notes = _write_apart(arguments, scene, skinning, {each: places[each] for each in actors})
     away = [actor.name for actor in shown if not actor.is_present]
     notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
     return notes + left_out_notes(scene, shown)
+
+
+def _write_together(
+    arguments: argparse.Namespace,
+    scene: Scene,
+    output: Path,
+    skinning: Skinning,
+    actors: Sequence[Actor],
+    clips_of: Callable[[Actor], Sequence[TransformClip] | None],
+) -> list[Diagnostic]:
+    """Write all actors and cameras to one file."""
+    check_targets(files_written(output), inputs_of(arguments, scene), arguments.force)
+    upright = []
+    for actor in actors:
+        placement = upright_placement(scene, actor)
+        upright.append(replace(upright_actor(scene, actor), placement=placement))
+    with raising():
+        clips = [clips_of(actor) for actor in upright]
+        optimizes = bool(arguments.optimize)
+        return export_figures(upright, output, skinning, clips, scene, optimizes)
+
+
+def _write_apart(
+    arguments: argparse.Namespace, scene: Scene, skinning: Skinning, places: Mapping[Actor, Path]
+) -> list[Diagnostic]:
+    """Write each actor to a file of its own."""
+    files = [file for path in places.values() for file in files_written(path)]
+    check_targets(files, inputs_of(arguments, scene), arguments.force)
+    notes: list[Diagnostic] = []
+    with all_or_none(files):
+        for actor, path in places.items():
+            with raising():
+                notes += export(upright_actor(scene, actor), path, skinning)
+    return notes
 
 
 def _write_motions(

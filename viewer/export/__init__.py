@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
+from viewer.export._exporter import Exporter
 from viewer.export._options import MotionOptions
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import own_animations
@@ -28,44 +28,12 @@ __all__ = [
     "export",
     "export_animation",
     "export_clips",
+    "export_figures",
     "exporter_for",
     "files_written",
     "motion_exporters",
     "suited_exporter",
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class Exporter:
-    """Properties of an exporter that menus need before its module is imported.
-
-    Attributes
-    ----------
-    title : str
-        Label in menus.
-    suffixes : tuple of str
-        With leading dots; ``"/"`` represents a folder.
-    keeps, omits : str
-        Data that its files hold, and data that they cannot hold.
-    writes_pose : bool
-        Whether its module has ``export(actor, path, skinning)``.
-    writes_motion : bool
-        Whether its module has ``export_animation(animation, path, options)``.
-    keeps_world : bool
-        Whether it keeps the up axis of the motion's own world, even if that world is upside down.
-    writes_keys : bool
-        Whether its module has ``export_clips(actor, path, skinning, clips)``, which writes all
-        animations of a figure with their own keys.
-    """
-
-    title: str
-    suffixes: tuple[str, ...]
-    keeps: str
-    omits: str
-    writes_pose: bool = True
-    writes_motion: bool = False
-    keeps_world: bool = False
-    writes_keys: bool = False
 
 
 EXPORTERS = {
@@ -116,6 +84,7 @@ EXPORTERS = {
         "limits of joints, pose correctives",
         writes_motion=True,
         writes_keys=True,
+        writes_several=True,
     ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
@@ -200,9 +169,7 @@ def export(
     if optimizes and not EXPORTERS[exporter_for(path)].writes_keys:
         raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
     notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), *options)
-    if actor.hidden_parts:
-        notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
-    return notes
+    return notes + _hidden_note([actor])
 
 
 def export_clips(
@@ -245,9 +212,49 @@ def export_clips(
     chosen = own_animations(actor) if clips is None else clips
     how = skinning or Skinning()
     notes: list[Diagnostic] = module.export_clips(actor, Path(path), how, chosen, optimizes)
-    if actor.hidden_parts:
-        notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
-    return notes
+    return notes + _hidden_note([actor])
+
+
+def export_figures(
+    actors: Sequence[Actor],
+    path: str | Path,
+    skinning: Skinning | None = None,
+    clips: Sequence[Sequence[TransformClip] | None] | None = None,
+    scene: Scene | None = None,
+    optimizes: bool = False,
+) -> list[Diagnostic]:
+    """Write figures to one file, placed as in their scene; raises as ``export`` does.
+
+    Parameters
+    ----------
+    actors : sequence of Actor
+        Figures and poses.
+    path : str or Path
+        As for ``export``; a format that ``writes_several``.
+    skinning : Skinning, optional
+        Skinning method and options.
+    clips : sequence of sequences of TransformClip, optional
+        Animations of each figure; None for a figure, or for all, to write the current pose.
+    scene : Scene, optional
+        Provides the up axis of the placements, by default that of the first figure, and cameras.
+    optimizes : bool
+        Quantise vertices.
+
+    Returns
+    -------
+    list of Diagnostic
+        As for ``export``.
+    """
+    module = import_module(f"{__name__}.{exporter_for(path)}")
+    own = [None] * len(actors) if clips is None else clips
+    how = skinning or Skinning()
+    notes: list[Diagnostic] = module.export_figures(actors, Path(path), how, own, scene, optimizes)
+    return notes + _hidden_note(actors)
+
+
+def _hidden_note(actors: Sequence[Actor]) -> list[Diagnostic]:
+    count = sum(len(actor.hidden_parts) for actor in actors)
+    return [Diagnostic("X005.hidden-parts", values={"n": count})] if count else []
 
 
 def motion_exporters(path: str | Path) -> list[str]:

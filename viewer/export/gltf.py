@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +18,14 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._gltf.body import Body, Built, add_body, body_of
-from viewer.export._gltf.clip_losses import clip_losses, shape_rows, shown_weights
+from viewer.export._gltf.cameras import add_cameras
 from viewer.export._gltf.document import Document
-from viewer.export._gltf.keyed import add_clips, first_time
+from viewer.export._gltf.figures import Added, add_figure, figure_losses, place_figures
+from viewer.export._gltf.keyed import Clips
 from viewer.export._gltf.losses import Written, gltf_losses, not_held
 from viewer.export._gltf.materials import material_losses
 from viewer.export._gltf.motion import add_animation, moving, still_locals
-from viewer.export._gltf.nodes import locals_of
+from viewer.export._gltf.nodes import locals_of, to_metres
 from viewer.export._gltf.reading import parsed
 from viewer.export._gltf.shape import shape_of
 from viewer.export._losses.between import resampling_losses
@@ -32,40 +34,22 @@ from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
-from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.skeleton import joint_label
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["export", "export_animation", "export_clips"]
+__all__ = ["export", "export_animation", "export_clips", "export_figures"]
 
 
 def export(
     actor: Actor, path: Path, skinning: Skinning, optimizes: bool = False
 ) -> list[Diagnostic]:
     """Write a figure in its current pose; see ``viewer.export.export``."""
-    figure, pose = actor.figure, actor.pose
-    weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
-    body = body_of(figure, shape_of(figure, weights), skinning)
-    skeleton, still = body.shape.figure.skeleton, None
-    if skeleton is not None and pose is not None:
-        still = locals_of(skeleton, pose)
-    document = Document(figure.name)
-    built = add_body(document, body, figure.up, pose, still, actor.color, optimizes=optimizes)
-    (data,) = _files([(path, document)])
-    written = {"counts": built.counts, "size": len(data[path])}
-    notes = [Diagnostic("X001.gltf", path, values=written)]
-    notes += _beside(data, path) + _quantization(path, built, figure) + _remarks(body, figure.up)
-    file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
-    figure, frames = pose_frames(figure, pose)
-    rows = np.zeros(1, dtype=np.intp)
-    notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
-    return notes + not_held(figure, body.shape)
+    return export_figures([actor], path, skinning, [None], optimizes=optimizes)
 
 
 def export_clips(
@@ -75,51 +59,69 @@ def export_clips(
     clips: Sequence[TransformClip],
     optimizes: bool = False,
 ) -> list[Diagnostic]:
-    """Write a figure at rest with animations, which keep their keys and interpolation.
+    """Write a figure at rest with its animations; see ``viewer.export.export_clips``."""
+    return export_figures([actor], path, skinning, [clips], optimizes=optimizes)
 
-    Parameters
-    ----------
-    actor : Actor
-        Provides the figure, its shape and its placement.
-    path : Path
-        The file.
-    skinning : Skinning
-        Selects influences, and is the reference for the measured error.
-    clips : sequence of TransformClip
-        Motions of the figure; see ``own_animations``.
-    optimizes : bool
-        Whether vertex attributes are quantised.
 
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the largest error over all animations.
+def export_figures(
+    actors: Sequence[Actor],
+    path: Path,
+    skinning: Skinning,
+    clips: Sequence[Sequence[TransformClip] | None],
+    scene: Scene | None = None,
+    optimizes: bool = False,
+) -> list[Diagnostic]:
+    """Write figures and cameras to one file; see ``viewer.export.export_figures``.
 
-    Raises
-    ------
-    RigError
-        If a number exceeds single precision.
-    OutputError
-        If a file cannot be written.
+    Several figures are placed as in their scene; the placement of a single one is omitted.
     """
-    figure, pose = actor.figure, still_pose(actor)
-    weights = shape_rows(clips, shown_weights(figure, pose.shape_weights))
-    shape = shape_of(figure, weights)
-    body = body_of(figure, replace(shape, weights=shape.weights[:1]), skinning)
-    document = Document(figure.name)
-    locals_ = locals_of(body.figure.require_skeleton(), pose)
-    built = add_body(document, body, figure.up, pose, locals_, actor.color, optimizes=optimizes)
-    kept = add_clips(document, clips, built.tree, built.meshes, shape.targets, weights[0])
+    document = Document(actors[0].figure.name)
+    together = Clips(document)
+    added = [
+        add_figure(document, actor, skinning, own, together, optimizes)
+        for actor, own in zip(actors, clips, strict=True)
+    ]
+    first, views = actors[0], () if scene is None else scene.views
+    up = first.figure.up if scene is None or len(actors) == 1 else scene.up
+    to_file = to_metres(up, first.figure.unit)
+    if len(actors) == 1:
+        to_file = to_file @ np.linalg.inv(first.placement)
+    placing = place_figures(document, actors, added, to_file) if len(actors) > 1 else []
+    lenses = add_cameras(document, views, to_file)
     (data,) = _files([(path, document)])
-    written = {"counts": built.counts, "n": len(kept), "size": len(data[path])}
-    notes = [Diagnostic("X001.gltf-animations", path, values=written)]
-    notes += _beside(data, path) + _quantization(path, built, figure) + _remarks(body, figure.up)
-    file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
-    notes += clip_losses(file, figure, pose, kept, skinning, body)
-    early = [clip.name for clip in kept if first_time(clip) < 0.0]
-    if early:
-        notes.append(Diagnostic("X005.negative-times", values={"names": early, "n": len(early)}))
-    return notes + not_held(figure, shape)
+    notes = [_written(path, actors, added, len(views), len(data[path])), *_beside(data, path)]
+    file = parsed([*data.values()])
+    for node in placing:
+        # Errors are measured in the space of each figure.
+        del file.root["nodes"][node]["matrix"]
+    for actor, each in zip(actors, added, strict=True):
+        own_notes = _quantization(path, each.built, actor.figure)
+        own_notes += _remarks(each.body, actor.figure.up)
+        own_notes += figure_losses(each, path, file, skinning)
+        several = len(actors) > 1
+        notes += [_of_figure(actor, note) for note in own_notes] if several else own_notes
+    return notes + lenses
+
+
+def _written(
+    path: Path, actors: Sequence[Actor], added: Sequence[Added], n_views: int, size: int
+) -> Diagnostic:
+    """Return the note about a written file."""
+    animations = {index for each in added for index in each.kept}
+    values: dict[str, Any] = {"size": size, "n": len(animations)}
+    cameras = [Phrase("written-cameras", n=n_views)] if n_views else []
+    if len(actors) > 1:
+        values |= {"figures": [actor.name for actor in actors], "n_figures": len(actors)}
+        if animations:
+            cameras.append(Phrase("written-animations", n=len(animations)))
+        return Diagnostic("X001.gltf-figures", path, values={**values, "others": cameras})
+    key = "X001.gltf" if added[0].clips is None else "X001.gltf-animations"
+    return Diagnostic(key, path, values={**values, "counts": added[0].built.counts + cameras})
+
+
+def _of_figure(actor: Actor, note: Diagnostic) -> Diagnostic:
+    values = {"figure": actor.name, "remark": replace(note, path=None)}
+    return Diagnostic(f"{note.code}.of-figure", note.path, values=values)
 
 
 def export_animation(

@@ -16,6 +16,7 @@ vertices are sRGB, 0 to 1 or 0 to 255; a texture replaces them.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -68,6 +69,7 @@ def read(source: Source) -> Figure:
     normals = _normals(source, parts)
     uvs, uv_triangles = _uvs(source, parts, picks)
     materials, of_face = _materials(source, parts)
+    names, part_of_face = _parts_of(parts)
     mesh = Mesh(
         positions=positions,
         normals=filled_normals(source, normals, positions, triangles),
@@ -76,6 +78,8 @@ def read(source: Source) -> Figure:
         uv_triangles=uv_triangles,
         materials=materials,
         triangle_materials=of_face[owners],
+        parts=names,
+        triangle_parts=part_of_face[owners],
         # Scans have the colours of their texture at the vertices, too.
         colors=None if any(one.image is not None for one in materials) else parts.colors,
     )
@@ -176,13 +180,33 @@ def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], I
     by_name = bool(used)
     if not used:
         used = sorted(parts.runs[b"g"] + parts.runs[b"o"], key=lambda run: run[0])
-    names = list(dict.fromkeys(name for _, name in used))
-    if not by_name and len(names) < 2:
-        used, names = [], []
-    numbers = {name: index for index, name in enumerate(names)}
-    of_run = np.array([-1, *(numbers[name] for _, name in used)], dtype=np.int32)
-    faces = np.arange(len(parts.counts))
-    of_face = of_run[np.searchsorted([face for face, _ in used], faces, side="right")]
+    if not by_name and len({name for _, name in used}) < 2:
+        used = []
+    names, of_face = _named(used, len(parts.counts))
     if by_name:
         return read_libraries(source, parts.libraries, names), of_face
     return tuple(map(Material, names)), of_face
+
+
+def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints]:
+    """Return the different names of runs of faces, and the index of each face's, -1 for none."""
+    names = list(dict.fromkeys(name for _, name in runs))
+    numbers = {name: index for index, name in enumerate(names)}
+    of_run = np.array([-1, *(numbers[name] for _, name in runs)], dtype=np.int32)
+    first = [face for face, _ in runs]
+    return names, of_run[np.searchsorted(first, np.arange(count), side="right")]
+
+
+def _parts_of(parts: ObjParts) -> tuple[tuple[str, ...], Ints]:
+    """Return the names of objects, or else of groups, and the index of each face's.
+
+    Without at least two of them there are no parts.
+    """
+    for word in (b"o", b"g"):
+        names, of_face = _named(parts.runs[word], len(parts.counts))
+        used = np.unique(of_face[of_face >= 0])
+        if len(used) > 1:
+            numbers = np.full(len(names) + 1, -1, dtype=np.int32)
+            numbers[used] = np.arange(len(used))
+            return tuple(names[index] for index in used.tolist()), numbers[of_face]
+    return (), np.full(len(parts.counts), -1, dtype=np.int32)

@@ -16,7 +16,7 @@ from viewer.lint._opening import Opened, Owners, open_files, with_files
 from viewer.lint._running import Progress, lint_scene
 from viewer.phrases import listed, printable
 from viewer.rig.figure import Figure
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Motion, Scene
 
 if TYPE_CHECKING:
     from viewer.loading import MotionSettings
@@ -150,7 +150,13 @@ def _same_part(actor: Actor, other: Actor, part: str) -> bool:
         return one.mesh is not None and _same_mesh(one, two)
     if part == "skeleton":
         return one.skeleton is not None and _alike(one.skeleton, two.skeleton)
-    return actor.clip is not None and _alike(actor.clip, other.clip)
+    return actor.clip is not None and _alike(actor.clip, _clip(other, actor.animation))
+
+
+def _clip(actor: Actor, animation: int) -> Motion | None:
+    """Return an actor's clip, or its figure's animation of this index."""
+    animations = actor.figure.animations
+    return animations[animation].clip() if 0 <= animation < len(animations) else actor.clip
 
 
 def _same_mesh(one: Figure, two: Figure) -> bool:

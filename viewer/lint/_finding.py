@@ -16,6 +16,7 @@ from viewer.lint._track import Track
 from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion.animation_choice import animation_labels
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints
@@ -87,6 +88,10 @@ class Finding:
         Times of these frames on the scene's clock, in seconds.
     seek : float or None
         Best time for viewing the finding, in seconds; None for the first of ``times``.
+    motion : str
+        Label of the animation that the finding is about, if the figure has several.
+    animation : int
+        Index of that animation, which need not be playing; -1 for none.
     at : (str, int) or None
         The first item of the message, whose position in the file the reader recorded:
         ``("weights", 5)`` is the line of vertex 5's weights.
@@ -102,6 +107,8 @@ class Finding:
     frames: Ints = field(default_factory=lambda: _NONE)
     times: Floats = field(default_factory=lambda: _NO_TIMES)
     seek: float | None = None
+    motion: str = ""
+    animation: int = -1
     at: tuple[str, int] | None = None
 
     @property
@@ -299,5 +306,14 @@ class Subject:
             frames=np.asarray(frames, dtype=np.int32),
             times=times,
             seek=seek,
+            motion=self._motion() if part == "clip" else "",
+            animation=self.actor.animation if part == "clip" else -1,
             at=at,
         )
+
+    def _motion(self) -> str:
+        """Return the label of the animation that the actor plays, if its figure has several."""
+        figure, index = self.actor.figure, self.actor.animation
+        if index < 0 or len(figure.animations) < 2:
+            return ""
+        return animation_labels(figure)[index]

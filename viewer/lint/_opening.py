@@ -263,7 +263,7 @@ def with_files(
         actors = opened.scene.actors
         everything = [dict.fromkeys(_INVALID, index) for index in range(len(actors))]
         looked_at = opened.scene, everything
-    placed = [_placed(finding, opened, looked_at[1]) for finding in findings]
+    placed = [_placed(finding, opened, *looked_at) for finding in findings]
     remarks: list[Finding] = []
     for remark in _aimed(opened, *looked_at):
         twin = next((index for index, other in enumerate(placed) if _is_same(remark, other)), None)
@@ -297,13 +297,18 @@ def _with_line(finding: Finding, opened: Opened) -> Finding:
     return finding if place is None else finding.located(*place)
 
 
-def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Finding:
+def _placed(finding: Finding, opened: Opened, scene: Scene, owners: Sequence[Owners]) -> Finding:
     """Return a finding with the file that the part of the actor came from."""
-    owner = None if finding.actor is None else owners[finding.actor].get(finding.part or "mesh")
+    if finding.actor is None:
+        return finding
+    # An animation that is not playing has not been edited: it comes with the skeleton.
+    playing = scene.actors[finding.actor].animation
+    part = "skeleton" if finding.animation not in (-1, playing) else finding.part
+    owner = owners[finding.actor].get(part or "mesh")
     if owner is None:
         return finding
     actor = opened.scene.actors[owner]
-    paths = _files_of(actor, finding.part, opened.contents)
+    paths = _files_of(actor, part, opened.contents)
     if not paths:
         return finding
     pointer = _pointer(finding, actor, opened.sources[paths[0]])
@@ -312,9 +317,10 @@ def _placed(finding: Finding, opened: Opened, owners: Sequence[Owners]) -> Findi
 
 def _pointer(finding: Finding, actor: Actor, source: Source) -> str | None:
     """Return the JSON pointer to the first item of a finding, if the reader recorded one."""
-    if finding.part == "clip":
-        return next((one.place for one in actor.figure.animations if one.plays(actor.clip)), None)
-    if finding.at is None:
+    animations = actor.figure.animations
+    if 0 <= finding.animation < len(animations):
+        return animations[finding.animation].place
+    if finding.at is None or finding.part == "clip":
         return None
     return source.pointer_of(actor.figure.skeleton, *finding.at)
 

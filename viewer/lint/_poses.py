@@ -8,14 +8,13 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
-from viewer.rig.skeleton import clamp_dofs
+from viewer.rig.skeleton import FIRST_ROTATION, clamp_dofs
 
 __all__ = ["some_poses"]
 
 _COUNT = 4  # number of poses in addition to the rest pose and the current pose
 _SWING = 0.6  # radians: about the largest rotation of most joints in a walk
 _SEED = 5  # fixed, so that the same file gives the same results
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def some_poses(actor: Actor) -> list[Pose]:
@@ -37,7 +36,7 @@ def some_poses(actor: Actor) -> list[Pose]:
             pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
         ]
     rng = np.random.default_rng(_SEED)
-    is_rotation = figure.skeleton.dof_kinds >= _FIRST_ROTATION
+    is_rotation = figure.skeleton.dof_kinds >= FIRST_ROTATION
     for _ in range(_COUNT):
         pose = actor.pose.copy()
         pose.dofs[is_rotation] += rng.uniform(-_SWING, _SWING, int(is_rotation.sum()))

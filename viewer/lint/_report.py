@@ -27,17 +27,19 @@ def worst_first(findings: Sequence[Finding]) -> list[Finding]:
 def finding_text(finding: Finding) -> str:
     """Return one finding in the format of compilers, so that editors can jump to file and line.
 
-    The actor is named if the file does not identify it: one of several people, or a clip.
+    The actor is named if the file does not identify it: one of several people, or a clip. One of
+    several animations is named too.
     """
-    place, who = "", ""
+    place, names = "", [finding.motion]
     if finding.file is not None and finding.file != Path():
         place = finding.place()
         # A folder's figure has the folder's name, whereas its findings name the file inside.
         folders = finding.file.parent.name, folder_name(finding.file.parent)
-        known = (finding.file.stem, finding.file.name, *folders, "")
-        who = "" if finding.name in known else f"{printable(finding.name, 100)}: "
+        if finding.name not in (finding.file.stem, finding.file.name, *folders):
+            names = [finding.name, finding.motion]
     elif finding.name:
         place = printable(finding.name, 100)
+    who = "".join(f"{printable(name, 100)}: " for name in names if name)
     head = f"{place}: " if place else ""
     text = f"{finding.severity} {finding.code}: {who}{printable(finding.message, 2000)}"
     return f"{head}{text}\n    {finding.title}: {finding.hint}"
@@ -88,6 +90,7 @@ def _describe(finding: Finding, scene: Scene) -> dict[str, Any]:
         "pointer": finding.pointer,
         "actor": finding.actor,
         "name": printable(finding.name),
+        "animation": printable(finding.motion) or None,
         **_data(finding.diagnostic),
     }
     for key in ("vertices", "triangles", "joints", "frames", "times"):

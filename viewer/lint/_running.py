@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.lint._counting import counting_of
 from viewer.lint._finding import Finding, LintOptions, Subject
 from viewer.rig.arrays import Ints
+from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.motion.evaluation import scene_rate
-from viewer.rig.scene import Scene
+from viewer.rig.scene import Actor, Scene
 
 __all__ = ["CHECKS", "Check", "Progress", "lint_scene"]
 
@@ -30,10 +32,13 @@ class Check:
         Name of the checked part, for progress.
     of_motion : bool
         Whether it depends on an actor's motion; otherwise actors of one figure are checked once.
+    of_animations : bool
+        Whether it is repeated for each animation of a figure.
     """
 
     title: str
     of_motion: bool = False
+    of_animations: bool = False
 
 
 CHECKS = {
@@ -42,8 +47,8 @@ CHECKS = {
     "skeletons": Check("skeleton", of_motion=True),  # each actor has its own pose
     "meshes": Check("mesh"),
     "symmetry": Check("symmetry"),
-    "clips": Check("clip", of_motion=True),
-    "feet": Check("feet", of_motion=True),
+    "clips": Check("clip", of_motion=True, of_animations=True),
+    "feet": Check("feet", of_motion=True, of_animations=True),
     "captures": Check("captured points", of_motion=True),
 }
 """Modules in this folder with a function ``check(subject)``, in order of execution."""
@@ -72,18 +77,19 @@ def lint_scene(
     Returns
     -------
     list of Finding
-        Findings by actor, in the order of ``CHECKS``; each has its actor and locations.
+        Findings by actor, in the order of ``CHECKS``, then those of its figure's other animations;
+        each has its actor and locations.
     """
     chosen = options or LintOptions()
-    counting = counting_of(scene, chosen.frame_rate or scene_rate(scene.actors))
-    known: set[int] = set()
-    steps: list[tuple[Subject, str]] = []
+    rate = scene_rate(scene.actors)
+    counting = counting_of(scene, chosen.frame_rate or rate)
+    subjects = []
     for index, actor in enumerate(scene.actors):
         lost = invalid[index] if index < len(invalid) else {}
-        subject = Subject(actor, index, scene.up, chosen, counting, lost)
-        is_new = id(actor.figure) not in known
-        known.add(id(actor.figure))
-        steps += [(subject, name) for name, kind in CHECKS.items() if is_new or kind.of_motion]
+        subjects.append(Subject(actor, index, scene.up, chosen, counting, lost))
+    # The rate of the playing animation's keys is no choice for the frames of others.
+    others = replace(chosen, frame_rate=None) if chosen.frame_rate == rate else chosen
+    steps = [(subject, name) for subject, names in _checked(subjects, others) for name in names]
     findings: list[Finding] = []
     for number, (subject, name) in enumerate(steps):
         if progress is not None:
@@ -91,6 +97,43 @@ def lint_scene(
         # Products of huge numbers overflow; vertices that far away are reported as strays.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             findings += import_module(f"viewer.lint.{name}").check(subject)
-        if name == next(reversed(CHECKS)):
+        if number + 1 == len(steps) or steps[number + 1][0] is not subject:
             subject.tracks.clear()  # a long track takes a lot of memory, and is not needed again
     return findings
+
+
+def _checked(
+    subjects: Sequence[Subject], options: LintOptions
+) -> Iterator[tuple[Subject, list[str]]]:
+    """Yield each actor, and copies of it that play the figure's other animations, with checks.
+
+    Parameters
+    ----------
+    subjects : sequence of Subject
+        The actors of the scene.
+    options : LintOptions
+        Options for the other animations.
+    """
+    again = [name for name, kind in CHECKS.items() if kind.of_animations]
+    known: set[int] = set()
+    for subject in subjects:
+        figure = subject.actor.figure
+        is_new = id(figure) not in known
+        known.add(id(figure))
+        yield subject, [name for name, kind in CHECKS.items() if is_new or kind.of_motion]
+        for animation in range(len(figure.animations)) if is_new else ():
+            if animation != subject.actor.animation:
+                actor = _playing(subject.actor, animation)
+                if actor is not None:
+                    other = replace(subject, actor=actor, counting=None, tracks=[])
+                    yield replace(other, options=options), again
+
+
+def _playing(actor: Actor, animation: int) -> Actor | None:
+    """Return a copy that plays another animation; None if its keys are invalid."""
+    other = actor.copy()
+    try:
+        play_animation(other, animation)
+    except FormatError:  # lint of files reports it when it reads all animations
+        return None
+    return other

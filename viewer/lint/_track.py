@@ -31,6 +31,9 @@ class Track:
         Joints in scene space.
     rotations : (F, J, 4)
         Local rotations: unit quaternions.
+    stepped : (F, J) bool
+        Whether a key without interpolation, of the joint or of an ancestor, lies between the
+        previous row and this one: such jumps are intended.
     size : float
         Size of the skeleton at rest, in scene units.
     scale : float
@@ -46,6 +49,7 @@ class Track:
     present: Bools
     positions: Floats
     rotations: Floats
+    stepped: Bools
     size: float
     scale: float
     feet: Ints

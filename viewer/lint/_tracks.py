@@ -25,6 +25,7 @@ from viewer.rig.motion.evaluation import (
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.shape import rest_joints, shaped
+from viewer.rig.skeleton import Skeleton
 
 __all__ = ["frame_numbers", "key_times", "track_of"]
 
@@ -78,11 +79,27 @@ def _track(subject: Subject) -> Track | None:
         present=frames.present & _known(subject, clip, count),
         positions=placed,
         rotations=frames.rotations,
+        stepped=_stepped(clip, skeleton, times),
         size=scale * _size(subject, figure),
         scale=scale,
         feet=feet,
         soles=lowest,
     )
+
+
+def _stepped(clip: JointMotion, skeleton: Skeleton, times: Floats) -> Bools:
+    """Return where keys without interpolation move a joint or its ancestors: (F, J)."""
+    result = np.zeros((len(times), skeleton.n_joints), dtype=np.bool_)
+    if not isinstance(clip, TransformClip):
+        return result
+    for channel in clip.channels:
+        if channel.joint >= 0 and channel.interpolation == "step":
+            rows = np.searchsorted(times, channel.times)
+            result[rows[rows < len(times)], channel.joint] = True
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        if parent >= 0:
+            result[:, joint] |= result[:, parent]
+    return result
 
 
 def _size(subject: Subject, figure: Figure) -> float:

@@ -138,6 +138,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     speeds = np.zeros((len(track.times), skeleton.n_joints))
     steps = np.linalg.norm(np.diff(track.positions, axis=0), axis=2)
     speeds[1:] = steps / np.diff(track.times)[:, None]
+    speeds[track.stepped] = 0.0
     fast = _too_fast(track, speeds, limit)
     if fast is None:
         return []
@@ -164,6 +165,7 @@ def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[
     rates = np.zeros((len(track.times), skeleton.n_joints))
     cosines = np.abs(np.einsum("fjq,fjq->fj", track.rotations[1:], track.rotations[:-1]))
     rates[1:] = 2.0 * np.arccos(np.minimum(cosines, 1.0)) / np.diff(track.times)[:, None]
+    rates[track.stepped] = 0.0
     fast = _too_fast(track, rates, subject.options.max_rotation)
     if fast is None:
         return []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,39 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
 from viewer.rig.expressions import ExpressionRules
 
-__all__ = ["BlendShapes", "Correctives", "JointRegressor", "corrective_weights", "regress_joints"]
+__all__ = [
+    "BlendShapes",
+    "Correctives",
+    "JointRegressor",
+    "SummedOffsets",
+    "corrective_weights",
+    "regress_joints",
+]
+
+
+class SummedOffsets(Deferred):
+    """Offsets of blend shapes whose weighted sum does not need the whole array.
+
+    Parameters
+    ----------
+    shape : (int, int, int)
+        S, V, 3.
+    load : callable
+        Returns the array; see ``Deferred``.
+    total : callable
+        Returns sum_s w_s d_s, (V, 3), for weights (S,).
+    """
+
+    __slots__ = ("total",)
+
+    def __init__(
+        self,
+        shape: tuple[int, int, int],
+        load: Callable[[], Floats],
+        total: Callable[[Floats], Floats],
+    ) -> None:
+        super().__init__(shape, np.float64, load)
+        self.total = total
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,6 +157,10 @@ class BlendShapes:
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
+        if isinstance(offsets, SummedOffsets):
+            whole = np.zeros(self.n_shapes)
+            whole[: len(weights)] = weights
+            return offsets.total(whole)
         return np.einsum("s,sva->va", weights[active], _values(offsets)[active])
 
     def direction_values(self) -> Floats:

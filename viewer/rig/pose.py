@@ -13,7 +13,7 @@ from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.number_key import NumberKey
 from viewer.rig.posed_skeleton import PosedSkeleton
-from viewer.rig.skeleton import Skeleton, clamp_dofs
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 
 __all__ = [
     "Pose",
@@ -26,8 +26,6 @@ __all__ = [
     "pose_of",
     "rest_pose",
 ]
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 @dataclass(slots=True, eq=False)
@@ -173,7 +171,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     local = np.zeros((skeleton.n_joints, 4, 4))
     local[:, 3, 3] = 1.0
     local[:, :3, 3] = skeleton.rest_translations + pose.translations
-    is_translation = skeleton.dof_kinds < _FIRST_ROTATION
+    is_translation = skeleton.dof_kinds < FIRST_ROTATION
     joints, axes = skeleton.dof_joints[is_translation], skeleton.dof_kinds[is_translation]
     # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
     np.add.at(local[:, :3, 3], (joints, axes), pose.dofs[is_translation])
@@ -209,10 +207,10 @@ def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
     """
     shape = (*dofs.shape[:-1], skeleton.n_joints, 3, 3)
     rotations = np.broadcast_to(np.eye(3), shape).copy()
-    rows = np.flatnonzero(skeleton.dof_kinds >= _FIRST_ROTATION)
+    rows = np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION)
     for rank_rows in _rows_by_rank(skeleton.dof_joints[rows], rows):
         joints = skeleton.dof_joints[rank_rows]
-        axes = skeleton.dof_kinds[rank_rows] - _FIRST_ROTATION
+        axes = skeleton.dof_kinds[rank_rows] - FIRST_ROTATION
         for axis in range(3):
             chosen = axes == axis
             # Rows are multiplied from the left: a later row is applied after the earlier ones.

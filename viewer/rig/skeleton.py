@@ -15,6 +15,7 @@ from viewer.rig.humanoid import Humanoid
 
 __all__ = [
     "DOF_KINDS",
+    "FIRST_ROTATION",
     "Skeleton",
     "ball_skeleton",
     "clamp_dofs",
@@ -31,6 +32,9 @@ __all__ = [
 
 DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
 """Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""
+
+FIRST_ROTATION = 3
+"""Kinds below this translate, the others rotate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

@@ -7,10 +7,12 @@ from dataclasses import replace
 import pytest
 from app.linting.checked_scenes import LIGHT, SIZE, codes, finish, jump, marked, row_of
 from lint.sound import column, scene_of
+from rig.animated import animated_leg, bow, channel, clip_of
 
 from viewer.app.linting.actions import check_rig, start_check
 from viewer.app.linting.state import Linting
 from viewer.lint import lint_scene
+from viewer.rig.motion.animation_choice import play_animation
 from viewer.rig.scene import Actor
 
 
@@ -43,6 +45,17 @@ def test_posing_makes_findings_stale_and_time_does_not(lint, texts):
     hand.click("Recheck")
     finish(hand)
     assert not stale(hand, texts)
+
+
+def test_a_finding_in_another_animation_plays_it(lint, texts):
+    leap = clip_of(channel(0, "translation", [0.0, 1.0], [[0.0] * 3, [1000.0, 0, 0]]), name="leap")
+    scene = scene_of(animated_leg(bow(), leap))
+    play_animation(scene.actors[0], 0)
+    hand = lint(scene)
+    hand.click(row_of(hand, "C003"))
+    assert hand.state.actor.clip is leap and not hand.state.clock.playing
+    assert not stale(hand, texts)
+    assert any(text.startswith("leap: ") for text in texts)
 
 
 def test_recheck_uses_the_current_pose_and_limits(lint, texts):

@@ -65,7 +65,7 @@ def test_blend_shapes_are_offsets_with_default_weights(strip: NodeFile) -> None:
     low = mesh.primitives[0]
     assert low.targets is not None
     expected = np.where(low.positions[:, :1] == 1.0, [[0.5, 0.0, 0.0]], 0.0)
-    assert_allclose(low.targets[0], expected)
+    assert_allclose(low.targets.dense()[0], expected)
 
 
 @needs_ufbx

@@ -133,6 +133,20 @@ def test_invalid_accessors_are_refused(members: dict[str, object], key: str, poi
     assert (found.key, found.pointer) == (key, f"/accessors/0{pointer}")
 
 
+def test_components_that_are_not_kept_do_not_count_as_decoded() -> None:
+    file = File()
+    # 36 MB per reading, of 256 MB that every file may decode.
+    accessor = {"componentType": 5121, "count": 4_000_000, "type": "SCALAR"}
+    indices = {"bufferView": file.view(bytes([3])), "componentType": 5121}
+    values = {"bufferView": file.view(bytes([7]))}
+    file.add("accessors", accessor | {"sparse": {"count": 1, "indices": indices, "values": values}})
+    read = accessors(file)
+    for _ in range(9):
+        found = read.components(0)
+    assert found is not None and found.sum() == 7.0
+    assert read.floats(0, ("SCALAR",), "")[3, 0] == 7.0
+
+
 def test_accessor_without_data_cannot_exhaust_memory() -> None:
     file = File()
     file.add("accessors", {"componentType": 5126, "count": 2**31, "type": "MAT4"})

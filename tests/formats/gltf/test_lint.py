@@ -7,7 +7,9 @@ from formats.gltf.files import animated, skinned
 from formats.gltf.planted_gltf import PLANTED
 from formats.gltf.validator_faults import FAULTS
 
-from viewer.lint import lint_files
+from viewer.lint import lint_again, lint_files
+from viewer.loading import MotionSettings, load
+from viewer.rig.motion.animation_choice import play_animation
 
 
 @pytest.mark.parametrize("code", PLANTED)
@@ -75,3 +77,55 @@ def test_a_file_that_follows_the_specification_has_no_errors(tmp_path: Path) -> 
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
     assert {one.code for one in lint_files([path])[1]} == {"S007", "M005"}
+
+
+@pytest.mark.parametrize(
+    ("path", "end", "code"),
+    [("translation", [1000, 0, 0], "C003"), ("rotation", [1, 0, 0, 0], "C004")],
+)
+def test_steps_between_keys_are_no_jumps(
+    tmp_path: Path, path: str, end: list[float], code: str
+) -> None:
+    rest = [0, 0, 0, 1] if path == "rotation" else [0, 0, 0]
+    for interpolation, expected in (("LINEAR", True), ("STEP", False)):
+        # Half a rotation takes 50 ms if it is interpolated.
+        file = animated(path, [rest, end], input=0, interpolation=interpolation)
+        file.root["animations"][0]["samplers"][0]["input"] = file.times([0.0, 0.05])
+        file.mesh()
+        file.root["nodes"][0]["mesh"] = 0
+        name = tmp_path / f"{interpolation}.gltf"
+        name.write_bytes(file.json())
+        codes = {finding.code for finding in lint_files([name])[1]}
+        assert (code in codes) == expected
+
+
+def with_two_animations(folder: Path) -> Path:
+    """Write a node with a mesh that jumps in its second animation."""
+    file = animated("translation", [[0, 0, 0], [0.1, 0, 0]])
+    file.mesh()
+    file.root["nodes"][0]["mesh"] = 0
+    (first,) = file.root["animations"]
+    sampler = first["samplers"][0] | {"output": file.accessor([[0, 0, 0], [1000, 0, 0]])}
+    file.root["animations"] = [first | {"name": "walk"}, first | {"name": "leap"}]
+    file.root["animations"][1]["samplers"] = [sampler]
+    path = folder / "a.gltf"
+    path.write_bytes(file.json())
+    return path
+
+
+@pytest.mark.parametrize("playing", ["walk", "leap", "none"])
+def test_all_animations_are_checked(tmp_path: Path, playing: str) -> None:
+    path = with_two_animations(tmp_path)
+    settings = MotionSettings(animation=playing)
+    (found,) = [one for one in lint_files([path], None, settings)[1] if one.code == "C003"]
+    assert (found.place(), found.motion, found.animation) == (f"{path}#/animations/1", "leap", 1)
+
+
+def test_animations_of_an_open_scene_have_the_places_of_the_file(tmp_path: Path) -> None:
+    path = with_two_animations(tmp_path)
+    scene = load(path)
+    (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
+    assert found.place() == f"{path}#/animations/1"
+    play_animation(scene.actors[0], 1)
+    (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
+    assert found.place() == f"{path}#/animations/1"

@@ -130,9 +130,8 @@ def vertices(file: NodeFile, moved: Local | None = None, morphs: Local | None = 
         weights = (morphs or {}).get(node, tree.shape_weights.get(node, whole.shape_weights))
         for primitive in whole.primitives:
             points = np.array(primitive.positions)
-            for weight, target in zip(
-                weights, () if primitive.targets is None else primitive.targets, strict=False
-            ):
+            targets = () if primitive.targets is None else primitive.targets.dense()
+            for weight, target in zip(weights, targets, strict=False):
                 points = points + weight * target
             for vertex, point in enumerate(np.c_[points, np.ones(len(points))]):
                 found.append(_moved(file, node, primitive, vertex, moved) @ point)

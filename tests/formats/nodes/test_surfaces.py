@@ -16,6 +16,7 @@ from tests.formats.nodes.node_files import (
 )
 from viewer.formats._nodes.content import NodeAnimation, NodeChannel, NodeSkin, Primitive
 from viewer.formats._nodes.figures import figure_group
+from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.material import Material
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import deform
@@ -74,8 +75,8 @@ def test_colours_and_materials_of_only_some_primitives_are_completed():
 def faces_with_targets():
     """Return nodes, meshes and skins of a face and its teeth, both with targets smile and blink."""
     random = np.random.default_rng(4)
-    face = triangle(1, 1, targets=random.normal(size=(2, 3, 3)))
-    teeth = triangle(2, 1, targets=random.normal(size=(2, 3, 3)))
+    face = triangle(1, 1, targets=MorphTargets(3, random.normal(size=(2, 3, 3))))
+    teeth = triangle(2, 1, targets=MorphTargets(3, random.normal(size=(2, 3, 3))))
     names = {"target_names": ("smile", "blink"), "shape_weights": np.array([0.25, 0.0])}
     tree = tree_of(
         {"name": "hip"},

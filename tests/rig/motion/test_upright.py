@@ -15,7 +15,7 @@ from viewer.rig.motion.evaluation import pose_of
 from viewer.rig.motion.sampled_animation import upright_animation
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.motion.upright import own_up, upright_actor
+from viewer.rig.motion.upright import own_up, upright_actor, upright_placement
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import deform
@@ -123,3 +123,12 @@ def test_one_pose_is_the_frame_of_the_motion():
     assert_allclose(
         deform(found.figure, found.pose)[0], deform(actor.figure, framed)[0], rtol=0, atol=1e-12
     )
+
+
+def test_an_upright_actor_is_placed_where_the_hanging_one_is():
+    scene, actor = standing("y", rotation_transform(0, np.pi), "y")
+    actor.pose.figure_translation[:] = 1.0, 2.0, 3.0
+    upright = upright_actor(scene, actor)
+    placed = upright_placement(scene, actor)[:3, :3]
+    expected = actor.placement[:3, :3] @ actor.pose.figure_translation
+    assert_allclose(placed @ upright.pose.figure_translation, expected, atol=1e-12)

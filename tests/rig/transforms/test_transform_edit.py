@@ -165,3 +165,23 @@ def test_a_changed_cubic_rotation_rotates_its_spline():
     assert np.linalg.norm(turn) == pytest.approx(1.0)
     sizes = [np.linalg.norm(one.channels[0].tangents[1], axis=1) for one in (clip, turned)]
     assert_allclose(*sizes, atol=EXACT)
+
+
+def test_edits_keep_the_interpolation_of_every_channel():
+    clip, figure = wave(), leg()
+    modes = ["cubic", "linear", "step", "linear", "linear"]
+    rows = [row_of(clip, path, joint, 0) for path, joint in
+            (("translation", 0), ("rotation", 0), ("rotation", 1), ("scale", 1))]  # fmt: skip
+    edited = clip
+    for row in rows:
+        edited = move_transform_keys(edited, SKELETON, [(row, 1)], 0.01, 0.1, GAP)
+        edited = set_transform_key(edited, SKELETON, (row, 0), value=0.2)
+        edited = add_transform_key(edited, rows_of(edited, SKELETON)[row], 0.8)
+        edited = delete_transform_keys(edited, SKELETON, [(row, 1)])
+    actor = Actor(figure, clip=edited)
+    pose_actor(actor, 0.9)
+    edited = key_transform_pose(edited, figure, actor.pose, 0.9, False)
+    assert [one.interpolation for one in edited.channels[: len(modes)]] == modes
+    assert [one.tangents is not None for one in edited.channels[: len(modes)]] == [
+        mode == "cubic" for mode in modes
+    ]

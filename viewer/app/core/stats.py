@@ -17,7 +17,6 @@ class Stats:
     renderer: str = ""
     version: str = ""
     samples: int = 0
-    skin_updates: int = 0
     scalar_range: tuple[float, float] = (0.0, 0.0)
     scalar_ends: tuple[float, float] = (0.0, 0.0)
     legend: Legend | None = None

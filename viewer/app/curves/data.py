@@ -18,13 +18,12 @@ from viewer.rig.motion.clip_table import evaluate_all
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
-from viewer.rig.skeleton import DOF_KINDS, Skeleton, joint_labels, shown_joints
+from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton, joint_labels, shown_joints
 from viewer.rig.transforms.rows import rows_of
 
 __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 
 _AXES = "xyz"
-_FIRST_ROTATION = 3
 _PREFIXES = {"translation": "t", "rotation": "", "scale": "s"}
 _SHAPES, _SHAPE_NUMBER = "shapes", -2  # heading of the curves of blend shapes
 _PLACE = "place"  # heading of the curves of the whole figure
@@ -110,7 +109,7 @@ def _shape_name(shapes: BlendShapes | None, shape: int) -> str:
 def _dof_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
     labels = [printable(label, 60) for label in joint_labels(skeleton)]
     return tuple(
-        Curve(labels[joint], joint, DOF_KINDS[kind], kind % 3, kind >= _FIRST_ROTATION)
+        Curve(labels[joint], joint, DOF_KINDS[kind], kind % 3, kind >= FIRST_ROTATION)
         for joint, kind in zip(
             skeleton.dof_joints.tolist(), skeleton.dof_kinds.tolist(), strict=True
         )

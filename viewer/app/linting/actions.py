@@ -11,6 +11,7 @@ from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.linting.state import Checked, Linting, Running
+from viewer.app.playback.animations import choose_animation
 from viewer.app.shown_panels import set_open
 from viewer.app.view.picks import take_pick
 from viewer.lint import (
@@ -108,10 +109,13 @@ def is_stale(state: AppState) -> bool:
     before, view.seen = view.seen, _moving(state)
     if before[0] == view.seen[0] and before[1:] != view.seen[1:]:
         view.is_edited = True
-    actors, old = state.scene.actors, known.scene.actors
+    actors, old, options = state.scene.actors, known.scene.actors, _options(state)
+    if [actor.clip for actor in actors] != [actor.clip for actor in old]:
+        # Other animations may have another frame rate.
+        options = replace(options, frame_rate=known.options.frame_rate)
     return (
         view.is_edited
-        or _options(state) != known.options
+        or options != known.options
         or len(actors) != len(old)
         or any(map(_differs, actors, old))
     )
@@ -124,7 +128,11 @@ def _moving(state: AppState) -> tuple[object, ...]:
 
 
 def _differs(actor: Actor, old: Actor) -> bool:
-    if actor.figure is not old.figure or actor.clip is not old.clip:
+    if actor.figure is not old.figure:
+        return True
+    # All animations of the file were checked.
+    is_known = any(animation.plays(actor.clip) for animation in actor.figure.animations)
+    if actor.clip is not old.clip and not is_known:
         return True
     if actor.offset != old.offset or (actor.placement != old.placement).any():
         return True
@@ -154,6 +162,8 @@ def choose_finding(state: AppState, index: int) -> None:
     if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:
         joint = -1
     take_pick(state, Pick(finding.actor, joint, -1, -1, actor.placement[:3, 3]), False)
+    if finding.animation >= 0:
+        choose_animation(state, finding.animation)
     if len(finding.times) and state.clock.has_motion:
         state.clock.playing = False
         seek = finding.times[0] if finding.seek is None else finding.seek

@@ -203,8 +203,8 @@ def _draw_list(state: AppState, known: Checked) -> None:
 
 def _searched_text(finding: Finding) -> str:
     """Return the text that the filter searches, in lower case."""
-    parts = (finding.code, finding.severity, finding.title, finding.message, finding.name)
-    return " ".join((*parts, _place(finding))).lower()
+    parts = [finding.code, finding.severity, finding.title, finding.message]
+    return " ".join((*parts, finding.name, finding.motion, _place(finding))).lower()
 
 
 def _place(finding: Finding) -> str:
@@ -219,6 +219,8 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
     title, message = finding.title, printable(finding.message, _LONGEST)
     if several and finding.name:
         title = f"{printable(finding.name, 60)}: {title}"
+    if finding.motion:
+        title = f"{printable(finding.motion, 60)}: {title}"
     if _place(finding):
         title = f"{title} ({_place(finding)})"
     room = max(imgui.get_content_region_avail().x, 1.0)

@@ -65,7 +65,7 @@ def draw_tracks(state: AppState) -> None:
         _draw_track(state.scene.actors[index], state.clock, area, top, height, chosen)
         if chosen:
             _draw_keys(state, area, top, height)
-    _draw_ruler(state.clock, area, height)
+    _draw_ruler(state.clock, area)
     _draw_time(state.clock, area)
     imgui.end_child()
 
@@ -183,7 +183,7 @@ def present_spans(clip: Motion, shortest: float) -> list[tuple[float, float]]:
     return list(zip(begins.tolist(), stops.tolist(), strict=True))
 
 
-def _draw_ruler(clock: Clock, area: tuple[float, float, float, float], height: float) -> None:
+def _draw_ruler(clock: Clock, area: tuple[float, float, float, float]) -> None:
     """Draw frame numbers and lines, and darken the time outside the playback range."""
     draw_list = imgui.get_window_draw_list()
     left, top, width, total = area

@@ -56,11 +56,10 @@ from viewer.phrases import printable
 from viewer.rig.mesh import box_size
 from viewer.rig.number_text import angle_text, number_text
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import DOF_KINDS, Skeleton
+from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton
 
 __all__ = ["draw"]
 
-_FIRST_ROTATION = 3
 _LABEL_WIDTH = 1.6  # in font sizes
 _INDENT = 9.0  # points per level
 _DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
@@ -110,7 +109,7 @@ def draw(state: AppState) -> None:
                 _indent(depth)
                 draw_scale(state, actor.pose, joint, labels[joint])
             elif dof < 0:
-                _draw_joint(state, skeleton, joint, depth, labels[joint])
+                _draw_joint(state, joint, depth, labels[joint])
             else:
                 _draw_dof(state, skeleton, actor.pose, dof, depth, labels[joint])
     clipper.end()
@@ -186,7 +185,7 @@ def _draw_pose_menu(state: AppState) -> None:
     imgui.end_popup()
 
 
-def _draw_joint(state: AppState, skeleton: Skeleton, joint: int, depth: int, label: str) -> None:
+def _draw_joint(state: AppState, joint: int, depth: int, label: str) -> None:
     _indent(depth)
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.open_on_arrow
     flags |= imgui.TreeNodeFlags_.span_avail_width
@@ -229,8 +228,8 @@ def _draw_dof(
     low, high = skeleton.dof_limits[dof]
     locked = low == high
     joint, figure = int(skeleton.dof_joints[dof]), state.actor.figure
-    if state.of(Posing).as_vectors and kind >= _FIRST_ROTATION and is_ball(figure, joint):
-        draw_vector_component(state, figure, pose, joint, kind - _FIRST_ROTATION, label)
+    if state.of(Posing).as_vectors and kind >= FIRST_ROTATION and is_ball(figure, joint):
+        draw_vector_component(state, figure, pose, joint, kind - FIRST_ROTATION, label)
         return
     imgui.begin_disabled(bool(locked))
     value = _dof_slider(state, skeleton, pose, dof)
@@ -250,7 +249,7 @@ def _draw_dof(
         if menu_item(state, "Set to 0", why=why or outside):
             value = 0.0
         if menu_item(state, "Copy value"):
-            is_angle = state.in_degrees and kind >= _FIRST_ROTATION
+            is_angle = state.in_degrees and kind >= FIRST_ROTATION
             shown = math.degrees(pose.dofs[dof]) if is_angle else float(pose.dofs[dof])
             imgui.set_clipboard_text(repr(shown + 0.0))
         imgui.end_popup()
@@ -260,7 +259,7 @@ def _draw_dof(
 def _dof_slider(state: AppState, skeleton: Skeleton, pose: Pose, dof: int) -> float:
     """Draw the slider in the displayed unit and return the value in radians or lengths."""
     low, high = (float(limit) for limit in skeleton.dof_limits[dof])
-    is_rotation = skeleton.dof_kinds[dof] >= _FIRST_ROTATION
+    is_rotation = skeleton.dof_kinds[dof] >= FIRST_ROTATION
     unlimited = math.pi if is_rotation else _reach(state)
     factor = math.degrees(1.0) if is_rotation and state.in_degrees else 1.0
     text = ("%.1f\N{DEGREE SIGN}" if state.in_degrees else "%.4f rad") if is_rotation else "%.4f"
@@ -300,4 +299,4 @@ def _limits_text(low: float, high: float, kind: int, in_degrees: bool) -> str:
 
 def _value_text(value: float, kind: int, in_degrees: bool) -> str:
     """Return a DOF's value in the displayed unit."""
-    return angle_text(value, in_degrees) if kind >= _FIRST_ROTATION else number_text(value)
+    return angle_text(value, in_degrees) if kind >= FIRST_ROTATION else number_text(value)

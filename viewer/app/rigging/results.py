@@ -35,7 +35,6 @@ __all__ = [
     "TARGET",
     "compare",
     "no_motion_of",
-    "no_other_version",
     "no_trial_of",
     "plays_motion",
     "plays_trial",
@@ -162,11 +161,6 @@ def shown_result(state: AppState) -> Result | None:
     present = [one for name, one in state.of(Rigging).results.items() if name in known]
     visible = [one for one in present if one.actor.visible]
     return (visible or present)[-1] if present else None
-
-
-def no_other_version(state: AppState) -> str:
-    """Return why there is no other version to switch to."""
-    return "" if len(versions(state)) > 1 else "nothing is rigged yet: press Run"
 
 
 def switch_version(state: AppState) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
 __all__ = ["TRIAL", "trial_clip"]
 
@@ -19,7 +19,6 @@ TRIAL = "trial motion"
 _ANGLE = math.radians(35.0)
 _LONGEST, _WHOLE = 0.9, 20.0
 """Seconds for a joint, and for all joints."""
-_FIRST_ROTATION = 3
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:
@@ -50,7 +49,7 @@ def _bending_dof(skeleton: Skeleton, joint: int) -> int:
     """Return the rotation DOF of a joint with the widest range; -1 if it has none or is a root."""
     if skeleton.parents[joint] < 0:
         return -1
-    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION))
+    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
     ranges = np.ptp(skeleton.dof_limits[own], axis=1)
     own, ranges = own[ranges > 0.0], ranges[ranges > 0.0]
     return int(own[np.argmax(ranges)]) if len(own) else -1

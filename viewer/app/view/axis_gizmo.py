@@ -25,7 +25,6 @@ _NARROWEST, _LOWEST = 240.0, 200.0  # points: smaller views have no room for the
 _DEGREES_PER_POINT = 0.9
 _LEFT = imgui.MouseButton_.left
 _SAME = 1e-6  # tolerance of a direction
-_Color = tuple[float, float, float, float]
 
 
 @dataclass(slots=True)

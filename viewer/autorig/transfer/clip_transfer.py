@@ -10,11 +10,9 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
 __all__ = ["transfer_clip"]
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def transfer_clip(
@@ -81,7 +79,7 @@ def _scaled(channel: Channel, skeleton: Skeleton, factors: Floats) -> Channel:
         raise RigError(
             f"a channel moves DOF {channel.target}, the figure has {skeleton.n_dofs} DOFs"
         )
-    if skeleton.dof_kinds[channel.target] >= _FIRST_ROTATION:
+    if skeleton.dof_kinds[channel.target] >= FIRST_ROTATION:
         return channel
     factor = float(factors[skeleton.dof_joints[channel.target]])
     tangents = tuple(

@@ -17,11 +17,9 @@ from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose, dof_rotations, joint_rotations
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.retargeting.mirror import joint_partners, mirror_axis
-from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 __all__ = ["RestSkeleton", "fit_rest_skeleton"]
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +118,7 @@ def fit_rest_skeleton(
 def _moves(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return a pose's additions to the rest translations: (J, 3)."""
     moves = pose.translations.copy()
-    rows = skeleton.dof_kinds < _FIRST_ROTATION
+    rows = skeleton.dof_kinds < FIRST_ROTATION
     np.add.at(moves, (skeleton.dof_joints[rows], skeleton.dof_kinds[rows]), pose.dofs[rows])
     return moves
 
@@ -187,7 +185,7 @@ def _with_offsets(skeleton: Skeleton, offsets: Floats, joint_scales: Floats) -> 
 
 
 def _dof_scales(skeleton: Skeleton, joint_scales: Floats) -> Floats:
-    is_move = skeleton.dof_kinds < _FIRST_ROTATION
+    is_move = skeleton.dof_kinds < FIRST_ROTATION
     return np.where(is_move, joint_scales[skeleton.dof_joints], 1.0)
 
 

@@ -25,6 +25,7 @@ MESSAGES = {
     "X001.gltf-motion": "{counts:all}, {frames} at {rate:g} fps, {size} bytes",
     "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
     "bytes",
+    "X001.gltf-figures": "{n_figures:#figure}: {figures:list}{others:+; {}}, {size} bytes",
     "X001.gltf-arrays": "array data, {size} bytes",
     "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
     "X001.texture": "its texture",
@@ -86,6 +87,16 @@ MESSAGES = {
     "keypoints3d folder",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
+    "X002.of-figure": "{figure:text}: {remark}",
+    "X003.of-figure": "{figure:text}: {remark}",
+    "X003.idle-animations": "{n:#animation|has|have} no effect on what is written and "
+    "{n:?is|are} omitted: {names:list}",
+    "X003.idle-shapes": "keys of {n:#blend shape} that {n:?changes|change} no vertex are omitted: "
+    "{names:list}",
+    "X003.camera-lenses": "glTF cannot store distortion, skew or the centre of lenses, which "
+    "{n:?is|are} omitted: {names:list}",
+    "X003.camera-motions": "{n:#camera|is|are} written at the first frame only, without "
+    "{n:?its|their} motion: {names:list}",
     # Missing frames
     "X004.closed": "missing {n:?frame|frames} {gaps:list}: {how}",
     "X004.kept": "{n:?frame|frames} {gaps:list} missing, as in the original motion",
@@ -124,6 +135,7 @@ MESSAGES = {
     "its roughness map",
     "X005.untracked": "{names:all}: not tracked, possibly a different person in each frame",
     "X005.of-person": "{person}: {remark}",
+    "X005.of-figure": "{figure:text}: {remark}",
 }
 
 PHRASES = {
@@ -137,6 +149,8 @@ PHRASES = {
     "split-vertices": "{n:#vertex} ({before} before they were split along texture seams)",
     "written-triangles": "{n:#triangle}",
     "written-joints": "{n:#joint}",
+    "written-cameras": "{n:#camera}",
+    "written-animations": "{n:#animation}",
     "missing-frame": "{frame}",
     "missing-frames": "{first} to {last}",
     # Replacements of missing frames

@@ -48,6 +48,7 @@ class Built:
     meshes: list[Placed]
     counts: list[Phrase]
     errors: dict[str, float]  # of quantised attributes
+    roots: list[int]  # nodes of the scene
 
 
 def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:
@@ -101,8 +102,10 @@ def add_body(
         counts.append(Phrase("written-triangles", n=figure.mesh.n_triangles))
     if figure.skeleton is not None:
         counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
-    document.root["scene"] = document.add("scenes", {"nodes": scene})
-    return Built(tree, meshes, counts, errors)
+    if "scenes" not in document.root:
+        document.root["scene"] = document.add("scenes", {"nodes": []})
+    document.root["scenes"][0]["nodes"] += scene
+    return Built(tree, meshes, counts, errors, scene)
 
 
 def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
@@ -110,7 +113,7 @@ def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
     if not optimizes:
         return Encoding(document)
     for name in ("extensionsUsed", "extensionsRequired"):
-        document.root.setdefault(name, []).append(EXTENSION)
+        document.root[name] = [EXTENSION]
     shapes, offsets = body.figure.blend_shapes, list[Floats]()
     if shapes is not None and len(body.shape.targets):
         offsets = [shapes.direction_values()[row] for row in body.shape.targets]

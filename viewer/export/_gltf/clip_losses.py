@@ -79,7 +79,7 @@ def clip_losses(
     """
     count = sum(len(placed.part.sources) for placed in written.meshes)
     each = _MOST_VERTICES // max(1, count * len(clips))
-    found = _sampled(written.file, figure, pose, clips, min(_MOST, max(_FEWEST, each)))
+    found = _sampled(written, figure, pose, clips, min(_MOST, max(_FEWEST, each)))
     written = replace(written, keys=found.keys)
     expected, read = sides(written, figure, found.frames, how, body.shape)
     distances = _distances(expected, read(None), len(found.times))
@@ -126,12 +126,13 @@ def _distances(expected: Side, found: Side, count: int) -> Floats:
 
 
 def _sampled(
-    file: GltfFile, figure: Figure, pose: Pose, clips: Sequence[TransformClip], most: int
+    written: Written, figure: Figure, pose: Pose, clips: Sequence[TransformClip], most: int
 ) -> _Samples:
     """Return the rest pose, and each animation at its keys and at times between them."""
     frames, owners, seconds = [pose_frames(figure, pose)[1]], [-1], [0.0]
     moved: list[tuple[int, Keys]] = []
-    animations = file.root.get("animations", [])
+    file = written.file
+    animations = [file.root["animations"][index] for index in written.animations]
     for index, (clip, animation) in enumerate(zip(clips, animations, strict=True)):
         times = key_times(animation, file)
         times = np.union1d(times, 0.5 * (times[1:] + times[:-1]))

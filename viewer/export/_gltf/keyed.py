@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -16,7 +16,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
 from viewer.rig.transforms.sampling import sample_transforms
 
-__all__ = ["add_clips", "first_time"]
+__all__ = ["Clips", "first_time"]
 
 Targets: TypeAlias = NDArray[np.integer]
 """Indices of blend shapes."""
@@ -26,43 +26,68 @@ _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights":
 _RATE = 60.0  # frames per second at which channels of different interpolation are merged
 
 
-def add_clips(
-    document: Document,
-    clips: Sequence[TransformClip],
-    tree: Tree,
-    meshes: Sequence[Placed],
-    shapes: Targets,
-    weights: Floats,
-) -> list[TransformClip]:
-    """Add an animation for each clip; return those with an effect in the file.
+class Clips:
+    """The animations of a file: clips of its figures with equal name and range are one.
 
     Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
 
     ``document``: modified in place.
-    ``clips``: motions with at least one channel each.
-    ``tree``, ``meshes``: the nodes of joints and parts.
-    ``shapes`` (M,): blend shapes that are morph targets.
-    ``weights`` (S,): weights of all blend shapes at rest.
     """
-    times: dict[bytes, int] = {}
-    added = []
-    for clip in clips:
-        keys = _Keys(document, times, first_time(clip))
-        for channel in clip.channels:
-            if channel.path != "weights":
-                keys.add(tree.joints[channel.joint], channel)
-        moved = [channel for channel in clip.channels if channel.path == "weights"]
-        for placed in meshes:
-            rows = shapes[placed.part.targets]
-            joined = _joined_weights(moved, rows, weights)
-            if joined is not None:
-                keys.add(placed.node, joined)
-        if keys.channels:
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._times: dict[bytes, int] = {}
+        self._known: dict[tuple[object, ...], list[int]] = {}
+
+    def add(
+        self,
+        clips: Sequence[TransformClip],
+        tree: Tree,
+        meshes: Sequence[Placed],
+        shapes: Targets,
+        weights: Floats,
+    ) -> dict[int, TransformClip]:
+        """Add the clips of a figure; return those with an effect, by animation of the file.
+
+        ``clips``: motions with at least one channel each.
+        ``tree``, ``meshes``: the nodes of joints and parts.
+        ``shapes`` (M,): blend shapes that are morph targets.
+        ``weights`` (S,): weights of all blend shapes at rest.
+        """
+        added: dict[int, TransformClip] = {}
+        for clip in clips:
+            keys = _Keys(self._document, self._times, first_time(clip))
+            for channel in clip.channels:
+                if channel.path != "weights":
+                    keys.add(tree.joints[channel.joint], channel)
+            moved = [channel for channel in clip.channels if channel.path == "weights"]
+            for placed in meshes:
+                rows = shapes[placed.part.targets]
+                joined = _joined_weights(moved, rows, weights)
+                if joined is not None:
+                    keys.add(placed.node, joined)
+            if keys.channels:
+                added[self._put(clip, keys, added)] = clip
+        return added
+
+    def _put(self, clip: TransformClip, keys: _Keys, taken: Collection[int]) -> int:
+        """Add keys to the animation that another figure has in common, or to a new one."""
+        name = (clip.name, clip.start, clip.end, first_time(clip))
+        known = self._known.setdefault(name, [])
+        index = next((index for index in known if index not in taken), -1)
+        if index < 0:
             item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
             item |= {"samplers": keys.samplers, "channels": keys.channels}
-            document.add("animations", item)
-            added.append(clip)
-    return added
+            index = self._document.add("animations", item)
+            known.append(index)
+            return index
+        item = self._document.root["animations"][index]
+        first = len(item["samplers"])
+        for channel in keys.channels:
+            channel["sampler"] += first
+        item["samplers"] += keys.samplers
+        item["channels"] += keys.channels
+        return index
 
 
 def first_time(clip: TransformClip) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,6 +42,8 @@ class Written:
         Frame of the figure that comes first in the file.
     keys : dict, optional
         Animated values of each frame; by default, the file's keys, one per frame.
+    animations : sequence of int
+        Indices of the figure's animations.
     """
 
     path: Path
@@ -50,6 +52,7 @@ class Written:
     meshes: list[Placed]
     start: int = 0
     keys: Keys | None = None
+    animations: Sequence[int] = ()
 
     @property
     def sources(self) -> Ints:

@@ -32,6 +32,7 @@ from viewer.rig.units import METRES, UNIT_NAMES
 _HALF = float(np.sqrt(0.5))
 _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
 _Z_TO_Y = [-_HALF, 0.0, 0.0, _HALF]
+_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,6 +143,14 @@ def _above(up: str, unit: str) -> dict[str, Any]:
         names.append(UNIT_NAMES[unit])
         node["scale"] = [METRES[unit]] * 3
     return {"name": ", ".join(names), **node} if names else {}
+
+
+def to_metres(up: str, unit: str) -> Floats:
+    """Return the matrix of the node above the whole figure: (4, 4)."""
+    matrix = np.diag([METRES.get(unit, 1.0)] * 3 + [1.0])
+    if up == "z":
+        matrix[:3, :3] = matrix[:3, :3] @ _Z_UP
+    return matrix
 
 
 def _add_joints(document: Document, skeleton: Skeleton, still: Locals) -> list[int]:

@@ -13,8 +13,9 @@ def add_record(document: Document, record: FileRecord, joints: list[int]) -> Non
     ``record``: the record of the figure.
     ``joints`` (J,): their nodes.
     """
-    if record.copyright:
-        document.root["asset"]["copyright"] = text_of(record.copyright)
+    asset, holder = document.root["asset"], text_of(record.copyright)
+    if holder and holder not in asset.get("copyright", ""):
+        asset["copyright"] = "; ".join(filter(None, (asset.get("copyright"), holder)))
     if record.extras is not None:
         document.root["extras"] = record.extras
     for joint, extras in record.joint_extras.items():

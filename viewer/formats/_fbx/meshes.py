@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._mesh.polygons import triangulate
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, Primitive
+from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 
@@ -154,7 +155,7 @@ def _primitive(
         joints=None if influences is None else influences[0][vertices],
         weights=None if influences is None else influences[1][vertices],
         material=material,
-        targets=np.array([offsets @ linear.T for offsets, _ in targets]) if targets else None,
+        targets=_targets([offsets @ linear.T for offsets, _ in targets]),
         normal_targets=_normal_targets([rows[vertices] for _, rows in targets], linear),
     )
 
@@ -168,11 +169,15 @@ def _spread(get: Any, row: int, name: str, count: int) -> Floats:
     return result
 
 
-def _normal_targets(rows: list[Floats], linear: Floats) -> Floats | None:
+def _targets(offsets: list[Floats]) -> MorphTargets | None:
+    return MorphTargets(len(offsets[0]), offsets) if offsets else None
+
+
+def _normal_targets(rows: list[Floats], linear: Floats) -> MorphTargets | None:
     """Return the offsets of normals; None if the file has none; they are then recomputed."""
     if not any(each.any() for each in rows):
         return None
-    return np.array([_turned(each, linear, unit=False) for each in rows])
+    return _targets([_turned(each, linear, unit=False) for each in rows])
 
 
 def _turned(normals: Floats, linear: Floats, unit: bool = True) -> Floats:

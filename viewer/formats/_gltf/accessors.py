@@ -144,6 +144,16 @@ class Accessors:
         with np.errstate(invalid="ignore"):  # signalling NaNs
             return values.astype(np.float64)
 
+    def stored(self, index: int, kinds: Sequence[str], user: str) -> NDArray[Any] | None:
+        """Return single-precision numbers as in the file, without copying them: (N, C).
+
+        None for other types, and for accessors that are sparse or without data. Parameters and
+        errors as for ``floats``.
+        """
+        layout = self._layout(index, kinds, user)
+        is_plain = layout.element.has("bufferView") and not layout.element.has("sparse")
+        return self._values(layout) if is_plain and layout.dtype.kind == "f" else None
+
     def fractions(
         self,
         index: int,
@@ -185,7 +195,8 @@ class Accessors:
     def components(self, index: int) -> Floats | None:
         """Return the components of an accessor as stored, not normalised: (N, C).
 
-        None if the data is elsewhere: compressed with Draco, for instance.
+        None if the data is elsewhere: compressed with Draco, for instance. As the caller does not
+        keep them, they do not count as decoded data, although they must fit within the limit.
 
         Raises
         ------
@@ -194,9 +205,13 @@ class Accessors:
         """
         if not self._table[index].has("bufferView") and not self._table[index].has("sparse"):
             return None
-        layout = self._layout(index, tuple(_TYPES), self._table[index].pointer)
+        pointer = self._table[index].pointer
+        layout = self._layout(index, tuple(_TYPES), pointer)
+        values = self._picked(layout, None, None)
+        size = values.itemsize if not layout.element.has("bufferView") else 0
+        self._spend(-values.size * (8 + size), pointer)
         with np.errstate(invalid="ignore"):  # signalling NaN
-            return self._picked(layout, None, None).astype(np.float64)
+            return values.astype(np.float64)
 
     def matrices(self, index: int, user: str) -> Floats:
         """Return an accessor of MAT4 as matrices with the translation in the last column.
@@ -289,9 +304,7 @@ class Accessors:
         return indices
 
     def _sparse_view(self, items: Element) -> View:
-        place = items.index("bufferView", self._buffers.n_views, "bufferViews")
-        if place < 0:
-            raise items.wrong("bufferView", "the index of a buffer view")
+        place = items.required_index("bufferView", self._buffers.n_views, "bufferViews")
         return self._buffers.view(place)
 
 

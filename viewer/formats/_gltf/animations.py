@@ -139,15 +139,10 @@ def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[fl
         if type(index) is not int or not 0 <= index < len(accessors):
             samplers = animation.table("samplers")
             for place in range(len(samplers)):
-                _required_input(document, samplers[place])
+                samplers[place].required_index("input", len(document.accessors), "accessors")
         ends.append(_declared(accessors, index) or _read_range(document, animation, index))
     start = min((first for first, _ in ends), default=0.0)
     return start, max((last for _, last in ends), default=0.0)
-
-
-def _required_input(document: Document, sampler: Element) -> None:
-    if sampler.index("input", len(document.accessors), "accessors") < 0:
-        raise sampler.wrong("input", "the index of an accessor")
 
 
 def _declared(accessors: Table, index: int) -> tuple[float, float] | None:

@@ -76,6 +76,17 @@ class Attributes:
         read, user = self.document.accessors.floats, self.element.at(name)
         return read(index, kinds, user, self.rows, self.decoded.get(name))
 
+    def stored(self, name: str, *kinds: str) -> NDArray[Any] | None:
+        """Return the finite numbers of all vertices as in the file, without copying them.
+
+        None if the attribute is missing, or its data must be decoded or corrected; see ``floats``.
+        """
+        index = self.accessor(name)
+        if index < 0 or name in self.decoded:
+            return None
+        values = self.document.accessors.stored(index, kinds, self.element.at(name))
+        return values if values is not None and _is_finite(values) else None
+
     def fractions(self, name: str, *kinds: str) -> Floats | None:
         """Return an attribute of normalised integers; shape and errors as for ``floats``."""
         index = self.accessor(name)
@@ -161,6 +172,13 @@ def read_colors(attributes: Attributes) -> Floats | None:
     if colors.shape[1] == 4:
         return colors
     return np.column_stack([colors, np.ones(len(colors))])
+
+
+def _is_finite(values: NDArray[Any]) -> bool:
+    """Return whether all numbers are finite and their squares do not overflow in sum."""
+    flat = values.ravel()
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(np.dot(flat, flat)))
 
 
 def _not_finite(values: Floats) -> Bools:

@@ -10,7 +10,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf.meshopt import decoded_view, meshopt_of
-from viewer.formats._gltf.uris import is_data_uri, media_type, uri_bytes, uri_path
+from viewer.formats._gltf.uris import is_data_uri, uri_bytes, uri_path
 from viewer.rig.arrays import Bytes
 
 __all__ = ["Buffers", "EncodedImage", "View"]
@@ -44,8 +44,6 @@ class EncodedImage:
     name : str
         Path relative to the document's folder; for embedded images the name of the image, which
         may be empty.
-    media_type : str
-        As declared, such as ``image/png``; may be empty.
     data : bytes
         The encoded image.
     is_embedded : bool
@@ -53,7 +51,6 @@ class EncodedImage:
     """
 
     name: str
-    media_type: str
     data: bytes
     is_embedded: bool
 
@@ -141,24 +138,22 @@ class Buffers:
             If the image's data is missing, unreadable, or outside the folder.
         """
         image = self._images[index]
-        name, kind = image.text("name"), image.text("mimeType")
+        name = image.text("name")
         place = image.index("bufferView", self.n_views, "bufferViews")
         if place >= 0:
-            return EncodedImage(name, kind, self.view(place).data.tobytes(), True)
+            return EncodedImage(name, self.view(place).data.tobytes(), True)
         if not image.has("uri"):
             raise image.fault("F002.gltf-image")
         uri = image.text("uri")
         if is_data_uri(uri):
-            return EncodedImage(name, kind or media_type(uri), uri_bytes(image), True)
+            return EncodedImage(name, uri_bytes(image), True)
         path = uri_path(image)
         file = path.relative_to(image.source.path.parent).as_posix()
-        return EncodedImage(file, kind, uri_bytes(image), False)
+        return EncodedImage(file, uri_bytes(image), False)
 
     def _part(self, view: Element) -> View:
         """Return the bytes that a view, or the compressed form of one, refers to."""
-        number = view.index("buffer", len(self._buffers), "buffers")
-        if number < 0:
-            raise view.wrong("buffer", "the index of a buffer")
+        number = view.required_index("buffer", len(self._buffers), "buffers")
         offset, length = view.whole("byteOffset", 0), view.whole("byteLength")
         data = self.data(number)
         if offset + length > len(data):

@@ -63,10 +63,7 @@ def sampler_of(channel: Element, samplers: Table) -> int:
     FormatError
         If the channel has no sampler.
     """
-    index = channel.index("sampler", len(samplers), "samplers")
-    if index < 0:
-        raise channel.wrong("sampler", "the index of a sampler")
-    return index
+    return channel.required_index("sampler", len(samplers), "samplers")
 
 
 def _channel(reading: _Reading, channel: Element, moved: Moved, node: int) -> NodeChannel:

@@ -7,6 +7,7 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, NodeTree
 from viewer.rig.arrays import Floats
 
@@ -14,6 +15,8 @@ __all__ = ["check_conformance"]
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
 _UNIT = 1e-3  # deviation of a quaternion's length from 1
+# Normalised integers that stand for 1, by component type.
+_ONES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 
 
 def check_conformance(
@@ -112,7 +115,7 @@ def _has_bounds(accessor: Element) -> bool:
 
 def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
     """Check that the joints have a common root, and that ``skeleton`` is one if it is declared."""
-    ancestors = [_ancestors(joint, parents) for joint in read.joints.tolist()]
+    ancestors = [path_to_root(parents, joint) for joint in read.joints.tolist()]
     roots = {chain[-1] for chain in ancestors}
     if len(roots) > 1:
         skin.warn("G004.no-common-root", "joints", nodes=sorted(roots))
@@ -121,14 +124,6 @@ def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
         outside = sum(declared not in chain for chain in ancestors)
         if outside:
             skin.warn("G004.not-a-root", "skeleton", node=declared, n=outside)
-
-
-def _ancestors(node: int, parents: list[int]) -> list[int]:
-    """Return a node and its ancestors, ending with the root."""
-    chain = [node]
-    while parents[chain[-1]] >= 0:
-        chain.append(parents[chain[-1]])
-    return chain
 
 
 def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
@@ -187,11 +182,13 @@ def _check_rotations(document: Document, sampler: Element) -> None:
     accessor = sampler.index("output", len(document.accessors), "accessors")
     if accessor < 0:
         return
-    keys = document.accessors.floats(accessor, ("VEC4",), sampler.at("output"))
-    lengths = np.linalg.norm(keys, axis=1)
+    keys = document.accessors.components(accessor)
+    if keys is None or keys.shape[1] != 4:
+        return
+    one = _ONES.get(document.accessors[accessor].whole("componentType"), 1.0)
+    lengths = np.linalg.norm(keys, axis=1) / one
     # Integers are rounded: 1 / 127 for each component of a byte.
-    is_float = document.accessors[accessor].values.get("componentType") == 5126
-    odd = np.abs(lengths - 1.0) > (_UNIT if is_float else 0.02)
+    odd = np.abs(lengths - 1.0) > (_UNIT if one == 1.0 else 0.02)
     if odd.any():
         key = int(odd.argmax())
         found = {"index": key, "found": float(lengths[key])}

@@ -19,10 +19,9 @@ from typing import Any
 from viewer.formats._gltf.json_text import parsed
 from viewer.formats._source import Source
 
-__all__ = ["MAGIC", "Container", "open_container"]
+__all__ = ["Container", "open_container"]
 
-MAGIC = b"glTF"
-"""First bytes of a GLB."""
+_MAGIC = b"glTF"  # first bytes of a GLB
 
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
@@ -54,7 +53,7 @@ def open_container(source: Source) -> Container:
         If the file is neither JSON nor GLB, or its JSON is truncated or invalid.
     """
     data = source.data
-    if not data.startswith(MAGIC):
+    if not data.startswith(_MAGIC):
         return Container(parsed(source, data, has_lines=True), None)
     chunks: dict[bytes, memoryview] = {}
     for kind, content in _chunks(source):

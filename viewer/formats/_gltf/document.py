@@ -57,18 +57,18 @@ class Document:
         return self._tables[name]
 
     def spend(self, n_bytes: int, pointer: str) -> None:
-        """Count bytes that are about to be decoded.
+        """Count bytes that are about to be decoded; negative numbers are no longer in memory.
 
         Raises
         ------
         FormatError
             If the decoded data are much larger than the file, which may declare huge arrays.
         """
-        self._decoded += n_bytes
+        size = self._decoded + n_bytes
         most = _FREE_BYTES + _MOST_GROWTH * self.buffers.n_bytes_read
-        if self._decoded > most:
-            values = {"most": most, "size": self._decoded}
-            raise self.source.fault("F002.gltf-decoded", pointer, **values)
+        if size > most:
+            raise self.source.fault("F002.gltf-decoded", pointer, most=most, size=size)
+        self._decoded = size
 
     def kept(self, read: Callable[[], Content], neutral: Content) -> Content:
         """Return the result of a function; after an error, a neutral value if errors are kept.
@@ -93,6 +93,22 @@ def open_document(source: Source) -> Document:
     Raises
     ------
     FormatError
-        If its container or its JSON is invalid.
+        If its container or its JSON is invalid, or it has another version.
     """
-    return Document(source, open_container(source))
+    container = open_container(source)
+    # In glTF 1.0, the tables are objects instead of lists, so the version is checked first.
+    _check_version(Element(source, container.root))
+    return Document(source, container)
+
+
+def _check_version(root: Element) -> None:
+    """Refuse documents that have another major version or require a later minor version."""
+    asset = root.part("asset")
+    if asset is None:
+        root.warn("G001.no-asset")
+        return
+    version = asset.text("version", "2.0")
+    if version.partition(".")[0] != "2":
+        raise asset.fault("F002.gltf-version", "version", found=version)
+    if asset.text("minVersion", "2.0") != "2.0":
+        raise asset.fault("F002.gltf-version", "minVersion", found=asset.text("minVersion"))

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 
-__all__ = ["NAME", "DecodedPrimitive", "decoded_primitive"]
+__all__ = ["DecodedPrimitive", "decoded_primitive"]
 
-NAME = "KHR_draco_mesh_compression"
+_NAME = "KHR_draco_mesh_compression"
 """The extension."""
 
 
@@ -46,18 +46,16 @@ def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitiv
     FormatError
         If the extension or the data are malformed, or DracoPy is needed but not installed.
     """
-    extension = primitive.extension(NAME) if primitive.has("extensions") else None
+    extension = primitive.extension(_NAME) if primitive.has("extensions") else None
     if extension is None:
         return None
     try:
         library = import_module("DracoPy")
     except ModuleNotFoundError:
-        if NAME not in document.root.values.get("extensionsRequired", []):
+        if _NAME not in document.root.values.get("extensionsRequired", []):
             return None
         raise extension.fault("F002.gltf-draco") from None
-    view = extension.index("bufferView", document.buffers.n_views, "bufferViews")
-    if view < 0:
-        raise extension.wrong("bufferView", "the index of a buffer view")
+    view = extension.required_index("bufferView", document.buffers.n_views, "bufferViews")
     mesh = _decoded(library, extension, document.buffers.view(view).data.tobytes())
     arrays = {int(item["unique_id"]): np.asarray(item["data"]) for item in mesh.attributes}
     n_bytes = sum(array.size for array in arrays.values()) * 8

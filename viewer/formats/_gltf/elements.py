@@ -14,17 +14,23 @@ from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import one_of
 from viewer.rig.arrays import Floats
 
-__all__ = ["Element", "Table", "pointer_to"]
+__all__ = ["Element", "Table"]
 
 Choice = TypeVar("Choice", int, str)
 
+_ONE = {
+    "accessors": "an accessor",
+    "buffers": "a buffer",
+    "bufferViews": "a buffer view",
+    "samplers": "a sampler",
+}
 _BEYOND = 1 << 64  # whole numbers from here on are invalid in any file
 
 
-def pointer_to(base: str, *keys: str | int) -> str:
+def _pointer_to(base: str, *keys: str | int) -> str:
     """Return a JSON pointer to a member (RFC 6901).
 
-    >>> pointer_to("/nodes/3", "extensions", "a/b")
+    >>> _pointer_to("/nodes/3", "extensions", "a/b")
     '/nodes/3/extensions/a~1b'
     """
     for key in keys:
@@ -54,7 +60,7 @@ class Element:
 
     def at(self, *keys: str | int) -> str:
         """Return a JSON pointer to a member."""
-        return pointer_to(self.pointer, *keys)
+        return _pointer_to(self.pointer, *keys)
 
     def has(self, name: str) -> bool:
         """Return whether the object has a member of this name."""
@@ -113,6 +119,16 @@ class Element:
         index = self.whole(name)
         if index >= count:
             raise self.fault("F002.gltf-index", name, what=what, count=count, found=index)
+        return index
+
+    def required_index(self, name: str, count: int, what: str) -> int:
+        """Return a member that is an index below ``count``.
+
+        Parameters and errors as for ``index``; a missing member is also an error.
+        """
+        index = self.index(name, count, what)
+        if index < 0:
+            raise self.wrong(name, f"the index of {_ONE[what]}")
         return index
 
     def number(self, name: str, default: float | None = None) -> float:

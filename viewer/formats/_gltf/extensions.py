@@ -8,9 +8,9 @@ from typing import Any
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf_materials.materials import DRAWN_EXTENSIONS
 
-__all__ = ["GEOMETRY", "KNOWN", "check_extensions"]
+__all__ = ["check_extensions"]
 
-GEOMETRY = (
+_GEOMETRY = (
     "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_mesh_quantization",
@@ -30,7 +30,7 @@ _CHARACTERS = (
 _ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
 _WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
 
-KNOWN = frozenset((*GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS, *_WITHOUT_EFFECT))
+_KNOWN = frozenset((*_GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS, *_WITHOUT_EFFECT))
 """Extensions that a file may require."""
 
 
@@ -43,11 +43,11 @@ def check_extensions(document: Document) -> None:
         If an unknown extension is required.
     """
     required = _names(document, "extensionsRequired")
-    unknown = [name for name in required if name not in KNOWN]
+    unknown = [name for name in required if name not in _KNOWN]
     if unknown:
         pointer = document.root.at("extensionsRequired")
         document.source.refuse("F002.gltf-extensions", pointer, names=unknown)
-    optional = [name for name in _names(document, "extensionsUsed") if name not in KNOWN]
+    optional = [name for name in _names(document, "extensionsUsed") if name not in _KNOWN]
     optional = [name for name in optional if name not in unknown and not _ABOUT.match(name)]
     if optional:
         document.root.warn("F007.gltf-extensions", "extensionsUsed", names=optional)

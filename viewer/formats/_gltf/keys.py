@@ -42,9 +42,7 @@ def read_times(document: Document, sampler: Element) -> Floats:
     FormatError
         If the times are missing, malformed, not finite or not in ascending order.
     """
-    accessor = sampler.index("input", len(document.accessors), "accessors")
-    if accessor < 0:
-        raise sampler.wrong("input", "the index of an accessor")
+    accessor = sampler.required_index("input", len(document.accessors), "accessors")
     times = document.accessors.floats(accessor, ("SCALAR",), sampler.at("input"))[:, 0]
     if not len(times):
         raise sampler.fault("F002.gltf-no-keys", "input")
@@ -84,9 +82,7 @@ def read_keys(
     """
     names = tuple(_INTERPOLATIONS)
     interpolation = _INTERPOLATIONS[sampler.choice("interpolation", names, "LINEAR")]
-    accessor = sampler.index("output", len(document.accessors), "accessors")
-    if accessor < 0:
-        raise sampler.wrong("output", "the index of an accessor")
+    accessor = sampler.required_index("output", len(document.accessors), "accessors")
     rows = document.accessors.floats(accessor, (_KINDS[path],), sampler.at("output"))
     width = _WIDTHS.get(path, n_shapes)
     per_key = 3 if interpolation == "cubic" else 1

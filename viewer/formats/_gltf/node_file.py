@@ -53,7 +53,6 @@ def read_nodes(source: Source) -> NodeFile:
         extension. Errors without visible effect are warnings.
     """
     document = open_document(source)
-    _check_version(document)
     check_extensions(document)
     materials = read_materials(document)
     tree, skins = _without_empty(read_tree(document), read_skins(document))
@@ -104,16 +103,3 @@ def _with_material(mesh: NodeMesh, index: int) -> NodeMesh:
 def _object(document: Document, name: str) -> dict[str, object]:
     part = document.root.part(name)
     return {} if part is None else part.values
-
-
-def _check_version(document: Document) -> None:
-    """Refuse documents that have another major version or require a later minor version."""
-    asset = document.root.part("asset")
-    if asset is None:
-        document.root.warn("G001.no-asset")
-        return
-    version = asset.text("version", "2.0")
-    if version.partition(".")[0] != "2":
-        raise asset.fault("F002.gltf-version", "version", found=version)
-    if asset.text("minVersion", "2.0") != "2.0":
-        raise asset.fault("F002.gltf-version", "minVersion", found=asset.text("minVersion"))

@@ -6,6 +6,7 @@ import numpy as np
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
+from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeTree
 
 __all__ = ["shown_roots"]
@@ -39,10 +40,5 @@ def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
     children = [node for node in nodes if tree.parents[node] >= 0]
     if children:
         scene.warn("G003.scene-child", "nodes", n=len(children), found=children[0])
-    found = []
-    for node in nodes:
-        # Transforms of the ancestors apply, so the tree is shown from its root.
-        while tree.parents[node] >= 0:
-            node = int(tree.parents[node])
-        found.append(node)
-    return tuple(dict.fromkeys(found))
+    # Transforms of the ancestors apply, so the tree is shown from its root.
+    return tuple(dict.fromkeys(path_to_root(tree.parents, node)[-1] for node in nodes))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.formats._gltf.attributes import Attributes
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element, Table
 from viewer.formats._nodes.content import NodeMesh, NodeTree
+from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats
 
 __all__ = ["n_targets", "node_weights", "read_targets", "shape_weights", "target_names"]
@@ -32,8 +34,10 @@ def n_targets(mesh: Element, primitives: Table) -> int:
     return counts[0] if counts else 0
 
 
-def read_targets(attributes: Attributes, targets: Table) -> tuple[Floats | None, Floats | None]:
-    """Return the offsets of positions and normals of a primitive: (S, V, 3) each, or None.
+def read_targets(
+    attributes: Attributes, targets: Table
+) -> tuple[MorphTargets | None, MorphTargets | None]:
+    """Return the offsets of positions and normals of a primitive, or None.
 
     Raises
     ------
@@ -44,25 +48,27 @@ def read_targets(attributes: Attributes, targets: Table) -> tuple[Floats | None,
         return None, None
     offsets = _offsets(attributes, targets, "POSITION")
     if offsets is None:
-        offsets = np.zeros((len(targets), attributes.n_rows, 3))
+        offsets = MorphTargets(attributes.n_rows, [None] * len(targets))
     return offsets, _offsets(attributes, targets, "NORMAL")
 
 
-def _offsets(attributes: Attributes, targets: Table, name: str) -> Floats | None:
+def _offsets(attributes: Attributes, targets: Table, name: str) -> MorphTargets | None:
     """Return the offsets of one attribute; None if no target has that attribute."""
     used = [place for place in range(len(targets)) if targets[place].has(name)]
     if not used:
         return None
     document, rows = attributes.document, attributes.rows
-    size = len(targets) * attributes.n_rows * 3 * 8
-    document.spend(size, targets.pointer)
-    result = np.zeros((len(targets), attributes.n_rows, 3))
+    # As if all vertices moved: some uses need an offset for each vertex.
+    document.spend(len(targets) * attributes.n_rows * 3 * 8, targets.pointer)
+    found: list[NDArray[Any] | None] = [None] * len(targets)
     for place in used:
-        target = Attributes(document, targets[place], attributes.n_vertices, rows)
-        values = target.floats(name, "VEC3")
-        if values is not None:
-            result[place] = target.finite(name, values)
-    return result
+        target = Attributes(document, targets[place], attributes.n_vertices)
+        values: NDArray[Any] | None = target.stored(name, "VEC3")
+        if values is None:
+            whole = target.floats(name, "VEC3")
+            values = None if whole is None else target.finite(name, whole)
+        found[place] = values
+    return MorphTargets(attributes.n_rows, found, rows)
 
 
 def shape_weights(mesh: Element, count: int) -> Floats:

@@ -9,7 +9,7 @@ from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.rig.arrays import Ints
 
-__all__ = ["TRIANGLES", "fan", "read_triangles", "strip"]
+__all__ = ["TRIANGLES", "read_triangles"]
 
 _LIST, _STRIP, _FAN = 4, 5, 6
 TRIANGLES = (_LIST, _STRIP, _FAN)
@@ -45,9 +45,9 @@ def read_triangles(
     corners = _corners(document, primitive, n_vertices)
     mode = primitive.whole("mode", _LIST)
     if mode == _STRIP:
-        return strip(corners)
+        return _strip(corners)
     if mode == _FAN:
-        return fan(corners)
+        return _fan(corners)
     if len(corners) % 3:
         primitive.warn("G002.corners", "indices", n=len(corners), left=len(corners) % 3)
     return corners[: len(corners) // 3 * 3].reshape(-1, 3)
@@ -82,12 +82,12 @@ def _checked(
     return corners.astype(np.int32)
 
 
-def strip(corners: Ints) -> Ints:
+def _strip(corners: Ints) -> Ints:
     """Return the triangles of a strip, every other one reversed (glTF 2.0, 3.7.2.1).
 
     Degenerate triangles, which connect parts of a strip, are omitted.
 
-    >>> strip(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
+    >>> _strip(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
     [[0, 1, 2], [1, 3, 2]]
     """
     if len(corners) < 3:
@@ -98,10 +98,10 @@ def strip(corners: Ints) -> Ints:
     return triangles[(a != b) & (b != c) & (c != a)]
 
 
-def fan(corners: Ints) -> Ints:
+def _fan(corners: Ints) -> Ints:
     """Return the triangles of a fan around its first corner (glTF 2.0, 3.7.2.1).
 
-    >>> fan(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
+    >>> _fan(np.array([0, 1, 2, 3], dtype=np.int32)).tolist()
     [[1, 2, 0], [2, 3, 0]]
     """
     if len(corners) < 3:

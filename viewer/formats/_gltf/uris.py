@@ -11,7 +11,7 @@ from viewer.formats._file_bytes import read_bytes
 from viewer.formats._gltf.elements import Element
 from viewer.formats._references import referenced_path, refused_text
 
-__all__ = ["data_uri_bytes", "is_data_uri", "media_type", "uri_bytes", "uri_path"]
+__all__ = ["is_data_uri", "uri_bytes", "uri_path"]
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # at least two letters, because C: is a drive
 _SHOWN = 60  # characters of a URI in messages
@@ -20,11 +20,6 @@ _SHOWN = 60  # characters of a URI in messages
 def is_data_uri(uri: str) -> bool:
     """Return whether a URI contains its data."""
     return uri[:5].lower() == "data:"
-
-
-def media_type(uri: str) -> str:
-    """Return the media type of a data URI, such as ``image/png``; empty if it has none."""
-    return uri[5:200].partition(",")[0].partition(";")[0].strip().lower()
 
 
 def uri_bytes(element: Element, most: int | None = None) -> bytes:
@@ -45,7 +40,7 @@ def uri_bytes(element: Element, most: int | None = None) -> bytes:
     """
     uri = element.text("uri")
     if is_data_uri(uri):
-        return data_uri_bytes(element, most)
+        return _data_uri_bytes(element, most)
     path = uri_path(element)
     element.source.also_read.append(path)
     return read_bytes(path, element.source.max_size)
@@ -80,7 +75,7 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def data_uri_bytes(element: Element, most: int | None = None) -> bytes:
+def _data_uri_bytes(element: Element, most: int | None = None) -> bytes:
     """Return the data of a data URI (RFC 2397), with or without base64.
 
     Raises

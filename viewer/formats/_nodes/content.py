@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.material import Material
@@ -72,6 +73,10 @@ class NodeTree:
         """Number of nodes, N."""
         return len(self.names)
 
+    def with_mesh(self, mesh: int) -> list[int]:
+        """Return the nodes that show a mesh."""
+        return np.flatnonzero(self.meshes == mesh).tolist()
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
@@ -94,9 +99,9 @@ class Primitive:
         stored, unused slots are 0.
     material : int
         Index into ``NodeFile.materials``, -1 for none.
-    targets : (S, V, 3) or None
+    targets : MorphTargets or None
         Offsets of the positions for each morph target of the mesh.
-    normal_targets : (S, V, 3) or None
+    normal_targets : MorphTargets or None
         Offsets of the normals; None if the file has none.
     pointer : str
         JSON pointer to it; empty for files without JSON.
@@ -110,8 +115,8 @@ class Primitive:
     joints: Ints | None = None
     weights: Floats | None = None
     material: int = -1
-    targets: Floats | None = None
-    normal_targets: Floats | None = None
+    targets: MorphTargets | None = None
+    normal_targets: MorphTargets | None = None
     pointer: str = ""
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from viewer.formats._nodes.ancestors import with_ancestors
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeTree
 from viewer.rig.arrays import Bools, Ints
 
@@ -222,12 +223,7 @@ class _Grouping:
 
     def _with_ancestors(self, wanted: Iterable[int]) -> list[int]:
         """Return nodes and their ancestors, parents first."""
-        found: set[int] = set()
-        for node in wanted:
-            while node >= 0 and node not in found:
-                found.add(node)
-                node = self.parents[node]
-        return sorted(found, key=self.place.__getitem__)
+        return sorted(with_ancestors(self.parents, wanted), key=self.place.__getitem__)
 
     def _trimmed(self, nodes: list[int], wanted: set[int]) -> list[int]:
         """Return the nodes, except for topmost ones without effect."""

@@ -11,8 +11,8 @@ from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
 from viewer.formats._nodes.motions import Reader
 from viewer.formats._nodes.surfaces import Piece, normal_matrix, normal_scales, part_name
-from viewer.rig.arrays import Deferred, Floats, Ints
-from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.blendshapes import BlendShapes, SummedOffsets
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
 
 __all__ = ["blend_shapes_of", "shape_columns"]
@@ -117,9 +117,11 @@ def blend_shapes_of(
     mixed, sums = _expressions(file, columns, len(targets))
     shape = len(targets) + len(mixed), count, 3
 
-    def offsets(of_normals: bool) -> Deferred:
-        return Deferred(
-            shape, np.float64, lambda: _offsets(columns, pieces, count, of_normals, sums)
+    def offsets(of_normals: bool) -> SummedOffsets:
+        return SummedOffsets(
+            shape,
+            lambda: _offsets(columns, pieces, count, of_normals, sums),
+            lambda weights: _sum(columns, pieces, count, of_normals, sums, weights),
         )
 
     has_normals = any(piece.shading == "file" for piece in pieces)
@@ -202,7 +204,7 @@ def _offsets(
         targets = primitive.normal_targets if of_normals else primitive.targets
         if own is None or targets is None:
             continue
-        values = targets[:, piece.sources]
+        values = targets.dense()[:, piece.sources]
         if of_normals:
             offsets[own, rows] = values @ normal_matrix(piece) * normal_scales(piece)
         else:
@@ -210,3 +212,30 @@ def _offsets(
     if not len(sums):
         return offsets
     return np.concatenate([offsets, np.einsum("es,sva->eva", sums, offsets)])
+
+
+def _sum(
+    columns: dict[int, Ints],
+    pieces: list[Piece],
+    count: int,
+    of_normals: bool,
+    sums: Floats,
+    weights: Floats,
+) -> Floats:
+    """Return the weighted sum of ``_offsets``, without the array: (V, 3)."""
+    n_targets = sums.shape[1]
+    weights = weights[:n_targets] + weights[n_targets:] @ sums
+    total, first = np.zeros((count, 3)), 0
+    for piece in pieces:
+        rows = slice(first, first + piece.n_vertices)
+        first += piece.n_vertices
+        primitive, own = piece.primitive, columns.get(piece.node)
+        targets = primitive.normal_targets if of_normals else primitive.targets
+        if own is None or targets is None:
+            continue
+        values = targets.weighted(weights[own])[piece.sources]
+        if of_normals:
+            total[rows] = values @ normal_matrix(piece) * normal_scales(piece)
+        else:
+            total[rows] = values @ piece.baked[:3, :3].T
+    return total

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from viewer.formats._nodes.ancestors import with_ancestors
 from viewer.formats._nodes.content import NodeCamera, NodeTree
 from viewer.formats._nodes.joints import make_joints, rest_worlds
 from viewer.rig.arrays import Floats
@@ -44,7 +45,8 @@ def views_of(
     chosen = [node for node in order if tree.cameras[node] >= 0]
     if not chosen:
         return (), []
-    joints = make_joints(tree, _with_ancestors(tree, order, chosen))
+    needed = with_ancestors(tree.parents.tolist(), chosen)
+    joints = make_joints(tree, [node for node in order if node in needed])
     worlds = rest_worlds(joints)
     views, left_out = [], []
     for node in chosen:
@@ -56,17 +58,6 @@ def views_of(
             world = worlds[joints.carrier[node]]
             views.append(_view(name, world, camera.vertical_angle, camera.aspect or _ASPECT))
     return tuple(views), left_out
-
-
-def _with_ancestors(tree: NodeTree, order: list[int], nodes: list[int]) -> list[int]:
-    """Return nodes and their ancestors, parents first."""
-    parents = tree.parents.tolist()
-    found: set[int] = set()
-    for node in nodes:
-        while node >= 0 and node not in found:
-            found.add(node)
-            node = parents[node]
-    return [node for node in order if node in found]
 
 
 def _view(name: str, world: Floats, vertical_angle: float, aspect: float) -> CameraView:

@@ -16,6 +16,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeFile
 from viewer.formats._nodes.joints import make_joints, skeleton_of
 from viewer.formats._nodes.motions import Reader, animations_of, read_once
@@ -104,9 +105,7 @@ def _with_ancestors(file: NodeFile, nodes: Iterable[int]) -> list[int]:
     """Return nodes and their ancestors, parents first."""
     depths: dict[int, int] = {}
     for node in nodes:
-        path = [node]
-        while (above := int(file.tree.parents[path[-1]])) >= 0:
-            path.append(above)
+        path = path_to_root(file.tree.parents, node)
         depths.update({each: len(path) - place for place, each in enumerate(path)})
     return sorted(depths, key=lambda node: (depths[node], node))
 

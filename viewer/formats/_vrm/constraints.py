@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.json_parts import is_index, part
@@ -120,12 +121,6 @@ def _needed(tree: NodeTree, found: dict[int, Constraint], each: Constraint) -> l
     if each.kind != "aim":
         return [each.source] if each.source in found else []
     # The positions of both nodes depend on their ancestors, not on their own rotations.
-    above = [*_ancestors(tree, each.joint), *_ancestors(tree, each.source)]
+    one, other = (path_to_root(tree.parents, node)[1:] for node in (each.joint, each.source))
+    above = [*one, *other]
     return [node for node in dict.fromkeys(above) if node in found]
-
-
-def _ancestors(tree: NodeTree, node: int) -> list[int]:
-    path = []
-    while (node := int(tree.parents[node])) >= 0:
-        path.append(node)
-    return path

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from viewer.formats._nodes.content import NodeFile
 from viewer.formats._source import Source
 from viewer.formats._vrm.json_parts import is_index, part
@@ -60,7 +58,7 @@ def _nodes(file: NodeFile, each: Any, version: int) -> list[int]:
     if version == 0:
         mesh = part(each, "mesh")
         has_mesh = is_index(mesh, len(file.meshes))
-        return np.flatnonzero(file.tree.meshes == mesh).tolist() if has_mesh else []
+        return file.tree.with_mesh(mesh) if has_mesh else []
     node = part(each, "node")
     has_node = is_index(node, file.tree.n_nodes) and file.tree.meshes[node] >= 0
     return [node] if has_node else []

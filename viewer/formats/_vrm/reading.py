@@ -157,7 +157,7 @@ def _binds(
         if version == 0:
             mesh, scale = part(each, "mesh"), 1.0 / _PERCENT
             is_mesh = is_index(mesh, len(file.meshes))
-            nodes = np.flatnonzero(file.tree.meshes == mesh).tolist() if is_mesh else []
+            nodes = file.tree.with_mesh(mesh) if is_mesh else []
         else:
             node, scale = part(each, "node"), 1.0
             nodes = [node] if is_index(node, file.tree.n_nodes) else []

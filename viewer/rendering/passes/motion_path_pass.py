@@ -22,13 +22,12 @@ from viewer.rig.motion.motion_paths import MotionPath, motion_path, segments
 from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformClip, TransformPath
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
 __all__ = ["Moment", "MotionPathBuffers", "MotionPathPass", "path_colors"]
 
 _WIDTH = 2.5  # pixels
 _HIDDEN = 0.3  # opacity of hidden parts
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _GOLDEN = 0.618033988749895
 
 
@@ -124,7 +123,7 @@ def _unmoved(clip: TransformClip, skeleton: Skeleton, pose: Pose) -> list[Floats
         own = [channel.joint] if channel.shapes is None else channel.shapes.tolist()
         moved[channel.path] += own
     follows = np.where(
-        skeleton.dof_kinds < _FIRST_ROTATION,
+        skeleton.dof_kinds < FIRST_ROTATION,
         np.isin(skeleton.dof_joints, moved["translation"]),
         np.isin(skeleton.dof_joints, moved["rotation"]),
     )

@@ -90,13 +90,13 @@ def counterpart(figure: Figure, animation: Animation) -> int:
     Figures of one file have animations with the same names; the range distinguishes animations of
     equal name.
     """
+    span = animation.start, animation.end
     found = [
-        (other.start != animation.start or other.end != animation.end, index)
+        (other is not animation, (other.start, other.end) != span, index)
         for index, other in enumerate(figure.animations)
         if other is animation or other.name == animation.name
     ]
-    exact = [index for index, other in enumerate(figure.animations) if other is animation]
-    return exact[0] if exact else min(found, default=(False, -1))[1]
+    return min(found)[-1] if found else -1
 
 
 def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) -> None:

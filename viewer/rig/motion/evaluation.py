@@ -27,7 +27,7 @@ from viewer.rig.pose import Pose, dof_rotations, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Motion, figure_pose
 from viewer.rig.shape import joint_directions, moved_rest_translations, rest_joints
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 from viewer.rig.transforms.posing import apply_transforms
 from viewer.rig.transforms.rate import key_rate
 from viewer.rig.transforms.sampling import sample_transforms
@@ -49,8 +49,6 @@ __all__ = [
 
 JointMotion: TypeAlias = Clip | TransformClip | SampledClip
 """A motion that poses a skeleton, and not captured points."""
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +152,7 @@ def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
 
 def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:
     joints: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
-    moves = skeleton.dof_kinds < _FIRST_ROTATION
+    moves = skeleton.dof_kinds < FIRST_ROTATION
     pose.dofs[moves] = np.clip(0.0, *skeleton.dof_limits[moves].T)
     set_joint_rotations(skeleton, pose, joints, quaternion_to_matrix(rows.rotations[row]))
     place_pose(pose, rows, row)
@@ -261,7 +259,7 @@ def _keyed_frames(skeleton: Skeleton, clip: Clip, times: Floats, pose: Pose) -> 
     beneath = pose.rotations / np.linalg.norm(pose.rotations, axis=-1, keepdims=True)
     rotations = multiply(beneath, matrix_to_quaternion(dof_rotations(skeleton, dofs)))
     translations = np.tile(pose.translations, (count, 1, 1))
-    for dof in np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION):
+    for dof in np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION):
         translations[:, skeleton.dof_joints[dof], skeleton.dof_kinds[dof]] += dofs[:, dof]
     return Frames(
         times,

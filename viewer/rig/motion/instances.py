@@ -29,7 +29,7 @@ from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.posing.pose_vector import rotation_rows
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton, clamp_dofs
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
 from viewer.rig.transforms.posing import apply_placements, apply_transforms
 from viewer.rig.transforms.sampling import sample_transforms
 
@@ -41,8 +41,6 @@ __all__ = [
     "posed_worlds",
     "worlds",
 ]
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False) -> None:
@@ -122,7 +120,7 @@ def _pose_by_frames(
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(rows.rotations)
     dofs = np.stack([actor.pose.dofs for actor in actors if actor.pose is not None])
-    dofs[:, skeleton.dof_kinds < _FIRST_ROTATION] = 0.0
+    dofs[:, skeleton.dof_kinds < FIRST_ROTATION] = 0.0
     dofs[:, balls] = matrix_to_euler(within)
     dofs = clamp_dofs(skeleton, dofs)
     for row, actor in enumerate(actors):
@@ -175,7 +173,7 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
     local[..., 3, 3] = 1.0
     scales = np.swapaxes(np.stack([pose.scales for pose in poses]), 0, 1)
     shifts = np.stack([pose.translations for pose in poses])
-    moves = np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION)
+    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
     if len(moves):
         dofs = np.stack([pose.dofs[moves] for pose in poses])
         every = np.arange(len(poses))[:, None]

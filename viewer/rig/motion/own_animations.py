@@ -8,10 +8,9 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene, figure_pose
+from viewer.rig.skeleton import FIRST_ROTATION
 
 __all__ = ["has_own_animations", "keeps_keys", "own_animations", "still_pose"]
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def has_own_animations(actor: Actor) -> bool:
@@ -72,7 +71,7 @@ def still_pose(actor: Actor) -> Pose:
     if not isinstance(actor.clip, TransformClip):
         return pose
     skeleton = actor.figure.require_skeleton()
-    rotates = skeleton.dof_kinds >= _FIRST_ROTATION
+    rotates = skeleton.dof_kinds >= FIRST_ROTATION
     for channel in actor.clip.channels:
         joint, dofs = channel.joint, skeleton.dof_joints == channel.joint
         if channel.path == "rotation":

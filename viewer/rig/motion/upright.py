@@ -7,13 +7,14 @@ from typing import Literal
 
 import numpy as np
 
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.shape import shaped
 
-__all__ = ["own_up", "upright_actor"]
+__all__ = ["own_up", "upright_actor", "upright_placement"]
 
 _OVER = np.array([1.0, -1.0, -1.0])  # 180 degrees about x
 
@@ -72,6 +73,12 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     if figure is actor.figure and pose is actor.pose and points is actor.points:
         return actor
     return replace(actor, figure=figure, pose=pose, points=points)
+
+
+def upright_placement(scene: Scene, actor: Actor) -> Floats:
+    """Return the matrix that places the actor of ``upright_actor`` in the scene: (4, 4)."""
+    hangs = own_up(scene, actor)[1]
+    return actor.placement @ np.diag([*_OVER, 1.0]) if hangs else actor.placement
 
 
 def _rotated_upright(figure: Figure, pose: Pose) -> Pose:

@@ -6,11 +6,10 @@ import math
 
 from viewer.diagnostics import Phrase
 from viewer.rig.number_text import number_text
-from viewer.rig.skeleton import Skeleton, dof_label
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, dof_label
 
 __all__ = ["beyond_text", "dof_value_text"]
 
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _MOST_DIGITS = 9  # decimals; more would show rounding errors of float64
 
 
@@ -28,7 +27,7 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
     digits : int
         Decimals of angles; lengths have three more.
     """
-    if skeleton.dof_kinds[dof] >= _FIRST_ROTATION:
+    if skeleton.dof_kinds[dof] >= FIRST_ROTATION:
         return f"{number_text(math.degrees(value), f'.{digits}f')}\N{DEGREE SIGN}"
     return number_text(value, f".{digits + 3}g")
 

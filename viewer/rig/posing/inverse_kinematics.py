@@ -20,11 +20,10 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 __all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _CLOSE = 1e-7  # fraction of the chain's length; a smaller error counts as 0
 _STILL = 1e-10  # radians; smaller steps end the search
 _LARGEST_STEP = 0.5  # radians; beyond it the linearisation is poor
@@ -68,7 +67,7 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
     (N,) int32
         N <= length, the nearest first.
     """
-    rotates = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
+    rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
     able = set(skeleton.dof_joints[rotates].tolist())
     chain: list[int] = []
     above = int(skeleton.parents[joint])
@@ -133,11 +132,11 @@ def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Float
     dict of int to (3,)
         Unit vectors in the parent's frame, by row of the DOF table.
     """
-    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION))
+    own = np.flatnonzero((skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION))
     after = quaternion_to_matrix(pose.rotations[joint])
     axes = {}
     for row in own[::-1]:  # the last row is applied last, so it is the outermost
-        kind = int(skeleton.dof_kinds[row]) - _FIRST_ROTATION
+        kind = int(skeleton.dof_kinds[row]) - FIRST_ROTATION
         axes[int(row)] = after[:, kind].copy()
         after = after @ axis_rotations(kind, pose.dofs[row])
     return axes
@@ -177,7 +176,7 @@ def reach(
     chain = chain_above(skeleton, joint, length)
     if not len(chain):
         raise RigError(f"no joint above {joint_label(skeleton, joint)} can rotate")
-    rotates = (skeleton.dof_kinds >= _FIRST_ROTATION) & ~skeleton.locked
+    rotates = (skeleton.dof_kinds >= FIRST_ROTATION) & ~skeleton.locked
     rows = np.flatnonzero(rotates & np.isin(skeleton.dof_joints, chain)).astype(np.int32)
     return _Solver(skeleton, pose.copy(), joint, np.asarray(target, float), rows).solve(rounds)
 

@@ -19,11 +19,10 @@ import numpy as np
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quaternion_to_matrix
 from viewer.rig.pose import Pose
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
 __all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 _SWEEPS = 200
 _STILL = 1e-10  # radians; a sweep with smaller changes is the last
 _ROUNDING = 1e-9  # radians; a value this far beyond its limit counts as within it
@@ -66,7 +65,7 @@ def rotation_dofs(skeleton: Skeleton, joint: int, free: bool = False) -> Ints:
     (N,) int32
         Rows of the DOF table.
     """
-    chosen = (skeleton.dof_joints == joint) & (skeleton.dof_kinds >= _FIRST_ROTATION)
+    chosen = (skeleton.dof_joints == joint) & (skeleton.dof_kinds >= FIRST_ROTATION)
     if free:
         chosen &= ~skeleton.locked
     return np.flatnonzero(chosen).astype(np.int32)
@@ -100,7 +99,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     """
     rows = rotation_dofs(skeleton, joint)
     low, high = skeleton.dof_limits[rows].T
-    axes = (skeleton.dof_kinds[rows] - _FIRST_ROTATION).tolist()
+    axes = (skeleton.dof_kinds[rows] - FIRST_ROTATION).tolist()
     wanted = quaternion_to_matrix(pose.rotations[joint]).T @ rotation
     solver = _Solver(axes, low, high, pose.dofs[rows], wanted)
     dofs = pose.dofs.copy()

@@ -8,12 +8,10 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
-from viewer.rig.skeleton import Skeleton
+from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 from viewer.rig.transforms.sampling import TransformSamples
 
 __all__ = ["apply_placements", "apply_transforms", "set_joint_translations"]
-
-_FIRST_ROTATION = 3  # DOF kinds 0-2 translate, 3-5 rotate
 
 
 def apply_transforms(samples: TransformSamples, row: int, skeleton: Skeleton, pose: Pose) -> None:
@@ -63,7 +61,7 @@ def set_joint_translations(
         Relative to the parent joint, rest translation included; lengths.
     """
     offsets = translations - skeleton.rest_translations[joints]
-    moves = np.flatnonzero(skeleton.dof_kinds < _FIRST_ROTATION)
+    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
     moves = moves[np.isin(skeleton.dof_joints[moves], joints)]
     if not len(moves):
         pose.translations[joints] = offsets
@@ -72,7 +70,7 @@ def set_joint_translations(
     wanted[joints] = offsets
     owners, axes = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
     # Of several DOFs along one axis, the first takes the offset.
-    _, first = np.unique(owners * _FIRST_ROTATION + axes, return_index=True)
+    _, first = np.unique(owners * FIRST_ROTATION + axes, return_index=True)
     values = np.zeros(len(moves))
     values[first] = wanted[owners[first], axes[first]]
     pose.dofs[moves] = np.clip(values, *skeleton.dof_limits[moves].T)

@@ -1,0 +1,23 @@
+"""Objects and groups of ``.obj`` files as parts of the mesh."""
+
+from viewer.formats import Source
+from viewer.formats.obj import read
+from viewer.rig.mesh import Mesh
+
+SQUARE = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n"
+
+
+def mesh_of(text: str) -> Mesh:
+    return read(Source("a.obj", text.encode())).require_mesh()
+
+
+def test_objects_or_else_groups_are_parts() -> None:
+    text = SQUARE + "f 1 2 3\no box\ng low\nf 1 2 4\ng high\nf 2 3 4\no lid\no ball\nf 1 3 4\n"
+    mesh = mesh_of(text)
+    assert mesh.parts == ("box", "ball")
+    assert mesh.part_indices.tolist() == [-1, 0, 0, 1]
+    mesh = mesh_of(text.replace("o ball", "o box"))
+    assert mesh.parts == ("low", "high")
+    assert mesh.part_indices.tolist() == [-1, 0, 1, 1]
+    mesh = mesh_of(SQUARE + "o box\nf 1 2 3\n")
+    assert mesh.parts == ()

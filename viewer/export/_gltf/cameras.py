@@ -1,0 +1,72 @@
+"""Cameras of a scene in a glTF file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.export._gltf.document import Document, text_of
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
+
+__all__ = ["add_cameras"]
+
+# OpenCV's cameras look along z with y down, those of glTF along -z with y up.
+_FLIP = np.diag([1.0, -1.0, -1.0])
+_NEAR = 0.01  # metres; glTF requires a near plane, which is closer than any figure
+_CENTRED = 1e-6  # fraction of the width
+
+
+def add_cameras(
+    document: Document, views: Sequence[CameraView], to_file: Floats
+) -> list[Diagnostic]:
+    """Add the cameras of a scene; return notes about what glTF cannot store.
+
+    ``document``: modified in place; already has a scene.
+    ``views``: the cameras, in the space of the scene.
+    ``to_file`` (4, 4): scene space to the space of the file.
+    """
+    for view in views:
+        camera: dict[str, Any] = {"name": text_of(view.name)} if view.name else {}
+        focal_x, focal_y = float(view.intrinsic[0, 0]), float(view.intrinsic[1, 1])
+        width, height = _size(view)
+        angle = 2.0 * math.atan(0.5 * height / focal_y)
+        aspect = (width / focal_x) / (height / focal_y)
+        lens = {"yfov": angle, "aspectRatio": aspect, "znear": _NEAR}
+        index = document.add("cameras", {**camera, "type": "perspective", "perspective": lens})
+        center = to_file @ np.append(-view.rotation.T @ view.translation, 1.0)
+        turned = nearest_rotations(to_file[:3, :3])[0] @ view.rotation.T @ _FLIP
+        place = {
+            "translation": center[:3].tolist(),
+            "rotation": matrix_to_quaternion(turned).tolist(),
+        }
+        node = document.add("nodes", {**camera, "camera": index, **place})
+        document.root["scenes"][0]["nodes"].append(node)
+    bent = [view.name for view in views if _is_bent(view)]
+    moving = [view.name for view in views if view.motion is not None]
+    found = {"X003.camera-lenses": bent, "X003.camera-motions": moving}
+    return [
+        Diagnostic(key, values={"n": len(names), "names": names})
+        for key, names in found.items()
+        if names
+    ]
+
+
+def _size(view: CameraView) -> tuple[float, float]:
+    """Return the width and height of the images; twice the principal point if unknown."""
+    if view.size is not None:
+        return float(view.size[0]), float(view.size[1])
+    return 2.0 * float(view.intrinsic[0, 2]), 2.0 * float(view.intrinsic[1, 2])
+
+
+def _is_bent(view: CameraView) -> bool:
+    """Return whether a lens is distorted, skewed or off centre."""
+    width, height = _size(view)
+    apart = view.intrinsic[:2, 2] - (0.5 * width, 0.5 * height)
+    is_off = bool((np.abs(apart) > _CENTRED * width).any()) or view.intrinsic[0, 1] != 0.0
+    return is_off or bool(view.distortion.any())
