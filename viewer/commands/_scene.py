@@ -59,6 +59,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         f"{f' (default: {default})' if default else ''}",
     )
     add_animation_argument(group)
+    parser.set_defaults(springs="off")
     group.add_argument("--body", action="store_true", help="also open the bundled human body")
     group.add_argument(
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
@@ -134,6 +135,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
+        springs=arguments.springs == "on",
     )
 
 

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from viewer.commands._baked_springs import bake_springs
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
@@ -77,10 +78,11 @@ def run(arguments: argparse.Namespace) -> int:
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
+    baked = bake_springs(arguments, scene)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    notes = write(arguments, scene, output, skinning)
+    notes = [*write(arguments, scene, output, skinning), *baked]
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 

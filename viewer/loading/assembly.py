@@ -110,12 +110,28 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         from viewer.loading.animating import animate
 
         animate(cast, settings.animation)
+    if settings.springs:
+        _switch_on_springs(cast)
     if any(actor.clip is not None for actor in cast.actors):
         from viewer.rig.motion.evaluation import pose_actor, time_span
 
         start = time_span(cast.actors)[0]
         for actor in cast.actors:
             pose_actor(actor, start)
+
+
+def _switch_on_springs(cast: Cast) -> None:
+    """Simulate the spring joints of all figures that have any."""
+    actors = [
+        actor
+        for actor in cast.actors
+        if actor.figure.skeleton is not None and actor.figure.skeleton.springs is not None
+    ]
+    if actors:
+        from viewer.rig.motion.spring_motion import SpringMotion
+
+        for actor in actors:
+            actor.springs = SpringMotion()
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:

@@ -39,6 +39,8 @@ class MotionSettings:
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
+    springs : bool
+        Whether joints that swing, such as hair, are simulated while a motion plays.
     """
 
     model: Path | None = None
@@ -51,3 +53,4 @@ class MotionSettings:
     drives: bool = True
     images: Path | None = None
     animation: str = ""
+    springs: bool = False

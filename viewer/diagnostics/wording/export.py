@@ -84,6 +84,8 @@ MESSAGES = {
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
     "keypoints3d folder",
+    "X003.springs": "{figure:text}: {n:#joint} that {n:?swings|swing} {n:?has|have} the rotations "
+    "of the clip; --bake-springs writes the simulated ones",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
     # Missing frames
@@ -122,6 +124,8 @@ MESSAGES = {
     "--model for exact translations)",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",
+    "X005.springs-baked": "{figure:text}: simulated rotations of {n:#joint} that {n:?swings|swing} "
+    "are written",
     "X005.untracked": "{names:all}: not tracked, possibly a different person in each frame",
     "X005.of-person": "{person}: {remark}",
 }
