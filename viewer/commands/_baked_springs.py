@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
@@ -23,9 +24,11 @@ def add_spring_argument(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def bake_springs(arguments: argparse.Namespace, scene: Scene) -> list[Diagnostic]:
+def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> list[Diagnostic]:
     """Replace motions of figures with joints that swing by frames, if requested; return notes."""
+    holds_motion = output.suffix.lower() != ".vrm"
     actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
+    actors = actors if holds_motion else []
     bakes = arguments.springs == "on"
     if bakes and not actors:
         raise ViewerError("--bake-springs: no figure with a motion has joints that swing")

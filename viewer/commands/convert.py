@@ -31,6 +31,7 @@ from viewer.commands._scene import (
     open_scene,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_clips, files_written
@@ -45,6 +46,8 @@ from viewer.rig.skinning import Skinning
 from viewer.streams import is_stdout, require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
+
+_OPTIMIZED = (".glb", ".gltf", ".vrm")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
     add_motion_arguments(parser)
+    add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser)
     add_pose_arguments(parser)
@@ -78,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
-    baked = bake_springs(arguments, scene)
+    baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
@@ -99,15 +103,11 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         )
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
-    if suffix == ".vrm":
-        raise UnsupportedFormatError(
-            "VRM files cannot be written: use .glb, which omits the humanoid map, expressions and "
-            "meta data"
-        )
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
-    if arguments.optimize and not any(kind.writes_keys for kind in kinds):
+    if arguments.optimize and suffix not in _OPTIMIZED:
         raise ViewerError(f"--optimize: expected .glb or .gltf, found {printable(suffix)}")
+    vrm_meta(arguments, output)
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
@@ -121,9 +121,9 @@ def _write_poses(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
     """Write the current poses."""
-    optimizes = bool(arguments.optimize)
+    optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, output)
     return _write_actors(
-        arguments, scene, output, lambda a, path: export(a, path, skinning, optimizes)
+        arguments, scene, output, lambda a, path: export(a, path, skinning, optimizes, meta)
     )
 
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
-from viewer.export._options import MotionOptions
+from viewer.export._options import MotionOptions, VrmMeta
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
@@ -24,6 +25,7 @@ __all__ = [
     "EXPORTERS",
     "Exporter",
     "MotionOptions",
+    "VrmMeta",
     "animation_for",
     "export",
     "export_animation",
@@ -117,6 +119,12 @@ EXPORTERS = {
         writes_motion=True,
         writes_keys=True,
     ),
+    "vrm": Exporter(
+        "VRM: humanoid character",
+        (".vrm",),
+        "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
+        "pose, motion, limits of joints, pose correctives",
+    ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
         (".bvh",),
@@ -165,7 +173,11 @@ def exporter_for(path: str | Path) -> str:
 
 
 def export(
-    actor: Actor, path: str | Path, skinning: Skinning | None = None, optimizes: bool = False
+    actor: Actor,
+    path: str | Path,
+    skinning: Skinning | None = None,
+    optimizes: bool = False,
+    meta: VrmMeta | None = None,
 ) -> list[Diagnostic]:
     """Write an actor in its current pose; its placement in the scene is omitted.
 
@@ -178,7 +190,9 @@ def export(
     skinning : Skinning, optional
         Skinning method and options.
     optimizes : bool
-        Quantise vertices, which glTF can.
+        Quantise vertices, which glTF and VRM can.
+    meta : VrmMeta, optional
+        Name, authors and licence of a VRM character; those of its file if omitted.
 
     Returns
     -------
@@ -195,11 +209,13 @@ def export(
     OutputError
         If a file cannot be written.
     """
-    module = import_module(f"{__name__}.{exporter_for(path)}")
-    options = (True,) if optimizes else ()
-    if optimizes and not EXPORTERS[exporter_for(path)].writes_keys:
+    key = exporter_for(path)
+    module = import_module(f"{__name__}.{key}")
+    options: dict[str, Any] = {"meta": meta} if key == "vrm" else {}
+    if optimizes and key not in ("gltf", "vrm"):
         raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
-    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), *options)
+    options |= {"optimizes": True} if optimizes else {}
+    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), **options)
     if actor.hidden_parts:
         notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
     return notes

@@ -7,7 +7,7 @@ it if it is in another unit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,9 +46,16 @@ __all__ = ["export", "export_animation", "export_clips"]
 
 
 def export(
-    actor: Actor, path: Path, skinning: Skinning, optimizes: bool = False
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    optimizes: bool = False,
+    extend: Callable[[Document, Body, Built], list[Diagnostic]] | None = None,
 ) -> list[Diagnostic]:
-    """Write a figure in its current pose; see ``viewer.export.export``."""
+    """Write a figure in its current pose; see ``viewer.export.export``.
+
+    ``extend`` adds the extensions of a VRM character, and returns notes about them.
+    """
     figure, pose = actor.figure, actor.pose
     weights = np.zeros((1, 0)) if pose is None else pose.shape_weights[None]
     body = body_of(figure, shape_of(figure, weights), skinning)
@@ -57,15 +64,16 @@ def export(
         still = locals_of(skeleton, pose)
     document = Document(figure.name)
     built = add_body(document, body, figure.up, pose, still, actor.color, optimizes=optimizes)
+    extensions = [] if extend is None else extend(document, body, built)
     (data,) = _files([(path, document)])
     written = {"counts": built.counts, "size": len(data[path])}
-    notes = [Diagnostic("X001.gltf", path, values=written)]
+    notes = [Diagnostic("X001.gltf", path, values=written), *extensions]
     notes += _beside(data, path) + _quantization(path, built, figure) + _remarks(body, figure.up)
     file = Written(path, parsed([*data.values()]), built.tree, built.meshes)
     figure, frames = pose_frames(figure, pose)
     rows = np.zeros(1, dtype=np.intp)
     notes += gltf_losses(file, figure, frames, rows, skinning, body.shape, body.influences, None)
-    return notes + not_held(figure, body.shape)
+    return notes + not_held(figure, body.shape, is_vrm=extend is not None)
 
 
 def export_clips(

@@ -61,7 +61,8 @@ class VrmRecord:
     materials : tuple of int
         Index in the file of each material of the figure's mesh.
     toon : mapping
-        Extension ``VRMC_materials_mtoon`` of the file's materials, by index.
+        Extensions ``VRMC_materials_mtoon`` and ``KHR_materials_unlit`` of the file's materials, by
+        index.
     textures : StoredTextures or None
         Textures of the file.
     """

@@ -239,7 +239,7 @@ def _add_modern(file: File, index: Any) -> None:
         "specVersion": "1.0",
         "constraint": {"roll": {"source": index["leftHand"], "rollAxis": "X", "weight": 0.5}},
     }
-    file.root["nodes"][index["leftLowerArm"]]["extensions"] = {"VRMC_node_constraint": roll}
+    file.root["nodes"][index["rightHand"]]["extensions"] = {"VRMC_node_constraint": roll}
     file.root["extensions"] = {"VRMC_vrm": vrm, "VRMC_springBone": springs}
     file.root["extensionsUsed"] = [
         "VRMC_vrm",

@@ -25,6 +25,7 @@ MESSAGES = {
     "X001.gltf-motion": "{counts:all}, {frames} at {rate:g} fps, {size} bytes",
     "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
     "bytes",
+    "X001.vrm": "VRM {version}: {parts:all}",
     "X001.gltf-arrays": "array data, {size} bytes",
     "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
     "X001.texture": "its texture",
@@ -86,6 +87,9 @@ MESSAGES = {
     "keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#joint} that {n:?swings|swing} {n:?has|have} the rotations "
     "of the clip; --bake-springs writes the simulated ones",
+    "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
+    "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
+    "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
     # Missing frames
@@ -112,6 +116,9 @@ MESSAGES = {
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",
+    "X005.t-pose": "the rest pose is a T-pose, as VRM requires: joints are rotated by up to "
+    "{degrees:.3g} degrees",
+    "X005.vrm-licence": "programs may refuse a VRM 1.0 file with another licence than {licence}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
     "X005.influences": _INFLUENCES,
@@ -143,6 +150,17 @@ PHRASES = {
     "written-joints": "{n:#joint}",
     "missing-frame": "{frame}",
     "missing-frames": "{first} to {last}",
+    "vrm-bones": "{n:#human bone}",
+    "vrm-expressions": "{n:#expression}",
+    "vrm-springs": "{n:#spring chain}",
+    "lost-bones": "{n:#human bone}",
+    "lost-annotations": "{n:#first-person setting}",
+    "lost-morph-binds": "{n:#bind} of morph targets",
+    "lost-material-binds": "{n:#bind} of materials",
+    "lost-textures": "{n:#texture}",
+    "lost-colliders": "{n:#collider}",
+    "lost-spring-joints": "{n:#joint} of springs",
+    "lost-centers": "{n:#centre} of springs",
     # Replacements of missing frames
     "pose-held": "the last pose is held",
     "pose-held-and-marked": "the last pose is held, and the frames are marked in present",

@@ -11,15 +11,16 @@ from viewer.rig.file_record import StoredImage, StoredTextures
 
 __all__ = ["stored_textures", "stored_toon"]
 
+_KEPT = (MTOON, "KHR_materials_unlit")
+
 
 def stored_toon(document: Document) -> dict[int, Any]:
-    """Return the toon shading of the materials that have any, by index, as parsed from JSON."""
+    """Return the toon and unlit extensions of the materials, by index, as parsed from JSON."""
     found = {}
     for index, material in enumerate(_listed(document, "materials")):
         extensions = material.get("extensions") if isinstance(material, dict) else None
-        toon = extensions.get(MTOON) if isinstance(extensions, dict) else None
-        if isinstance(toon, dict):
-            found[index] = toon
+        given = extensions if isinstance(extensions, dict) else {}
+        found[index] = {name: given[name] for name in _KEPT if isinstance(given.get(name), dict)}
     return found
 
 

@@ -302,7 +302,7 @@ class NodeFile:
     named_nodes : frozenset of int
         Further nodes that must become joints, because extensions refer to them.
     toon : dict
-        Toon shading of materials by index, as parsed from JSON.
+        Toon and unlit extensions of materials by index, as parsed from JSON.
     textures : StoredTextures or None
         Textures as the file lists them.
     facts : tuple of (str, str)
