@@ -82,6 +82,14 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         "captured bodies, otherwise the bundled body)",
     )
     group.add_argument(
+        "--motion",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a file whose motion or animation drives a figure, such as a glTF or FBX file with a "
+        "figure of its own; may be repeated",
+    )
+    group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
     group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
@@ -135,6 +143,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
+        motions=tuple(Path(resolve(file)) for file in arguments.motion),
         springs=arguments.springs == "on",
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from viewer.app.core.state import AppState
-from viewer.rig.motion.spring_motion import SpringMotion, has_springs, release_springs
+from viewer.rig.motion.spring_motion import has_springs, release_springs, springs_for
 
 __all__ = ["no_springs", "toggle_springs"]
 
@@ -20,7 +20,7 @@ def toggle_springs(state: AppState) -> None:
         state.say_status(no_springs(state))
         return
     if actor.springs is None:
-        actor.springs = SpringMotion()
+        actor.springs = springs_for(actor, state.scene.up)
     else:
         actor.springs = None
         release_springs(actor)

@@ -10,6 +10,7 @@ MESSAGES = {
     "B001.joints": "expected {joints:#bind matrix}, one per joint of {skeleton:text}, found {n}",
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
     "F002.no-body-model": "--model: not a body model",
+    "F002.no-motion": "--motion: expected a motion or an animation of a skeleton, found none",
     "F004.animation": "no animation is called {name:quoted}; {hint}",
     "F004.no-animations": "no animation is called {name:quoted}: the files have none",
     "F004.capture": "{problem}; specify the model with --model",

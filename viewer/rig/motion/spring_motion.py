@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.vectors import unit
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (
     JointMotion,
@@ -23,11 +26,18 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, PoseKey, pose_key
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import Skeleton
 from viewer.rig.springs.simulation import STEPS_PER_SECOND
 from viewer.rig.springs.springs import Springs
 from viewer.rig.springs.track import PosedJoints, SpringTrack
 
-__all__ = ["SpringMotion", "has_springs", "release_springs", "with_baked_springs"]
+__all__ = [
+    "SpringMotion",
+    "has_springs",
+    "release_springs",
+    "springs_for",
+    "with_baked_springs",
+]
 
 _MOST_TRACKS = 4
 _ON_FRAME = 1e-6  # fraction of a frame
@@ -38,9 +48,16 @@ class SpringMotion:
 
     Copies of an actor may share it. Results are kept until the clip changes, or the part of the
     pose that the clip does not animate.
+
+    Parameters
+    ----------
+    up : (3,), optional
+        The direction that is up in the world of the clip, in figure space: that of the figure if
+        omitted. Gravity is rotated with it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, up: Floats | None = None) -> None:
+        self._up = up
         self._tracks: dict[tuple[int, PoseKey], tuple[JointMotion, SpringTrack]] = {}
 
     def swing(self, actor: Actor, time: float) -> None:
@@ -71,11 +88,44 @@ class SpringMotion:
         if key not in self._tracks:
             while len(self._tracks) >= _MOST_TRACKS:
                 del self._tracks[next(iter(self._tracks))]
-            track = SpringTrack(figure.require_skeleton(), clip.start, clip.end)
+            track = SpringTrack(self.skeleton_of(figure), clip.start, clip.end)
             # The clip is kept alive, so that no other clip gets its id.
             self._tracks[key] = clip, track
         track = self._tracks[key][1]
         return track.rotations(times, lambda at: _posed(figure, clip, at, base))
+
+    def skeleton_of(self, figure: Figure) -> Skeleton:
+        """Return the skeleton with gravity in the world of the clip."""
+        skeleton, own = figure.require_skeleton(), np.zeros(3)
+        own["xyz".index(figure.up)] = 1.0
+        if self._up is None or skeleton.springs is None or np.allclose(own, self._up):
+            return skeleton
+        middle = unit(own + self._up)
+        if not middle.any():
+            middle = np.eye(3)["yzx".index(figure.up)]
+        # Two half turns, about the figure's up axis and about the middle of both.
+        first = 2.0 * np.outer(own, own) - np.eye(3)
+        turn = (2.0 * np.outer(middle, middle) - np.eye(3)) @ first
+        springs = skeleton.springs
+        turned = replace(springs, gravities=springs.gravities @ turn.T)
+        return replace(skeleton, springs=turned)
+
+
+def springs_for(actor: Actor, up: str) -> SpringMotion | None:
+    """Return the simulation of an actor in a scene; None without spring joints.
+
+    Parameters
+    ----------
+    actor : Actor
+        Its placement is that of the scene.
+    up : "y" or "z"
+        Up axis of the scene.
+    """
+    if not has_springs(actor):
+        return None
+    above = np.zeros(3)
+    above["xyz".index(up)] = 1.0
+    return SpringMotion(unit(actor.placement[:3, :3].T @ above))
 
 
 def has_springs(actor: Actor) -> bool:
@@ -115,7 +165,8 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     times = clip.start + np.arange(count) / rate
     frames = frames_of(actor.figure, clip, times, actor.pose)
     rotations = frames.rotations.copy()
-    rotations[:, skeleton.springs.joints] = SpringMotion().rotations(actor, times)
+    swings = actor.springs if isinstance(actor.springs, SpringMotion) else SpringMotion()
+    rotations[:, skeleton.springs.joints] = swings.rotations(actor, times)
     rows: Ints = np.arange(count, dtype=np.int32)
     return SampledClip(
         clip.name,
