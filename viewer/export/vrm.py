@@ -29,10 +29,12 @@ from viewer.export._vrm.made import made_character
 from viewer.export._vrm.maps import Maps
 from viewer.export._vrm.meta import LICENCE, changed_meta, checked_meta
 from viewer.export._vrm.standing import in_t_pose, standing
+from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skinning import Skinning
+from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["export"]
 
@@ -84,8 +86,18 @@ def export(
     figure, angle = in_t_pose(standing(figure, pose, bones), bones)
     still = replace(still, figure=figure, pose=figure_pose(figure))
     notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
+    notes += _unit_notes(actor.figure)
     extend = partial(_add_made, bones, told)
     return gltf.export(still, path, skinning, optimizes, extend) + notes
+
+
+def _unit_notes(figure: Figure) -> list[Diagnostic]:
+    """Return a note about lengths that are converted, or whose unit is unknown."""
+    if figure.unit not in METRES:
+        return [Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name})]
+    if METRES[figure.unit] != 1.0:
+        return [Diagnostic("X005.unit-converted", values={"unit": UNIT_NAMES[figure.unit]})]
+    return []
 
 
 def _left_out(actor: Actor) -> list[Diagnostic]:

@@ -74,8 +74,9 @@ MESSAGES = {
     "X003.body-joint-scales": "animated scales of joints are omitted ({low:.6g} to {high:.6g})",
     "X003.bvh-joint-scales": "BVH cannot animate scales of joints ({low:g} to {high:g}): only the "
     "positions of joints follow them",
-    "X003.rigged-correctives": "pose correctives cannot be stored in .skel and .skin: the rest "
-    "mesh is adjusted to match the target without them",
+    "X003.rigged-correctives": "pose correctives are not stored: the rest mesh is adjusted to "
+    "match the target without them",
+    "X003.rigged-pose": "the figure is at rest: .npz and .skel also store the target's pose",
     "X003.empty-mesh": "the mesh has no vertices and is omitted",
     "X003.absent": "{figure:text}: absent in {frames}, not written",
     "X003.absent-now": "{figure:text}: absent at that time, not written",
