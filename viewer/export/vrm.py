@@ -29,6 +29,7 @@ from viewer.export._vrm.made import made_character
 from viewer.export._vrm.maps import Maps
 from viewer.export._vrm.meta import LICENCE, changed_meta, checked_meta
 from viewer.export._vrm.standing import in_t_pose, standing
+from viewer.formats._vrm.json_parts import part
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 from viewer.rig.pose import pose_key
@@ -180,18 +181,23 @@ def _written(told: Mapping[str, Any], extensions: Mapping[str, Any], version: in
     """Return a note that counts the contents of the extensions."""
     bones = told["humanoid"]["humanBones"]
     if version == 0:
-        listed = told.get("blendShapeMaster", {}).get("blendShapeGroups", [])
-        chains = told.get("secondaryAnimation", {}).get("boneGroups", [])
-        n_chains = sum(len(each["bones"]) for each in chains)
+        n_expressions = _size(part(told, "blendShapeMaster", "blendShapeGroups"))
+        groups = part(told, "secondaryAnimation", "boneGroups")
+        chains = groups if isinstance(groups, list) else []
+        n_chains = sum(_size(part(each, "bones")) for each in chains)
     else:
-        kinds = told.get("expressions", {})
-        groups = (kinds.get(kind, {}) for kind in ("preset", "custom"))
-        listed = [name for group in groups for name in group]
-        n_chains = len(extensions.get("VRMC_springBone", {}).get("springs", []))
-    parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=len(listed))]
+        kinds = ("preset", "custom")
+        n_expressions = sum(_size(part(told, "expressions", kind)) for kind in kinds)
+        n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
+    parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=n_expressions)]
     parts.append(Phrase("vrm-springs", n=n_chains))
     values = {"version": "0.x" if version == 0 else "1.0", "parts": parts}
     return Diagnostic("X001.vrm", values=values)
+
+
+def _size(told: Any) -> int:
+    """Return the number of members of parsed JSON; 0 if it is neither a list nor an object."""
+    return len(told) if isinstance(told, list | dict) else 0
 
 
 def _lost(lost: Counter[str]) -> list[Diagnostic]:

@@ -200,6 +200,33 @@ def test_lost_references_are_counted(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("version", "place", "value"),
+    [
+        (1, ("VRMC_vrm", "expressions"), [1]),
+        (1, ("VRMC_vrm", "expressions", "preset"), "x"),
+        (1, ("VRMC_vrm", "firstPerson"), 5),
+        (1, ("VRMC_springBone", "springs"), {"joints": 3}),
+        (1, ("VRMC_springBone", "colliderGroups"), [{"colliders": [[1], None, 0]}]),
+        (0, ("VRM", "blendShapeMaster"), True),
+        (0, ("VRM", "blendShapeMaster", "blendShapeGroups"), 1.5),
+        (0, ("VRM", "secondaryAnimation", "boneGroups"), [None, 7, {"bones": 1}]),
+        (0, ("VRM", "materialProperties"), {"a": 1}),
+    ],
+)
+def test_data_of_another_structure_does_not_prevent_writing(
+    tmp_path: Path, version: int, place: tuple[str, ...], value: Any
+) -> None:
+    file = swinging(version)
+    told: Any = file.root["extensions"]
+    for name in place[:-1]:
+        told = told[name]
+    told[place[-1]] = value
+    written, _ = convert(file, tmp_path)
+    assert written.root["extensions"]
+    assert load(tmp_path / "out.vrm").actors[0].figure.require_skeleton().humanoid is not None
+
+
 @pytest.fixture(scope="module")
 def body(tmp_path_factory: pytest.TempPathFactory) -> Figure:
     path = tmp_path_factory.mktemp("body") / "SMPL.npz"

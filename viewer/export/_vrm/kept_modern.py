@@ -101,7 +101,12 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
     if colliders:
         result["colliders"] = colliders
         result["colliderGroups"] = [
-            {**each, "colliders": [places[i] for i in _list(each, "colliders") if i in places]}
+            {
+                **each,
+                "colliders": [
+                    places[i] for i in _list(each, "colliders") if type(i) is int and i in places
+                ],
+            }
             for each in _list(told, "colliderGroups")
             if isinstance(each, dict)
         ]

@@ -96,6 +96,8 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
     """Return the springs; groups of colliders keep their places, because springs index them."""
     groups = []
     for each in _list(told, "boneGroups"):
+        if not isinstance(each, dict):
+            continue
         listed = _list(each, "bones")
         bones = [maps.joint(bone, "spring-joints") for bone in listed]
         group = {**each, "bones": [bone for bone in bones if bone is not None]}
@@ -108,7 +110,8 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
         node = maps.joint(part(each, "node"), "colliders")
         # A group without a joint would be invalid: it moves to the first joint, without colliders.
         empty = {"node": next(iter(maps.record.joints), 0), "colliders": []}
-        colliders.append(empty if node is None else {**each, "node": node})
+        is_kept = node is not None and isinstance(each, dict)
+        colliders.append({**each, "node": node} if is_kept else empty)
     return {**told, "boneGroups": groups, "colliderGroups": colliders}
 
 

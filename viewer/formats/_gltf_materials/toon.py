@@ -100,7 +100,7 @@ def _old_toon(document: Document, told: Any, element: Element) -> Toon:
         named = Element(document.source, {"shade": {"index": texture}}, element.pointer)
         shade = read_slot(document, named, "shade")
     if color is not None:
-        color = decode_srgb(color[:3])
+        color = decode_srgb(color[:3].clip(0.0, 1.0))
     if toony is not None and shift is not None:
         toony += (1.0 - toony) * (0.5 + 0.5 * shift)
         shift = -shift - (1.0 - toony)

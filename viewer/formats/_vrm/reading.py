@@ -123,7 +123,8 @@ def _expressions(
     """Return the expressions that bind morph targets; report those that only change materials."""
     if version == 0:
         groups = part(told, "blendShapeMaster", "blendShapeGroups")
-        named = [(each.get("name"), each) for each in groups or () if isinstance(each, dict)]
+        listed = groups if isinstance(groups, list) else []
+        named = [(each.get("name"), each) for each in listed if isinstance(each, dict)]
         at = f"{pointer}/blendShapeMaster/blendShapeGroups"
     else:
         kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
