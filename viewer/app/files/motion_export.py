@@ -28,6 +28,7 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
@@ -166,6 +167,13 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # Edits made during the export must not change what is written.
         copied = actor.copy()
+        if actor.springs is not None and isinstance(actor.clip, JointMotion):
+            copied.springs = None
+            release_springs(copied)
+            springs = actor.figure.require_skeleton().springs
+            count = 0 if springs is None else springs.n_joints
+            values = {"figure": actor.name, "n": count}
+            notes.append(Diagnostic("X003.springs", values=values))
         is_keyed = isinstance(actor.clip, Clip | TransformClip)
         rate = state.clock.frame_rate if is_keyed else None
         parts.append(_Part(copied, file, frames, rate, number))

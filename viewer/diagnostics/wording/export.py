@@ -87,7 +87,7 @@ MESSAGES = {
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
     "keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#joint} that {n:?swings|swing} {n:?has|have} the rotations "
-    "of the clip; --bake-springs writes the simulated ones",
+    "of the clip; viewer convert --bake-springs writes the simulated ones",
     "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
     "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
     "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
