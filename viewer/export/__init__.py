@@ -125,6 +125,14 @@ EXPORTERS = {
         "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
         "pose, motion, limits of joints, pose correctives",
     ),
+    "vrma": Exporter(
+        "VRM animation: motion of a humanoid",
+        (".vrma",),
+        "motion of human bones, expressions",
+        "mesh, other joints",
+        writes_pose=False,
+        writes_motion=True,
+    ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
         (".bvh",),
@@ -216,9 +224,7 @@ def export(
         raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
     options |= {"optimizes": True} if optimizes else {}
     notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), **options)
-    if actor.hidden_parts:
-        notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
-    return notes
+    return notes + _hidden_notes(actor)
 
 
 def export_clips(
@@ -250,20 +256,19 @@ def export_clips(
 
     Raises
     ------
-    UnsupportedFormatError
-        If no exporter writes this suffix.
-    RigError
-        If the figure lacks the data that the format needs, or the keys are invalid.
-    OutputError
-        If a file cannot be written.
+    UnsupportedFormatError, RigError, OutputError
+        As for ``export``, and if the keys are invalid.
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     chosen = own_animations(actor) if clips is None else clips
     how = skinning or Skinning()
     notes: list[Diagnostic] = module.export_clips(actor, Path(path), how, chosen, optimizes)
-    if actor.hidden_parts:
-        notes.append(Diagnostic("X005.hidden-parts", values={"n": len(actor.hidden_parts)}))
-    return notes
+    return notes + _hidden_notes(actor)
+
+
+def _hidden_notes(actor: Actor) -> list[Diagnostic]:
+    n = len(actor.hidden_parts)
+    return [Diagnostic("X005.hidden-parts", values={"n": n})] if n else []
 
 
 def motion_exporters(path: str | Path) -> list[str]:
@@ -311,24 +316,13 @@ def export_animation(
     animation : SampledAnimation
         A figure in many poses.
     path : str or Path
-        Existing files are replaced; either all files of an export are written, or none.
+        Either all files of an export are written, or none.
     key : str
         A key of ``EXPORTERS``, see ``motion_exporters``.
     options : MotionOptions
         Options of the export.
 
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the data that the format cannot store, with errors. ``str``
-        gives the text of each.
-
-    Raises
-    ------
-    RigError
-        If the figure or motion lacks the data that the format needs.
-    OutputError
-        If a file cannot be written.
+    Returns notes, and raises errors, as ``export`` does.
     """
     module = import_module(f"{__name__}.{key}")
     notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)

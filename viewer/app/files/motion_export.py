@@ -21,6 +21,7 @@ from viewer.export import (
     suited_exporter,
 )
 from viewer.export._motion_paths import motion_paths
+from viewer.export._vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
@@ -73,7 +74,10 @@ def unsuited_formats(actor: Actor) -> dict[str, str]:
     """Return why formats cannot hold the motion of an actor, by suffix."""
     skeleton = actor.figure.skeleton
     is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
-    return {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
+    found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
+    if skeleton is not None and not is_humanoid(actor.figure):
+        found[".vrma"] = "for humanoids only: some human bones are not found"
+    return found
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:

@@ -26,6 +26,8 @@ MESSAGES = {
     "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
     "bytes",
     "X001.vrm": "VRM {version}: {parts:all}",
+    "X001.vrma": "{bones:#human bone}, {expressions:#expression}, {frames} at {rate:g} fps, {size} "
+    "bytes",
     "X001.gltf-arrays": "array data, {size} bytes",
     "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
     "X001.texture": "its texture",
@@ -91,6 +93,7 @@ MESSAGES = {
     "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
     "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
     "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
+    "X003.vrma-joints": "{n:#joint} that {n:?is|are} no human {n:?bone|bones} {n:?is|are} omitted",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
     # Missing frames

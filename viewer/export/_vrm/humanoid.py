@@ -9,7 +9,7 @@ from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["human_bones"]
+__all__ = ["bone_above", "human_bones", "is_humanoid"]
 
 _LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
 _REQUIRED = (
@@ -41,7 +41,7 @@ def human_bones(figure: Figure) -> dict[str, int]:
     skeleton = figure.require_skeleton()
     found = dict(skeleton.humanoid.joints) if skeleton.humanoid is not None else _named(skeleton)
     for bone in [*found]:
-        above = _above(bone)
+        above = bone_above(bone)
         needed = above in found or above in _REQUIRED
         if above and not (needed and _is_below(skeleton, found[bone], found.get(above, -1))):
             del found[bone]
@@ -52,6 +52,14 @@ def human_bones(figure: Figure) -> dict[str, int]:
     return found
 
 
+def is_humanoid(figure: Figure) -> bool:
+    """Return whether a figure with a skeleton has all required human bones."""
+    try:
+        return bool(human_bones(figure))
+    except RigError:
+        return False
+
+
 def _named(skeleton: Skeleton) -> dict[str, int]:
     """Return the bones that joint names imply; hips, legs and arms are needed for a humanoid."""
     joints = {name: joint for joint, name in enumerate(joint_meanings(skeleton)) if name}
@@ -60,7 +68,7 @@ def _named(skeleton: Skeleton) -> dict[str, int]:
     return found | dict(zip(SPINE_BONES, spine, strict=False))
 
 
-def _above(bone: str) -> str:
+def bone_above(bone: str) -> str:
     """Return the bone below which a bone must be; empty for the hips."""
     side = next((side for side in ("left", "right") if bone.startswith(side)), "")
     name = bone.removeprefix(side)

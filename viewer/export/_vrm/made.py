@@ -8,14 +8,16 @@ from typing import Any
 from viewer.export._gltf.body import Body, Built
 from viewer.rig.mesh import Mesh, PartView
 
-__all__ = ["made_character"]
+__all__ = ["PRESETS", "made_character"]
 
-_PRESETS = (
+PRESETS = (
     *("happy", "angry", "sad", "relaxed", "surprised", "neutral"),
     *("aa", "ih", "ou", "ee", "oh", "blink", "blinkLeft", "blinkRight"),
     *("lookUp", "lookDown", "lookLeft", "lookRight"),
 )
-_BY_NAME = {name.lower(): name for name in _PRESETS}
+"""Names of expressions that VRM 1.0 defines."""
+
+_BY_NAME = {name.lower(): name for name in PRESETS}
 _VIEWS: dict[PartView, str] = {
     "auto": "auto",
     "both": "both",

@@ -21,7 +21,7 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 from viewer.rig.units import METRES
 
-__all__ = ["in_t_pose", "standing"]
+__all__ = ["in_t_pose", "standing", "unit_rotation", "vrm_axes"]
 
 _PAIRS = ("UpperLeg", "UpperArm")
 _SMALL = 1e-6  # radians
@@ -33,7 +33,8 @@ _BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "L
 def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
     """Return a figure with a joint-wise equal skeleton without DOFs, in VRM's axes and unit.
 
-    Its shape is baked in unless it has only morph targets; pose correctives are dropped.
+    Its shape is baked in unless it has only morph targets; pose correctives are dropped. VRM
+    characters keep their height above the ground.
 
     ``figure``, ``pose``: the figure, and its rest pose with its shape.
     ``bones``: joint of each human bone.
@@ -43,9 +44,13 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
         figure, shapes = shaped(figure, pose.shape_weights), None
     skeleton = figure.require_skeleton()
     local = local_matrices(skeleton, pose)
-    turn = _axes(figure, forward_kinematics(skeleton.parents, local)[:, :3, 3], bones)
+    joints = forward_kinematics(skeleton.parents, local)[:, :3, 3]
+    turn = _axes(figure, joints, bones)
     scale = METRES.get(figure.unit, 1.0)
-    matrix = _on_ground(figure, scale * turn)
+    matrix = np.eye(4)
+    matrix[:3, :3] = scale * turn
+    if figure.record is None or figure.record.vrm is None:
+        matrix[1, 3] = _lift(figure, joints, scale * turn[1])
     roots = skeleton.parents < 0
     places = scale * local[:, :3, 3]
     places[roots] = apply_transform(matrix, local[roots, :3, 3])
@@ -78,6 +83,13 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
     return replace(moved, blend_shapes=replace(shapes, offsets=offsets, normal_offsets=normals))
 
 
+def vrm_axes(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Floats:
+    """Return the rotation from the axes of a figure in its rest pose to those of VRM: (3, 3)."""
+    skeleton = figure.require_skeleton()
+    world = forward_kinematics(skeleton.parents, local_matrices(skeleton, pose))
+    return _axes(figure, world[:, :3, 3], bones)
+
+
 def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
     """Return the rotation that turns the figure's left side to +x and its top to +y: (3, 3)."""
     up = np.zeros(3)
@@ -89,15 +101,16 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
     return np.stack([left, up, np.cross(left, up)])
 
 
-def _on_ground(figure: Figure, linear: Floats) -> Floats:
-    """Return the transform of a figure that puts its lowest vertex at y = 0: (4, 4)."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = linear
-    if figure.mesh is not None and figure.mesh.n_vertices:
-        heights = figure.mesh.positions @ linear[1]
-        low = float(heights.min())
-        matrix[1, 3] = -low if abs(low) > _NEAR * float(np.ptp(heights)) else 0.0
-    return matrix
+def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
+    """Return the height by which a figure is raised to stand on the ground; 0 if it nearly does.
+
+    ``joints`` (J, 3): their positions.
+    ``up`` (3,): multiplied by positions, gives heights.
+    """
+    points = joints if figure.mesh is None else np.concatenate([joints, figure.mesh.positions])
+    heights = points @ up
+    low = float(heights.min())
+    return -low if abs(low) > _NEAR * float(np.ptp(heights)) else 0.0
 
 
 def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
@@ -145,7 +158,8 @@ def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
 def unit_rotation(matrix: Floats) -> Floats:
     """Return the rotation of a matrix without shear: (3, 3)."""
     linear = matrix[:3, :3]
-    return linear / np.linalg.norm(linear, axis=0)
+    found: Floats = linear / np.linalg.norm(linear, axis=0)
+    return found
 
 
 def _worlds(skeleton: Skeleton, rotations: Floats) -> Floats:
