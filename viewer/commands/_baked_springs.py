@@ -26,7 +26,7 @@ def add_spring_argument(group: argparse._ArgumentGroup) -> None:
 
 def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> list[Diagnostic]:
     """Replace motions of figures with joints that swing by frames, if requested; return notes."""
-    holds_motion = output.suffix.lower() != ".vrm"
+    holds_motion = output.suffix.lower() not in (".vrm", ".vrma")
     actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
     actors = actors if holds_motion else []
     bakes = arguments.springs == "on"
