@@ -39,6 +39,7 @@ from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["export"]
 
+_STRAIGHT = 1e-4  # radians
 _CONSTRAINT = "VRMC_node_constraint"
 _TOON = "VRMC_materials_mtoon"
 _UNLIT = "KHR_materials_unlit"
@@ -86,7 +87,8 @@ def export(
     pose.shape_weights = actor.require_pose().shape_weights.copy()
     figure, angle = in_t_pose(standing(figure, pose, bones), bones)
     still = replace(still, figure=figure, pose=figure_pose(figure))
-    notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
+    if angle > _STRAIGHT:
+        notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
     notes += _unit_notes(actor.figure)
     extend = partial(_add_made, bones, told)
     return gltf.export(still, path, skinning, optimizes, extend) + notes

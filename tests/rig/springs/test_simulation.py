@@ -182,3 +182,17 @@ def test_chains_agree_with_the_pseudocode_of_the_specification(seed: int) -> Non
         for row, joint in enumerate(skeleton.springs.joints.tolist()):
             # 40 steps of 1e-16 relative rounding, amplified by inertia.
             assert_allclose(turn(rotations[row]), wanted[joint], rtol=0, atol=1e-9)
+
+
+def test_joints_hidden_by_a_scale_of_zero_do_not_swing() -> None:
+    springs = springs_of([1], [[0, -1, 0]], gravity=(1, 0, 0), center=0)
+    skeleton = skeleton_of(springs)
+    world, local, scales, place = pose_of(skeleton)
+    scales[0] = 0.0
+    world = forward_kinematics(skeleton.parents, local * np.array([0.0, 0.0, 0.0, 1.0]))
+    simulation = Simulation(skeleton)
+    tails = simulation.start(world, local, scales, place)
+    for _ in range(3):
+        tails, rotations = simulation.step(tails, world, local, scales, place)
+    assert np.isfinite(tails.now).all()
+    assert_allclose(np.linalg.norm(rotations, axis=1), 1.0, rtol=0, atol=1e-12)

@@ -34,6 +34,7 @@ STEPS_PER_SECOND = 60
 _STEP = 1.0 / STEPS_PER_SECOND
 _SHORT = 1e-12
 _OPPOSITE = 1e-9
+_FLAT = 1e-30  # determinant below which a matrix has no inverse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,8 +189,9 @@ class Simulation:
 
     def _arcs(self, rows: Ints, heads: Floats, points: Floats, factors: Floats) -> Floats:
         """Return the smallest rotations from the rest directions to the points: (N', 4)."""
-        local = np.linalg.solve(heads[:, :3, :3], (points - heads[:, :3, 3])[..., None])[..., 0]
-        start, end = self._axes[rows], unit(local / factors)
+        away = (points - heads[:, :3, 3])[..., None]
+        local = np.linalg.solve(_regular(heads[:, :3, :3]), away)[..., 0]
+        start, end = self._axes[rows], unit(local / np.where(factors == 0.0, 1.0, factors))
         scalar = 1.0 + np.einsum("na,na->n", start, end)[:, None]
         arcs = np.concatenate([np.cross(start, end), scalar], axis=-1)
         # Opposite directions: rotate by 180 degrees about any perpendicular axis.
@@ -236,7 +238,19 @@ def _points(matrices: Floats, points: Floats) -> Floats:
 
 
 def _inverse(matrices: Floats) -> Floats:
-    return np.asarray(np.linalg.inv(matrices), dtype=np.float64)
+    regular = matrices.copy()
+    regular[:, :3, :3] = _regular(matrices[:, :3, :3])
+    return np.asarray(np.linalg.inv(regular), dtype=np.float64)
+
+
+def _regular(linear: Floats) -> Floats:
+    """Return matrices (N, 3, 3) with the identity in place of those that have no inverse.
+
+    Joints are hidden by a scale of 0, which leaves nothing to swing.
+    """
+    is_flat = np.abs(np.linalg.det(linear)) < _FLAT
+    found: Floats = np.where(is_flat[:, None, None], np.eye(3), linear)
+    return found
 
 
 def _scaled(matrices: Floats, scales: Floats) -> Floats:
